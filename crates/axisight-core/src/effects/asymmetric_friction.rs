@@ -1,0 +1,63 @@
+//! Coulomb friction that differs between the two directions of motion.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "asymmetric_friction",
+    summary: "Coulomb friction of different size forward and backward",
+    equation: "tau_f = t (F_+ (1 + t) + F_- (1 - t)) / 2,  t = tanh(phi' / v_0)",
+    source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), section 2",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "forward_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "backward_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "smoothing_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 0.1,
+            lower: 0.01,
+            upper: 2.0,
+            typical: 0.1,
+        },
+    ],
+};
+
+struct Asymmetric<S> {
+    mean: S,
+    half_difference: S,
+    inverse_width: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Asymmetric {
+        mean: (p[0] + p[1]) * 0.5,
+        half_difference: (p[0] - p[1]) * 0.5,
+        inverse_width: p[2].recip(),
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Asymmetric<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        let t = (motor.speed * self.inverse_width).tanh();
+        -(t * self.half_difference.fma(t, self.mean))
+    }
+}

@@ -1,0 +1,45 @@
+//! Backlash: a dead zone between motor and joint.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "backlash",
+    summary: "play in the gear: no torque until the gap is crossed",
+    equation: "tau_g = k D + d D',  D = delta - clip(delta, -b, b)",
+    source: "Nordin, Gutman (2002), Automatica 38(10), dead-zone model",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    parameters: &[ParameterInfo {
+        name: "half_width_rad",
+        unit: "rad (joint side)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 0.05,
+        typical: 3e-4,
+    }],
+};
+
+struct Backlash<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Backlash(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Backlash<S> {
+    fn deflection(&self, delta: S) -> (S, S) {
+        let (above, below) = (delta - self.0, delta + self.0);
+        let zero = S::zero();
+        let loaded = above.if_positive(above, (-below).if_positive(below, zero));
+        let slope = above.if_positive(S::one(), (-below).if_positive(S::one(), zero));
+        (loaded, slope)
+    }
+
+    fn deflection_inverse(&self, loaded: S) -> S {
+        let zero = S::zero();
+        // An unloaded gear rests in the middle of its gap.
+        let side = loaded.if_positive(self.0, (-loaded).if_positive(-self.0, zero));
+        loaded + side
+    }
+}

@@ -1,0 +1,51 @@
+//! Coulomb friction.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "coulomb_friction",
+    summary: "constant friction against the direction of motion",
+    equation: "tau_f = F_c tanh(phi' / v_0)",
+    source: "Wernholt (2004), eq. (9.7), sign smoothed over the width v_0",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "coulomb_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "smoothing_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 0.1,
+            lower: 0.01,
+            upper: 2.0,
+            typical: 0.1,
+        },
+    ],
+};
+
+struct Coulomb<S> {
+    level: S,
+    inverse_width: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Coulomb {
+        level: p[0],
+        inverse_width: p[1].recip(),
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Coulomb<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        -(self.level * (motor.speed * self.inverse_width).tanh())
+    }
+}

@@ -1,0 +1,34 @@
+//! Transport delay between commanded and applied torque.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "input_delay",
+    summary: "the drive applies the commanded torque late",
+    equation: "tau(t) = u(t - T_d), any fraction of a sample",
+    source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    parameters: &[ParameterInfo {
+        name: "delay_s",
+        unit: "s",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 0.05,
+        typical: 1e-3,
+    }],
+};
+
+struct Delay<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Delay(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Delay<S> {
+    fn delay(&self) -> Option<S> {
+        Some(self.0)
+    }
+}

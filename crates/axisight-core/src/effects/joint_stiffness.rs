@@ -1,0 +1,36 @@
+//! Gear stiffness other than the simulator's.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "joint_stiffness",
+    summary: "gear stiffness off by more than its tolerance",
+    equation: "k = k_1 (1 + s)",
+    source: "Wernholt (2004), eq. (9.6) with k_3 = 0",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    parameters: &[ParameterInfo {
+        name: "relative_change",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.9,
+        upper: 5.0,
+        typical: 0.2,
+    }],
+};
+
+struct Stiffness<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Stiffness(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Stiffness<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(k) = plant.stiffness.as_deref_mut() {
+            *k = *k * (self.0 + 1.0);
+        }
+    }
+}

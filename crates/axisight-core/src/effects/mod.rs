@@ -1,0 +1,71 @@
+//! Effects: what a machine does and a simulator may not model.
+//!
+//! One file per effect states its parameters, the value at which it vanishes,
+//! where it acts, its equation and its source. A new effect is a new file and
+//! one line in the table below.
+
+mod harmonics;
+mod kernel;
+
+pub use kernel::{
+    Acts, EffectError, EffectInfo, Kernel, Motor, ParameterInfo, PlantParameters, Role, Scope,
+};
+
+use crate::scalar::Scalar;
+
+macro_rules! effect_table {
+    ($($module:ident),* $(,)?) => {
+        $(mod $module;)*
+
+        /// Every effect, in the order of the documentation.
+        pub static EFFECTS: &[&EffectInfo] = &[$(&$module::INFO),*];
+
+        /// The kernel of effect `name` at parameters `p` (in the order of its table).
+        ///
+        /// # Errors
+        /// [`EffectError`] if the name is unknown or the parameter count is wrong.
+        pub fn build<S: Scalar>(name: &str, p: &[S]) -> Result<Box<dyn Kernel<S>>, EffectError> {
+            let info = info(name)?;
+            if info.parameters.len() != p.len() {
+                return Err(EffectError::ParameterCount {
+                    effect: info.name,
+                    expected: info.parameters.len(),
+                    got: p.len(),
+                });
+            }
+            match name {
+                $(stringify!($module) => Ok($module::kernel(p)),)*
+                _ => Err(EffectError::unknown(name)),
+            }
+        }
+    };
+}
+
+effect_table!(
+    viscous_friction,
+    coulomb_friction,
+    asymmetric_friction,
+    stribeck_friction,
+    backlash,
+    nonlinear_stiffness,
+    joint_stiffness,
+    torque_ripple,
+    resolver_ripple,
+    input_delay,
+    actuator_bandwidth,
+    torque_constant,
+    torque_offset,
+    payload,
+);
+
+/// Description of effect `name`.
+///
+/// # Errors
+/// [`EffectError::Unknown`] with the list of known names.
+pub fn info(name: &str) -> Result<&'static EffectInfo, EffectError> {
+    EFFECTS
+        .iter()
+        .copied()
+        .find(|e| e.name == name)
+        .ok_or_else(|| EffectError::unknown(name))
+}

@@ -1,0 +1,34 @@
+//! Gear stiffness that changes with load.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "nonlinear_stiffness",
+    summary: "gear spring with a cubic term: stiffer (or softer) under load",
+    equation: "tau_g = k_1 delta + k_3 delta^3",
+    source: "Wernholt (2004), eq. (9.6)",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    parameters: &[ParameterInfo {
+        name: "cubic_nm_rad3",
+        unit: "Nm/rad^3",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e14,
+        upper: 1e14,
+        typical: 1e11,
+    }],
+};
+
+struct Cubic<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Cubic(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Cubic<S> {
+    fn gear_torque(&self, loaded: S) -> S {
+        self.0 * loaded.square() * loaded
+    }
+}

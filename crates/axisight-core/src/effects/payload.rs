@@ -1,0 +1,84 @@
+//! A point mass on the last link that carries mass.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use crate::robot::Body;
+use crate::scalar::Scalar;
+
+const fn coordinate(name: &'static str, neutral: f64) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "m (frame of the last link)",
+        role: Role::Shape,
+        neutral,
+        lower: -3.0,
+        upper: 3.0,
+        typical: 0.5,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "payload",
+    summary: "the tool or load is heavier (or lighter) than modelled",
+    equation: "point mass m at p on the last link",
+    source: "Swevers, Verdonck, De Schutter (2007), IEEE Control Systems 27(5), payload as a rigid body",
+    scope: Scope::Arm,
+    acts: Acts::Arm,
+    parameters: &[
+        ParameterInfo {
+            name: "mass_kg",
+            unit: "kg",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e4,
+            upper: 1e4,
+            typical: 30.0,
+        },
+        coordinate("x_m", 1.0),
+        coordinate("y_m", 0.0),
+        coordinate("z_m", 0.2),
+    ],
+};
+
+struct Payload<S> {
+    mass: S,
+    position: [S; 3],
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Payload {
+        mass: p[0],
+        position: [p[1], p[2], p[3]],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Payload<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        let last = plant.chain.joints.iter_mut().rev().find_map(|j| j.body.as_mut());
+        if let Some(body) = last {
+            *body = combined(body, self.mass, &self.position);
+        }
+    }
+}
+
+/// A body with a point mass attached (parallel-axis theorem).
+fn combined<S: Scalar>(body: &Body<S>, mass: S, position: &[S; 3]) -> Body<S> {
+    let total = body.mass + mass;
+    let share = mass / total;
+    let arm: [S; 3] = std::array::from_fn(|i| position[i] - body.com[i]);
+    // Reduced mass of the pair; zero with the payload.
+    let reduced = body.mass * share;
+    let [x, y, z] = arm;
+    let spread = [
+        y * y + z * z,
+        x * x + z * z,
+        x * x + y * y,
+        -(x * y),
+        -(x * z),
+        -(y * z),
+    ];
+    Body {
+        mass: total,
+        com: std::array::from_fn(|i| body.com[i] + share * arm[i]),
+        inertia: std::array::from_fn(|i| body.inertia[i] + reduced * spread[i]),
+    }
+}

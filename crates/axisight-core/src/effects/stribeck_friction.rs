@@ -1,0 +1,75 @@
+//! Stribeck friction: Coulomb friction with an excess at low speed.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "stribeck_friction",
+    summary: "Coulomb friction that rises towards standstill",
+    equation: "tau_f = (F_c + F_s exp(-(phi' / v_s)^2)) tanh(phi' / v_0)",
+    source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. (5)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "coulomb_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "excess_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.3,
+        },
+        ParameterInfo {
+            name: "stribeck_speed_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 3.0,
+            lower: 0.3,
+            upper: 60.0,
+            typical: 3.0,
+        },
+        ParameterInfo {
+            name: "smoothing_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 0.1,
+            lower: 0.01,
+            upper: 2.0,
+            typical: 0.1,
+        },
+    ],
+};
+
+struct Stribeck<S> {
+    coulomb: S,
+    excess: S,
+    inverse_speed: S,
+    inverse_width: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Stribeck {
+        coulomb: p[0],
+        excess: p[1],
+        inverse_speed: p[2].recip(),
+        inverse_width: p[3].recip(),
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Stribeck<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        let hump = (-(motor.speed * self.inverse_speed).square()).exp();
+        let level = self.excess.fma(hump, self.coulomb);
+        -(level * (motor.speed * self.inverse_width).tanh())
+    }
+}

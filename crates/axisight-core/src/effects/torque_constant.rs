@@ -1,0 +1,37 @@
+//! Torque constant other than the drive believes.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "torque_constant",
+    summary: "the motor gives more or less torque than commanded, in proportion",
+    equation: "tau = (1 + e) u",
+    source: "Gautier, Briot (2014), Global identification of joint drive gains, J. Dyn. Sys. 136(5)",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    parameters: &[ParameterInfo {
+        name: "relative_error",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.8,
+        upper: 2.0,
+        typical: 0.05,
+    }],
+};
+
+struct Gain<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Gain(p[0] + 1.0))
+}
+
+impl<S: Scalar> Kernel<S> for Gain<S> {
+    fn drive(&self, torque: S) -> S {
+        torque * self.0
+    }
+    fn drive_inverse(&self, torque: S) -> S {
+        torque / self.0
+    }
+}

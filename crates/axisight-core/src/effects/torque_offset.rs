@@ -1,0 +1,37 @@
+//! Constant torque error.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "torque_offset",
+    summary: "a constant torque is added to the commanded one",
+    equation: "tau = u + o",
+    source: "Janot, Gautier, Brunot (2019), EMPS benchmark: offset of the force",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    parameters: &[ParameterInfo {
+        name: "offset_nm",
+        unit: "Nm",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e4,
+        upper: 1e4,
+        typical: 0.5,
+    }],
+};
+
+struct Offset<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Offset(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Offset<S> {
+    fn drive(&self, torque: S) -> S {
+        torque + self.0
+    }
+    fn drive_inverse(&self, torque: S) -> S {
+        torque - self.0
+    }
+}

@@ -1,0 +1,34 @@
+//! Viscous friction beyond the simulator's.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "viscous_friction",
+    summary: "friction proportional to speed, beyond what the simulator has",
+    equation: "tau_f = F_v phi'",
+    source: "Wernholt (2004), eq. (9.7)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[ParameterInfo {
+        name: "viscous_nm_s_rad",
+        unit: "Nm s/rad",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e4,
+        upper: 1e4,
+        typical: 0.01,
+    }],
+};
+
+struct Viscous<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Viscous(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Viscous<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        -(self.0 * motor.speed)
+    }
+}

@@ -1,0 +1,100 @@
+//! Normal equations kept apart by block of data.
+//!
+//! A block is a stretch of one axis of one log. With the pieces of
+//! `J^T J`, `J^T r` and `r^T r` per block, cross-validation, bootstrap and
+//! sandwich covariance need no further simulation and no stored residuals.
+
+/// Where a block lies in the residual vector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Block {
+    /// Log number.
+    pub record: usize,
+    /// Axis number.
+    pub axis: usize,
+    /// First entry in the residual vector.
+    pub start: usize,
+    /// Number of entries.
+    pub len: usize,
+}
+
+/// Normal equations of one block; parameters in the order of the fit.
+#[derive(Debug, Clone)]
+pub struct BlockGram {
+    /// The block.
+    pub block: Block,
+    /// `J^T W J`, row-major.
+    pub matrix: Vec<f64>,
+    /// `J^T W r`.
+    pub gradient: Vec<f64>,
+    /// Sum of losses.
+    pub loss: f64,
+}
+
+/// Cut `len` entries of one axis of one log into blocks of about `block_len`.
+pub(super) fn cut(record: usize, axis: usize, start: usize, len: usize, block_len: usize) -> Vec<Block> {
+    let count = (len / block_len.max(1)).max(1);
+    (0..count)
+        .map(|i| {
+            let (from, to) = (i * len / count, (i + 1) * len / count);
+            Block {
+                record,
+                axis,
+                start: start + from,
+                len: to - from,
+            }
+        })
+        .collect()
+}
+
+impl BlockGram {
+    /// Normal equations of `block` from residuals, weights and Jacobian columns.
+    pub(super) fn new(
+        block: Block,
+        residual: &[f64],
+        loss: f64,
+        weight: &[f64],
+        columns: &[&[f64]],
+    ) -> Self {
+        let range = block.start..block.start + block.len;
+        let (r, w) = (&residual[range.clone()], &weight[range.clone()]);
+        let n = columns.len();
+        let mut matrix = vec![0.0; n * n];
+        let mut gradient = vec![0.0; n];
+        let weighted: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|c| c[range.clone()].iter().zip(w).map(|(x, w)| x * w).collect())
+            .collect();
+        for i in 0..n {
+            gradient[i] = dot(&weighted[i], r);
+            for j in 0..=i {
+                let entry = dot(&weighted[i], &columns[j][range.clone()]);
+                matrix[i * n + j] = entry;
+                matrix[j * n + i] = entry;
+            }
+        }
+        Self {
+            block,
+            matrix,
+            gradient,
+            loss,
+        }
+    }
+}
+
+/// Inner product with eight partial sums, which vectorises and rounds less.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = chunks_a
+        .remainder()
+        .iter()
+        .zip(chunks_b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in chunks_a.zip(chunks_b) {
+        for i in 0..8 {
+            sums[i] = x[i].mul_add(y[i], sums[i]);
+        }
+    }
+    sums.iter().sum::<f64>() + tail
+}

@@ -1,0 +1,24 @@
+//! The arm: its description, rigid-body algorithms, equilibrium, linearization and modes.
+
+mod chain;
+mod description;
+mod equilibrium;
+mod linear_algebra;
+mod linearization;
+mod modes;
+mod parameters;
+mod plant;
+mod reader;
+mod rigid_body;
+mod vector;
+
+pub use chain::{Body, Chain, ChainState};
+pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
+pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
+pub use linearization::{Linearization, linearize};
+pub use modes::{Mode, modes, zoh_frequency_response};
+pub use parameters::{Parameter, ParameterError};
+pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError, PlantScratch};
+pub use reader::{RobotError, read_robot};
+pub use rigid_body::RigidBody;
+pub use vector::{Mat3, Vec3};

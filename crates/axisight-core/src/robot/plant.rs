@@ -1,0 +1,395 @@
+//! The continuous-time plant: motors, gears, elastic arm and the effects on them.
+//!
+//! With motor angles `phi` (compliant gears only), joint angles `q`, deflection
+//! `delta = r phi - q` and gear torque `tau_g`:
+//! `J_m phi'' = tau - F_v phi' - r tau_g`, `M(q) q'' + c + g = B tau_g - K_e q_e - D_e q_e'`.
+//! A rigid gear has `phi = q / r` and no state of its own.
+
+use super::chain::{Chain, ChainState};
+use super::description::RobotDescription;
+use super::linear_algebra::solve_symmetric;
+use super::parameters::Parameter;
+use crate::effects::{self, EffectError, EffectInfo, Kernel, Motor, PlantParameters, Scope};
+use crate::scalar::Scalar;
+use std::sync::Arc;
+
+/// An effect with its place and parameters.
+#[derive(Debug, Clone)]
+pub struct EffectSetting<S> {
+    /// Name in the effect table.
+    pub name: String,
+    /// 0-based driven axis; `None` for effects of the whole arm.
+    pub axis: Option<usize>,
+    /// Parameters in the order of the table.
+    pub parameters: Vec<S>,
+}
+
+/// Why a plant cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// An effect is misused.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+/// A compliant transmission.
+#[derive(Debug, Clone, Copy)]
+pub struct Gear<S> {
+    /// Stiffness k [Nm/rad].
+    pub stiffness: S,
+    /// Damping d [Nm s/rad].
+    pub damping: S,
+    /// Index of the motor angle among the motor states.
+    slot: usize,
+}
+
+/// One driven axis.
+#[derive(Clone)]
+pub struct Axis<S> {
+    /// Index of the joint the axis drives.
+    pub joint: usize,
+    /// Gear ratio r, joint angle per motor angle.
+    pub ratio: f64,
+    /// Motor inertia [kg m^2].
+    pub motor_inertia: S,
+    /// Viscous friction of the motor [Nm s/rad].
+    pub viscous_friction: S,
+    /// Compliant transmission; `None` is rigid.
+    pub gear: Option<Gear<S>>,
+    /// Everything that acts on this axis.
+    pub kernels: Vec<Arc<dyn Kernel<S>>>,
+    on_motor: Vec<Arc<dyn Kernel<S>>>,
+    on_gear: Vec<Arc<dyn Kernel<S>>>,
+}
+
+/// A robot with its effects, ready to be integrated.
+#[derive(Clone)]
+pub struct Plant<S> {
+    /// Rigid-body chain.
+    pub chain: Chain<S>,
+    /// Driven axes in chain order.
+    pub axes: Vec<Axis<S>>,
+    /// Elastic joints: index, stiffness, damping.
+    pub elastic: Vec<(usize, S, S)>,
+    n_motors: usize,
+}
+
+/// Scratch of [`Plant::derivative`].
+#[derive(Debug, Clone)]
+pub struct PlantScratch<S> {
+    chain: ChainState<S>,
+    matrix: Vec<S>,
+    force: Vec<S>,
+}
+
+impl<S: Scalar> Plant<S> {
+    /// The plant of `robot` with some parameters replaced and some effects added.
+    ///
+    /// # Errors
+    /// [`PlantError`] when an effect is unknown, misplaced or has the wrong parameters.
+    pub fn new(
+        robot: &RobotDescription,
+        overrides: &[(Parameter, S)],
+        settings: &[EffectSetting<S>],
+    ) -> Result<Self, PlantError> {
+        let mut chain = Chain::new(robot);
+        for (parameter, value) in overrides {
+            parameter.apply_to_chain(*value, &mut chain);
+        }
+        let value_of = |p: Parameter| {
+            let found = overrides.iter().rev().find(|(q, _)| *q == p);
+            found.map_or_else(|| S::constant(p.nominal(robot)), |(_, v)| *v)
+        };
+        let mut plant = Self {
+            chain,
+            axes: axes(robot, &value_of),
+            elastic: elastic_joints(robot, &value_of),
+            n_motors: robot.driven().filter(|(_, j, _)| j.compliance.is_some()).count(),
+        };
+        for setting in settings {
+            plant.add_effect(setting)?;
+        }
+        Ok(plant)
+    }
+
+    fn add_effect(&mut self, setting: &EffectSetting<S>) -> Result<(), PlantError> {
+        let info = effects::info(&setting.name)?;
+        check_bounds(info, &setting.parameters)?;
+        let kernel: Arc<dyn Kernel<S>> = effects::build(&setting.name, &setting.parameters)?.into();
+        let n_axes = self.axes.len();
+        let misplaced = |expected: String, got: String| EffectError::Axis {
+            effect: info.name,
+            expected,
+            got,
+        };
+        match (info.scope, setting.axis) {
+            (Scope::Arm, None) => kernel.prepare(&mut PlantParameters {
+                chain: &mut self.chain,
+                stiffness: None,
+            }),
+            (Scope::Arm, Some(i)) => {
+                let got = format!("axis {}", i + 1);
+                return Err(misplaced("no axis (it acts on the whole arm)".into(), got).into());
+            }
+            (Scope::Axis, axis) => {
+                let got = axis.map_or_else(|| "no axis".to_owned(), |i| format!("axis {}", i + 1));
+                let Some(axis) = axis.and_then(|i| self.axes.get_mut(i)) else {
+                    return Err(misplaced(format!("an axis from 1 to {n_axes}"), got).into());
+                };
+                let on_gear = matches!(info.acts, effects::Acts::Transmission);
+                if on_gear && axis.gear.is_none() {
+                    let expected = "an axis with a compliant transmission".to_owned();
+                    return Err(misplaced(expected, format!("{got} (rigid)")).into());
+                }
+                kernel.prepare(&mut PlantParameters {
+                    chain: &mut self.chain,
+                    stiffness: axis.gear.as_mut().map(|g| &mut g.stiffness),
+                });
+                axis.kernels.push(Arc::clone(&kernel));
+                match info.acts {
+                    effects::Acts::Motor => axis.on_motor.push(kernel),
+                    effects::Acts::Transmission => axis.on_gear.push(kernel),
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of states: `[phi, q, phi', q']`.
+    pub fn n_states(&self) -> usize {
+        2 * (self.n_motors + self.chain.len())
+    }
+
+    /// Number of motor angles among the states (compliant gears).
+    pub fn n_motors(&self) -> usize {
+        self.n_motors
+    }
+
+    /// Scratch for [`Plant::derivative`].
+    pub fn scratch(&self) -> PlantScratch<S> {
+        let n = self.chain.len();
+        PlantScratch {
+            chain: ChainState::new(n),
+            matrix: vec![S::zero(); n * n],
+            force: vec![S::zero(); n],
+        }
+    }
+
+    /// Motor angle of an axis in state `x` [rad].
+    pub fn motor_angle(&self, axis: &Axis<S>, x: &[S]) -> S {
+        match &axis.gear {
+            Some(gear) => x[gear.slot],
+            None => x[self.n_motors + axis.joint] * (1.0 / axis.ratio),
+        }
+    }
+
+    /// Motor speed of an axis in state `x` [rad/s].
+    pub fn motor_speed(&self, axis: &Axis<S>, x: &[S]) -> S {
+        let rates = &x[self.n_motors + self.chain.len()..];
+        match &axis.gear {
+            Some(gear) => rates[gear.slot],
+            None => rates[self.n_motors + axis.joint] * (1.0 / axis.ratio),
+        }
+    }
+
+    /// Joint angles in state `x`.
+    pub fn joint_angles<'x>(&self, x: &'x [S]) -> &'x [S] {
+        &x[self.n_motors..self.n_motors + self.chain.len()]
+    }
+
+    /// State at rest with the given motor and joint angles.
+    pub fn state_at_rest(&self, motor_angle: &[S], joint_angle: &[S]) -> Vec<S> {
+        let mut x = vec![S::zero(); self.n_states()];
+        for (axis, angle) in self.axes.iter().zip(motor_angle) {
+            if let Some(gear) = &axis.gear {
+                x[gear.slot] = *angle;
+            }
+        }
+        x[self.n_motors..self.n_motors + self.chain.len()].copy_from_slice(joint_angle);
+        x
+    }
+
+    /// `dx = f(x, tau)`: `applied` is the torque the drives deliver, `command`
+    /// the commanded torque of the sample (torque ripple scales with it) [Nm].
+    pub fn derivative(
+        &self,
+        x: &[S],
+        applied: &[S],
+        command: &[S],
+        scratch: &mut PlantScratch<S>,
+        dx: &mut [S],
+    ) {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let (angles, rates) = x.split_at(m + n);
+        let (q, v) = (&angles[m..], &rates[m..]);
+        self.chain.evaluate(q, v, &mut scratch.chain);
+        scratch.matrix.copy_from_slice(&scratch.chain.inertia);
+        for (f, b) in scratch.force.iter_mut().zip(&scratch.chain.bias) {
+            *f = -*b;
+        }
+        dx[..m + n].copy_from_slice(rates);
+        for (i, axis) in self.axes.iter().enumerate() {
+            let torque = self.axis_torque(axis, x, applied[i], command[i]);
+            let joint = axis.joint;
+            match &axis.gear {
+                Some(gear) => {
+                    scratch.force[joint] += torque.gear;
+                    let net = torque.motor - torque.gear * axis.ratio;
+                    dx[m + n + gear.slot] = net / axis.motor_inertia;
+                }
+                None => {
+                    let up = 1.0 / axis.ratio;
+                    scratch.matrix[joint * n + joint] += axis.motor_inertia * (up * up);
+                    scratch.force[joint] += torque.motor * up;
+                }
+            }
+        }
+        for (joint, stiffness, damping) in &self.elastic {
+            scratch.force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
+        }
+        solve_symmetric(&mut scratch.matrix, &mut scratch.force, n);
+        dx[m + n + m..].copy_from_slice(&scratch.force);
+    }
+
+    #[inline]
+    fn axis_torque(&self, axis: &Axis<S>, x: &[S], applied: S, command: S) -> AxisTorque<S> {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let (angle, speed, gear) = match &axis.gear {
+            Some(gear) => {
+                let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
+                let delta = angle * axis.ratio - x[m + axis.joint];
+                let rate = speed * axis.ratio - x[m + n + m + axis.joint];
+                (angle, speed, gear_torque(gear, &axis.on_gear, delta, rate))
+            }
+            None => {
+                let up = 1.0 / axis.ratio;
+                let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
+                (q * up, v * up, S::zero())
+            }
+        };
+        let state = Motor {
+            angle,
+            speed,
+            command,
+        };
+        let mut motor = applied - axis.viscous_friction * speed;
+        for kernel in &axis.on_motor {
+            motor += kernel.motor_torque(&state);
+        }
+        AxisTorque { motor, gear }
+    }
+}
+
+struct AxisTorque<S> {
+    /// Torque on the motor, without the gear.
+    motor: S,
+    /// Gear torque on the joint side.
+    gear: S,
+}
+
+#[inline]
+fn gear_torque<S: Scalar>(
+    gear: &Gear<S>,
+    kernels: &[Arc<dyn Kernel<S>>],
+    delta: S,
+    rate: S,
+) -> S {
+    let (mut loaded, mut slope) = (delta, S::one());
+    for kernel in kernels {
+        let (next, factor) = kernel.deflection(loaded);
+        (loaded, slope) = (next, slope * factor);
+    }
+    let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
+    for kernel in kernels {
+        torque += kernel.gear_torque(loaded);
+    }
+    torque
+}
+
+fn axes<S: Scalar>(robot: &RobotDescription, value_of: &impl Fn(Parameter) -> S) -> Vec<Axis<S>> {
+    let mut slot = 0;
+    robot
+        .driven()
+        .map(|(joint, description, drive)| {
+            let gear = description.compliance.map(|_| {
+                slot += 1;
+                Gear {
+                    stiffness: value_of(Parameter::Stiffness(joint)),
+                    damping: value_of(Parameter::Damping(joint)),
+                    slot: slot - 1,
+                }
+            });
+            Axis {
+                joint,
+                ratio: drive.gear_ratio,
+                motor_inertia: value_of(Parameter::MotorInertia(joint)),
+                viscous_friction: value_of(Parameter::ViscousFriction(joint)),
+                gear,
+                kernels: Vec::new(),
+                on_motor: Vec::new(),
+                on_gear: Vec::new(),
+            }
+        })
+        .collect()
+}
+
+fn elastic_joints<S: Scalar>(
+    robot: &RobotDescription,
+    value_of: &impl Fn(Parameter) -> S,
+) -> Vec<(usize, S, S)> {
+    let is_elastic = |i: &usize| robot.joints[*i].drive.is_none();
+    (0..robot.joints.len())
+        .filter(is_elastic)
+        .map(|i| (i, value_of(Parameter::Stiffness(i)), value_of(Parameter::Damping(i))))
+        .collect()
+}
+
+fn check_bounds<S: Scalar>(info: &'static EffectInfo, values: &[S]) -> Result<(), EffectError> {
+    for (parameter, value) in info.parameters.iter().zip(values) {
+        for lane in 0..S::LANES {
+            let got = value.lane(lane);
+            if !(parameter.lower..=parameter.upper).contains(&got) {
+                return Err(EffectError::Bounds {
+                    effect: info.name,
+                    parameter: parameter.name,
+                    lower: parameter.lower,
+                    upper: parameter.upper,
+                    got,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+impl<S: Scalar> Axis<S> {
+    /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
+    ///
+    /// Simplified Newton iteration with the linear stiffness as slope; it contracts
+    /// by the share of the nonlinear part, so it is run until that is negligible.
+    pub(super) fn static_deflection(&self, load: S) -> S {
+        let Some(gear) = &self.gear else {
+            return S::zero();
+        };
+        let mut loaded = load / gear.stiffness;
+        for _ in 0..60 {
+            let mut torque = gear.stiffness * loaded;
+            for kernel in &self.on_gear {
+                torque += kernel.gear_torque(loaded);
+            }
+            loaded += (load - torque) / gear.stiffness;
+        }
+        self.on_gear
+            .iter()
+            .rev()
+            .fold(loaded, |d, kernel| kernel.deflection_inverse(d))
+    }
+}
+
+impl<S: Scalar> Plant<S> {
+    /// Index of an axis's motor angle among the states; `None` for a rigid transmission.
+    pub fn motor_slot(&self, axis: usize) -> Option<usize> {
+        self.axes.get(axis)?.gear.as_ref().map(|gear| gear.slot)
+    }
+}

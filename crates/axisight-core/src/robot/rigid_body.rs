@@ -1,0 +1,204 @@
+//! Rigid-body quantities of a robot at given joint angles, in plain numbers.
+
+use super::chain::{Chain, ChainState};
+use super::description::{Motion, RobotDescription};
+use super::linear_algebra::solve_symmetric;
+use nalgebra::DMatrix;
+
+/// Kinematics and dynamics of the chain of all joints (driven and elastic).
+#[derive(Debug, Clone)]
+pub struct RigidBody {
+    chain: Chain<f64>,
+    motion: Vec<Motion>,
+    gravity: [f64; 3],
+}
+
+/// A vector has the wrong length or a non-finite entry.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field}: expected {expected}, got {got}")]
+pub struct ShapeError {
+    /// Name of the argument.
+    pub field: &'static str,
+    /// What it should be.
+    pub expected: String,
+    /// What came.
+    pub got: String,
+}
+
+impl RigidBody {
+    /// The chain of a robot, motors and springs left out.
+    pub fn new(robot: &RobotDescription) -> Self {
+        Self {
+            chain: Chain::new(robot),
+            motion: robot.joints.iter().map(|j| j.motion).collect(),
+            gravity: robot.gravity,
+        }
+    }
+
+    /// Number of joints.
+    pub fn n_joints(&self) -> usize {
+        self.chain.len()
+    }
+
+    fn check(&self, field: &'static str, x: &[f64]) -> Result<(), ShapeError> {
+        let n = self.n_joints();
+        if x.len() != n {
+            return Err(ShapeError {
+                field,
+                expected: format!("{n} joint values"),
+                got: x.len().to_string(),
+            });
+        }
+        match x.iter().position(|v| !v.is_finite()) {
+            None => Ok(()),
+            Some(i) => Err(ShapeError {
+                field,
+                expected: "finite values".to_owned(),
+                got: format!("{} at joint {}", x[i], i + 1),
+            }),
+        }
+    }
+
+    fn evaluate(&self, q: &[f64], v: &[f64]) -> Result<ChainState<f64>, ShapeError> {
+        self.check("q", q)?;
+        self.check("v", v)?;
+        let mut state = ChainState::new(self.n_joints());
+        self.chain.evaluate(q, v, &mut state);
+        Ok(state)
+    }
+
+    /// Inertia matrix M(q), row-major.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for a wrong length or non-finite value (as for all methods here).
+    pub fn inertia_matrix(&self, q: &[f64]) -> Result<Vec<f64>, ShapeError> {
+        Ok(self.evaluate(q, &vec![0.0; q.len()])?.inertia)
+    }
+
+    /// Coriolis, centrifugal and gravity forces c(q, v) + g(q).
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn bias(&self, q: &[f64], v: &[f64]) -> Result<Vec<f64>, ShapeError> {
+        Ok(self.evaluate(q, v)?.bias)
+    }
+
+    /// Gravity forces g(q).
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn gravity(&self, q: &[f64]) -> Result<Vec<f64>, ShapeError> {
+        self.bias(q, &vec![0.0; q.len()])
+    }
+
+    /// Joint forces for accelerations `a`: M(q) a + c(q, v) + g(q).
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn inverse_dynamics(&self, q: &[f64], v: &[f64], a: &[f64]) -> Result<Vec<f64>, ShapeError> {
+        self.check("a", a)?;
+        let state = self.evaluate(q, v)?;
+        let n = a.len();
+        let row = |i: usize| (0..n).map(|j| state.inertia[i * n + j] * a[j]).sum::<f64>();
+        Ok((0..n).map(|i| state.bias[i] + row(i)).collect())
+    }
+
+    /// Joint accelerations under forces `tau`.
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn forward_dynamics(
+        &self,
+        q: &[f64],
+        v: &[f64],
+        tau: &[f64],
+    ) -> Result<Vec<f64>, ShapeError> {
+        self.check("tau", tau)?;
+        let mut state = self.evaluate(q, v)?;
+        let mut force: Vec<f64> = tau.iter().zip(&state.bias).map(|(t, b)| t - b).collect();
+        solve_symmetric(&mut state.inertia, &mut force, tau.len());
+        Ok(force)
+    }
+
+    /// Pose of the link frame of joint `joint`: rotation (rows) and origin [m], base frame.
+    ///
+    /// # Errors
+    /// [`ShapeError`], also for a joint the chain does not have.
+    pub fn pose(&self, q: &[f64], joint: usize) -> Result<([[f64; 3]; 3], [f64; 3]), ShapeError> {
+        let state = self.evaluate(q, &vec![0.0; q.len()])?;
+        self.check_joint(joint)?;
+        Ok((state.rotation[joint].0, state.position[joint].0))
+    }
+
+    fn check_joint(&self, joint: usize) -> Result<(), ShapeError> {
+        if joint < self.n_joints() {
+            return Ok(());
+        }
+        Err(ShapeError {
+            field: "joint",
+            expected: format!("a joint from 1 to {}", self.n_joints()),
+            got: (joint + 1).to_string(),
+        })
+    }
+
+    /// Geometric Jacobian of a point fixed in the frame of `joint`: rows are
+    /// linear velocity [m] then angular velocity of that link, base frame;
+    /// columns are all joints.
+    ///
+    /// # Errors
+    /// [`ShapeError`], also for a joint the chain does not have.
+    pub fn jacobian(
+        &self,
+        q: &[f64],
+        joint: usize,
+        point: [f64; 3],
+    ) -> Result<DMatrix<f64>, ShapeError> {
+        let state = self.evaluate(q, &vec![0.0; q.len()])?;
+        self.check_joint(joint)?;
+        let tip = state.position[joint] + state.rotation[joint].apply_constant(&point);
+        let mut out = DMatrix::zeros(6, self.n_joints());
+        for i in 0..=joint {
+            let axis = state.axis[i];
+            match self.motion[i] {
+                Motion::Revolute => {
+                    let linear = axis.cross(&(tip - state.position[i]));
+                    for k in 0..3 {
+                        out[(k, i)] = linear.0[k];
+                        out[(3 + k, i)] = axis.0[k];
+                    }
+                }
+                Motion::Prismatic => {
+                    for k in 0..3 {
+                        out[(k, i)] = axis.0[k];
+                    }
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// Kinetic and potential energy of the links [J].
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn energy(&self, q: &[f64], v: &[f64]) -> Result<(f64, f64), ShapeError> {
+        let state = self.evaluate(q, v)?;
+        let n = v.len();
+        let kinetic: f64 = (0..n)
+            .map(|i| v[i] * (0..n).map(|j| state.inertia[i * n + j] * v[j]).sum::<f64>())
+            .sum();
+        let potential: f64 = self
+            .chain
+            .joints
+            .iter()
+            .enumerate()
+            .filter_map(|(i, joint)| {
+                let body = joint.body.as_ref()?;
+                let com = state.position[i] + state.rotation[i].apply_constant(&body.com);
+                let height: f64 = (0..3).map(|k| self.gravity[k] * com.0[k]).sum();
+                Some(-body.mass * height)
+            })
+            .sum();
+        Ok((0.5 * kinetic, potential))
+    }
+}

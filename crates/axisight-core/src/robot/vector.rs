@@ -1,0 +1,169 @@
+//! Three-vectors, rotations and inertias over any scalar.
+
+use crate::scalar::Scalar;
+use std::array::from_fn;
+use std::ops::{Add, Sub};
+
+/// A vector in the base frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Vec3<S>(pub [S; 3]);
+
+impl<S: Scalar> Vec3<S> {
+    /// The zero vector.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self([S::zero(); 3])
+    }
+    /// A constant vector.
+    #[inline(always)]
+    pub fn constant(x: [f64; 3]) -> Self {
+        Self(x.map(S::constant))
+    }
+    /// Inner product.
+    #[inline(always)]
+    pub fn dot(&self, other: &Self) -> S {
+        let (a, b) = (&self.0, &other.0);
+        a[0].fma(b[0], a[1].fma(b[1], a[2] * b[2]))
+    }
+    /// Cross product.
+    #[inline(always)]
+    #[must_use]
+    pub fn cross(&self, other: &Self) -> Self {
+        let (a, b) = (&self.0, &other.0);
+        Self([
+            a[1].fma(b[2], -(a[2] * b[1])),
+            a[2].fma(b[0], -(a[0] * b[2])),
+            a[0].fma(b[1], -(a[1] * b[0])),
+        ])
+    }
+    /// Product with a scalar.
+    #[inline(always)]
+    #[must_use]
+    pub fn scale(&self, s: S) -> Self {
+        Self(self.0.map(|x| x * s))
+    }
+}
+
+impl<S: Scalar> Add for Vec3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(from_fn(|i| self.0[i] + other.0[i]))
+    }
+}
+impl<S: Scalar> Sub for Vec3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(from_fn(|i| self.0[i] - other.0[i]))
+    }
+}
+
+/// A 3x3 matrix by rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Mat3<S>(pub [[S; 3]; 3]);
+
+impl<S: Scalar> Mat3<S> {
+    /// The identity.
+    pub fn identity() -> Self {
+        Self(from_fn(|i| {
+            from_fn(|j| S::constant(if i == j { 1.0 } else { 0.0 }))
+        }))
+    }
+    /// The symmetric matrix with entries xx yy zz xy xz yz.
+    #[inline(always)]
+    pub fn symmetric(m: &[S; 6]) -> Self {
+        Self([
+            [m[0], m[3], m[4]],
+            [m[3], m[1], m[5]],
+            [m[4], m[5], m[2]],
+        ])
+    }
+    /// Matrix times vector.
+    #[inline(always)]
+    pub fn apply(&self, v: &Vec3<S>) -> Vec3<S> {
+        Vec3(from_fn(|i| Vec3(self.0[i]).dot(v)))
+    }
+    /// Matrix times a constant vector; zero entries cost nothing.
+    #[inline(always)]
+    pub fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
+        let mut out = Vec3::zero();
+        for (j, &x) in v.iter().enumerate() {
+            if x == 0.0 {
+                continue;
+            }
+            for i in 0..3 {
+                out.0[i] += self.0[i][j] * x;
+            }
+        }
+        out
+    }
+}
+
+/// `r * Rot(axis, angle)` for a constant unit axis (Rodrigues).
+#[inline(always)]
+pub fn rotate_about<S: Scalar>(r: &Mat3<S>, axis: &[f64; 3], angle: S) -> Mat3<S> {
+    let (s, c) = angle.sin_cos();
+    for k in 0..3 {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        if axis[i] == 0.0 && axis[j] == 0.0 {
+            // About a coordinate axis only two columns mix.
+            let s = s * axis[k];
+            let mut out = *r;
+            for row in 0..3 {
+                let (a, b) = (r.0[row][i], r.0[row][j]);
+                out.0[row][i] = a.fma(c, b * s);
+                out.0[row][j] = b.fma(c, -(a * s));
+            }
+            return out;
+        }
+    }
+    let t = S::one() - c;
+    let [x, y, z] = *axis;
+    let rot = [
+        [c + t * (x * x), t * (x * y) - s * z, t * (x * z) + s * y],
+        [t * (x * y) + s * z, c + t * (y * y), t * (y * z) - s * x],
+        [t * (x * z) - s * y, t * (y * z) + s * x, c + t * (z * z)],
+    ];
+    Mat3(from_fn(|row| {
+        from_fn(|col| {
+            r.0[row][0].fma(
+                rot[0][col],
+                r.0[row][1].fma(rot[1][col], r.0[row][2] * rot[2][col]),
+            )
+        })
+    }))
+}
+
+/// `R I R^T` for a symmetric inertia stored as xx yy zz xy xz yz.
+#[inline(always)]
+pub fn rotate_inertia<S: Scalar>(r: &Mat3<S>, inertia: &[S; 6]) -> [S; 6] {
+    let m = Mat3::symmetric(inertia);
+    // Rows of R I.
+    let ri: [Vec3<S>; 3] = from_fn(|i| m.apply(&Vec3(r.0[i])));
+    let entry = |i: usize, j: usize| ri[i].dot(&Vec3(r.0[j]));
+    [
+        entry(0, 0),
+        entry(1, 1),
+        entry(2, 2),
+        entry(0, 1),
+        entry(0, 2),
+        entry(1, 2),
+    ]
+}
+
+/// Move the reference point of a second moment by `-d` (bodies appear shifted
+/// by `d`); `first` and `mass` are the moments about the old point.
+#[inline(always)]
+pub fn shift_inertia<S: Scalar>(second: &mut [S; 6], d: &Vec3<S>, first: &Vec3<S>, mass: S) {
+    let h = Vec3(from_fn(|i| first.0[i].fma(S::constant(2.0), d.0[i] * mass)));
+    let spread = d.dot(&h);
+    // The symmetric part of d h^T without the doubled diagonal.
+    let half = |i: usize, j: usize| (d.0[i].fma(h.0[j], d.0[j] * h.0[i])) * 0.5;
+    second[0] += spread - half(0, 0);
+    second[1] += spread - half(1, 1);
+    second[2] += spread - half(2, 2);
+    second[3] -= half(0, 1);
+    second[4] -= half(0, 2);
+    second[5] -= half(1, 2);
+}

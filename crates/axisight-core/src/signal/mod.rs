@@ -1,0 +1,5 @@
+//! Signals: weighting of residuals over frequency.
+
+mod weighting;
+
+pub use weighting::{Weighting, WeightingError};

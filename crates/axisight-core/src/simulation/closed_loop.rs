@@ -1,0 +1,285 @@
+//! The sampled loop: measure, command, integrate to the next sample.
+
+use super::controller::ControlLoop;
+use super::method::{Interval, Method, Stepper};
+use super::torque_path::{Line, TorquePath};
+use crate::effects::Motor;
+use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
+use crate::scalar::Scalar;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What drives a run; arrays are row-major `(n_samples, n_axes)`, one per lane.
+#[derive(Debug, Clone, Copy)]
+pub enum Drive<'a> {
+    /// Motor-side velocity references through the controller [rad/s].
+    Reference(&'a [&'a [f64]]),
+    /// Commanded torques, no controller [Nm].
+    Torque(&'a [&'a [f64]]),
+}
+
+/// A run to simulate.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// Controller of the robot.
+    pub controller: &'a Controller,
+    /// Sample time [s].
+    pub sample_time: f64,
+    /// Driven joint angles at the start [rad].
+    pub start: &'a [f64],
+    /// References or torques; a lane shorter than the longest is held at zero.
+    pub drive: Drive<'a>,
+    /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
+    pub noise: &'a [&'a [f64]],
+    /// Integrator.
+    pub method: Method,
+    /// Set by another thread to end the run early.
+    pub cancel: Option<&'a AtomicBool>,
+}
+
+/// One sample as the log sees it, and the truth behind it.
+#[derive(Debug)]
+pub struct Sample<'a, S> {
+    /// Sample number.
+    pub index: usize,
+    /// Commanded motor torque [Nm].
+    pub command: &'a [S],
+    /// Measured motor position [rad].
+    pub measured: &'a [S],
+    /// Torque added on the motor by ripple, friction and other effects [Nm].
+    pub torque_disturbance: &'a [S],
+    /// Error of the position measurement, noise included [rad].
+    pub position_disturbance: &'a [S],
+    /// State `[phi, q, phi', q']`.
+    pub state: &'a [S],
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// All samples were simulated.
+    Completed,
+    /// A state became infinite or NaN at this sample: the loop is unstable.
+    Diverged(usize),
+    /// The error bound could not be met at this sample: the plant is too stiff for an
+    /// explicit method or a parameter is far off.
+    StepSizeCollapsed(usize),
+    /// The run was cancelled before this sample.
+    Cancelled(usize),
+}
+
+/// Misuse of the simulation.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// The arm does not settle.
+    #[error(transparent)]
+    Equilibrium(#[from] EquilibriumError),
+    /// An array has the wrong size.
+    #[error("{field}: expected {expected}, got {got}")]
+    Shape {
+        /// Argument.
+        field: &'static str,
+        /// What it should be.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// A reference-driven run needs a controller.
+    #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
+    NoController,
+}
+
+/// Simulate until the longest lane ends; `observe` sees every sample.
+///
+/// # Errors
+/// [`SimulationError`] for misuse; trouble during the run is a [`Status`].
+pub fn simulate<S: Scalar>(
+    plant: &Plant<S>,
+    run: &Run<'_>,
+    stepper: &mut Stepper<S>,
+    observe: &mut impl FnMut(&Sample<'_, S>),
+) -> Result<Status, SimulationError> {
+    let n_axes = plant.axes.len();
+    let n_samples = check(run, n_axes, S::LANES)?;
+    let rest = equilibrium(plant, run.start)?;
+    let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+    let mut controller = ControlLoop::new(
+        run.controller,
+        run.sample_time,
+        &rest.motor_angle,
+        &rest.motor_torque,
+    );
+    let mut paths: Vec<_> = plant
+        .axes
+        .iter()
+        .zip(&rest.motor_torque)
+        .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
+        .collect();
+    let mut signals = Signals::new(n_axes);
+    let mut substeps = 1;
+    let mut scratch_lines = Vec::new();
+    for k in 0..n_samples {
+        if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Ok(Status::Cancelled(k));
+        }
+        signals.measure(plant, run, k, &x);
+        signals.command(run, k, &mut controller);
+        signals.disturb(plant, &x);
+        observe(&signals.sample(k, &x));
+        for (path, u) in paths.iter_mut().zip(&signals.command) {
+            path.push(*u);
+        }
+        let interval = Interval {
+            plant,
+            command: &signals.command,
+            sample_time: run.sample_time,
+        };
+        let met = interval.advance(run.method, &mut x, &mut substeps, stepper, |n| {
+            sample_lines(&paths, &signals.command, n, &mut scratch_lines)
+        });
+        if x.iter().any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite())) {
+            return Ok(Status::Diverged(k));
+        }
+        if !met {
+            return Ok(Status::StepSizeCollapsed(k));
+        }
+        for (path, u) in paths.iter_mut().zip(&signals.command) {
+            path.advance(*u);
+        }
+    }
+    Ok(Status::Completed)
+}
+
+/// Torque lines of all axes, sub-step by sub-step.
+fn sample_lines<S: Scalar>(
+    paths: &[TorquePath<S>],
+    command: &[S],
+    n: usize,
+    scratch: &mut Vec<Line<S>>,
+) -> Vec<Vec<Line<S>>> {
+    let mut out = vec![Vec::with_capacity(paths.len()); n];
+    for (path, u) in paths.iter().zip(command) {
+        path.lines(*u, n, scratch);
+        for (step, line) in out.iter_mut().zip(scratch.iter()) {
+            step.push(*line);
+        }
+    }
+    out
+}
+
+/// Signals of the current sample.
+struct Signals<S> {
+    measured: Vec<S>,
+    command: Vec<S>,
+    reference: Vec<S>,
+    torque_disturbance: Vec<S>,
+    position_disturbance: Vec<S>,
+}
+
+impl<S: Scalar> Signals<S> {
+    fn new(n_axes: usize) -> Self {
+        let zeros = vec![S::zero(); n_axes];
+        Self {
+            measured: zeros.clone(),
+            command: zeros.clone(),
+            reference: zeros.clone(),
+            torque_disturbance: zeros.clone(),
+            position_disturbance: zeros,
+        }
+    }
+
+    fn measure(&mut self, plant: &Plant<S>, run: &Run<'_>, k: usize, x: &[S]) {
+        for (i, axis) in plant.axes.iter().enumerate() {
+            let angle = plant.motor_angle(axis, x);
+            let mut error = lane_value(run.noise, k, i, plant.axes.len());
+            for kernel in &axis.kernels {
+                error += kernel.sensor(angle);
+            }
+            self.position_disturbance[i] = error;
+            self.measured[i] = angle + error;
+        }
+    }
+
+    fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
+        let n = self.command.len();
+        match run.drive {
+            Drive::Torque(torque) => {
+                for i in 0..n {
+                    self.command[i] = lane_value(torque, k, i, n);
+                }
+            }
+            Drive::Reference(reference) => {
+                for i in 0..n {
+                    self.reference[i] = lane_value(reference, k, i, n);
+                }
+                controller.command(&self.measured, &self.reference, &mut self.command);
+            }
+        }
+    }
+
+    /// Torque that effects add on the motors in the present state.
+    fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
+        for (i, axis) in plant.axes.iter().enumerate() {
+            let state = Motor {
+                angle: plant.motor_angle(axis, x),
+                speed: plant.motor_speed(axis, x),
+                command: self.command[i],
+            };
+            let sum = axis.kernels.iter().map(|k| k.motor_torque(&state)).reduce(|a, b| a + b);
+            self.torque_disturbance[i] = sum.unwrap_or_else(S::zero);
+        }
+    }
+
+    fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
+        Sample {
+            index,
+            command: &self.command,
+            measured: &self.measured,
+            torque_disturbance: &self.torque_disturbance,
+            position_disturbance: &self.position_disturbance,
+            state: x,
+        }
+    }
+}
+
+/// Entry `(k, axis)` of each lane's array; zero beyond its end or without arrays.
+fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
+    S::from_lanes(|lane| {
+        let array = arrays.get(lane).or_else(|| arrays.last());
+        array.and_then(|a| a.get(k * n_axes + axis)).copied().unwrap_or(0.0)
+    })
+}
+
+fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
+    let shape = |field, expected: String, got: String| SimulationError::Shape {
+        field,
+        expected,
+        got,
+    };
+    let (field, arrays) = match run.drive {
+        Drive::Reference(_) if *run.controller == Controller::None => {
+            return Err(SimulationError::NoController);
+        }
+        Drive::Reference(r) => ("velocity_ref", r),
+        Drive::Torque(t) => ("torque", t),
+    };
+    if !(run.sample_time.is_finite() && run.sample_time > 0.0) {
+        let got = run.sample_time.to_string();
+        return Err(shape("sample_time", "a positive time in seconds".to_owned(), got));
+    }
+    if arrays.is_empty() || arrays.len() > lanes {
+        return Err(shape(field, format!("1 to {lanes} runs"), arrays.len().to_string()));
+    }
+    for (name, set) in [(field, arrays), ("noise", run.noise)] {
+        for array in set {
+            if array.len() % n_axes != 0 || array.is_empty() {
+                let expected = format!("samples of {n_axes} axes");
+                return Err(shape(name, expected, format!("{} numbers", array.len())));
+            }
+            if let Some(i) = array.iter().position(|v| !v.is_finite()) {
+                let got = format!("{} at sample {}", array[i], i / n_axes);
+                return Err(shape(name, "finite numbers".to_owned(), got));
+            }
+        }
+    }
+    Ok(arrays.iter().map(|a| a.len() / n_axes).max().unwrap_or(0))
+}

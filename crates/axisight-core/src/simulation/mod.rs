@@ -1,0 +1,13 @@
+//! Sampled-data simulation: controller at the sample time, plant in between.
+
+mod closed_loop;
+mod controller;
+mod dormand_prince;
+mod method;
+mod noise;
+mod runge_kutta4;
+mod torque_path;
+
+pub use closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
+pub use method::{Method, Stepper};
+pub use noise::measurement_noise;

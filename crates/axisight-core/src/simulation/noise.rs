@@ -1,0 +1,22 @@
+//! Measurement noise as a function of (seed, run, axis).
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// White Gaussian position noise of standard deviation `std` [rad], row-major
+/// `(n_samples, n_axes)`. Each axis has its own stream, so the noise of one
+/// axis does not depend on how many others there are.
+pub fn measurement_noise(seed: u64, run: u64, n_samples: usize, n_axes: usize, std: f64) -> Vec<f64> {
+    let mut out = vec![0.0; n_samples * n_axes];
+    for axis in 0..n_axes {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        // The stream number separates runs and axes; 2^16 axes are out of reach.
+        rng.set_stream((run << 16) | axis as u64);
+        for sample in 0..n_samples {
+            let e: f64 = StandardNormal.sample(&mut rng);
+            out[sample * n_axes + axis] = std * e;
+        }
+    }
+    out
+}

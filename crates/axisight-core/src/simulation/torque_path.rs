@@ -1,0 +1,196 @@
+//! From commanded torque to the torque the drive delivers inside a sample.
+//!
+//! Command -> transport delay -> current-loop lag -> torque constant and offset.
+//! Delay and lag make the torque vary inside a sample. It is handed to the
+//! integrator as the straight line with the same mean and first moment over
+//! each sub-step: velocity and position at the end of the step, which depend
+//! on those two moments only, are then exact for the motor inertia, whatever
+//! the delay or lag, and the result is smooth in both parameters.
+
+use crate::effects::Kernel;
+use crate::robot::Axis;
+use crate::scalar::Scalar;
+use std::sync::Arc;
+
+/// Torque over a sub-step: `mean + slope (s - 1/2)` for `s` from 0 to 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line<S> {
+    mean: S,
+    slope: S,
+}
+
+impl<S: Scalar> Line<S> {
+    /// Torque at fraction `s` of the sub-step.
+    #[inline(always)]
+    pub(super) fn at(&self, s: f64) -> S {
+        self.mean + self.slope * (s - 0.5)
+    }
+}
+
+/// Keeps a lag of zero from dividing by zero; far below any time that matters.
+const SHORTEST_LAG_S: f64 = 1e-12;
+
+/// Torque path of one axis.
+pub(super) struct TorquePath<S> {
+    sample_time: f64,
+    kernels: Vec<Arc<dyn Kernel<S>>>,
+    delay: Option<Delay<S>>,
+    lag: Option<Lag<S>>,
+}
+
+struct Delay<S> {
+    /// Fraction of a sample at which the command changes.
+    fraction: S,
+    /// The commands the drive still has to apply, oldest first: the one in force at
+    /// the start of the sample, the one it switches to, and those to come.
+    history: Vec<S>,
+}
+
+struct Lag<S> {
+    time_constant: S,
+    state: S,
+}
+
+/// Zeroth and first moment of a torque over part of a sub-step.
+struct Moments<S> {
+    zeroth: S,
+    first: S,
+}
+
+impl<S: Scalar> TorquePath<S> {
+    /// Path of `axis`, settled at the command `rest`.
+    pub(super) fn new(axis: &Axis<S>, rest: S, sample_time: f64) -> Self {
+        let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);
+        let delay = total(axis.kernels.iter().filter_map(|k| k.delay()).collect());
+        let lag = total(axis.kernels.iter().filter_map(|k| k.lag()).collect());
+        Self {
+            sample_time,
+            kernels: axis.kernels.clone(),
+            delay: delay.map(|d| Delay::new(d * (1.0 / sample_time), rest)),
+            lag: lag.map(|time_constant| Lag {
+                time_constant: time_constant + SHORTEST_LAG_S,
+                state: rest,
+            }),
+        }
+    }
+
+    /// Take the command of a new sample.
+    pub(super) fn push(&mut self, command: S) {
+        if let Some(delay) = &mut self.delay {
+            delay.history.rotate_left(1);
+            if let Some(newest) = delay.history.last_mut() {
+                *newest = command;
+            }
+        }
+    }
+
+    /// Torque lines over `n` equal sub-steps of the sample, for the command `command`.
+    pub(super) fn lines(&self, command: S, n: usize, out: &mut Vec<Line<S>>) {
+        out.clear();
+        if self.delay.is_none() && self.lag.is_none() {
+            let line = Line {
+                mean: self.delivered(command),
+                slope: S::zero(),
+            };
+            out.resize(n, line);
+            return;
+        }
+        let mut state = self.lag.as_ref().map_or(command, |l| l.state);
+        for i in 0..n {
+            let from = i as f64 / n as f64;
+            let to = (i + 1) as f64 / n as f64;
+            out.push(self.line(command, from, to, &mut state));
+        }
+    }
+
+    /// Advance the lag to the end of the sample.
+    pub(super) fn advance(&mut self, command: S) {
+        let Some(mut state) = self.lag.as_ref().map(|l| l.state) else {
+            return;
+        };
+        self.line(command, 0.0, 1.0, &mut state);
+        if let Some(lag) = &mut self.lag {
+            lag.state = state;
+        }
+    }
+
+    fn delivered(&self, torque: S) -> S {
+        self.kernels.iter().fold(torque, |t, k| k.drive(t))
+    }
+
+    fn line(&self, command: S, from: f64, to: f64, state: &mut S) -> Line<S> {
+        let width = to - from;
+        let mut zeroth = S::zero();
+        let mut first = S::zero();
+        for (torque, start, end) in self.pieces(command, from, to) {
+            let m = self.moments(torque, start - from, end - start, state);
+            zeroth += m.zeroth;
+            first += m.first;
+        }
+        let mean = zeroth * (1.0 / width);
+        // First moment about the middle of the sub-step, for unit width.
+        let tilt = first * (1.0 / (width * width)) - mean * 0.5;
+        // Drive kernels are affine (gain and offset), so they commute with the moments.
+        let (low, high) = (self.delivered(mean - tilt * 6.0), self.delivered(mean + tilt * 6.0));
+        Line {
+            mean: (low + high) * 0.5,
+            slope: high - low,
+        }
+    }
+
+    /// The commands in force between `from` and `to` (fractions of the sample).
+    fn pieces(&self, command: S, from: f64, to: f64) -> Vec<(S, S, S)> {
+        let (start, end) = (S::constant(from), S::constant(to));
+        let Some(delay) = &self.delay else {
+            return vec![(command, start, end)];
+        };
+        let (older, newer) = (delay.history[0], delay.history[1]);
+        let switch = delay.fraction;
+        // A switch at the very start stays in, for its derivative.
+        if switch.lane(0) < from {
+            vec![(newer, start, end)]
+        } else if switch.lane(0) >= to {
+            vec![(older, start, end)]
+        } else {
+            vec![(older, start, switch), (newer, switch, end)]
+        }
+    }
+
+    /// Moments over a piece of length `width` that starts `start` into the
+    /// sub-step (both in samples), command constant at `torque`.
+    fn moments(&self, torque: S, start: S, width: S, state: &mut S) -> Moments<S> {
+        let middle = start + width * 0.5;
+        let held = Moments {
+            zeroth: torque * width,
+            first: torque * width * middle,
+        };
+        let Some(lag) = &self.lag else {
+            return held;
+        };
+        let t_c = lag.time_constant * (1.0 / self.sample_time);
+        let ratio = width / t_c;
+        let decay = (-ratio).exp();
+        let gone = S::one() - decay;
+        let excess = *state - torque;
+        *state = torque + excess * decay;
+        let zeroth = t_c * gone;
+        let own_first = t_c * t_c * (S::one() - decay * (ratio + 1.0));
+        Moments {
+            zeroth: held.zeroth + excess * zeroth,
+            first: held.first + excess * (start * zeroth + own_first),
+        }
+    }
+}
+
+impl<S: Scalar> Delay<S> {
+    /// `samples` is the delay in samples; lanes share its whole part.
+    fn new(samples: S, rest: S) -> Self {
+        // Bounds on the delay keep the count small and non-negative.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = samples.lane(0).max(0.0) as usize;
+        Self {
+            fraction: samples - whole as f64,
+            history: vec![rest; whole + 2],
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Python bindings of the Axisight core; no numerics live here.
+
+mod convert;
+mod effects;
+mod entry;
+mod fit;
+mod robot;
+mod simulation;
+
+use pyo3::prelude::*;
+
+/// The processor lacks what the kernels were compiled for.
+fn unsupported() -> Option<&'static str> {
+    #[cfg(target_arch = "x86_64")]
+    if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
+        return Some("axisight needs a processor with AVX2 and FMA (x86-64-v3)");
+    }
+    None
+}
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    if let Some(reason) = unsupported() {
+        return Err(pyo3::exceptions::PyImportError::new_err(reason));
+    }
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<robot::Robot>()?;
+    module.add_class::<entry::CancelToken>()?;
+    module.add_class::<fit::FitResult>()?;
+    module.add_function(wrap_pyfunction!(effects::effect_table, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
+    Ok(())
+}

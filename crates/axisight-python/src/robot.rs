@@ -1,0 +1,315 @@
+//! The robot class.
+
+use crate::convert::{array1, array2, array3, matrix, rows};
+use crate::effects::{EffectTuple, settings};
+use crate::entry::{AxisightError, RobotError, input_error};
+use axisight_core::robot::{
+    Controller, Linearization, Parameter, Plant, RigidBody, RobotDescription, equilibrium,
+    linearize, modes, read_robot, zoh_frequency_response,
+};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A robot description with its rigid-body algorithms.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Robot {
+    pub description: RobotDescription,
+    body: RigidBody,
+    source: String,
+}
+
+type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
+type Matrix3<'py> = Bound<'py, PyArray3<f64>>;
+
+impl Robot {
+    fn linear(&self, effects: Vec<EffectTuple>, at: Option<Vec<f64>>) -> PyResult<Linearization> {
+        let at = at.unwrap_or_else(|| self.description.operating_point.clone());
+        linearize(&self.description, &settings(effects), &at).map_err(input_error)
+    }
+
+    /// Apply `f` to each row of one to three `(n, joints)` arrays of equal length.
+    fn each_row<'py>(
+        &self,
+        py: Python<'py>,
+        arrays: &[(&str, &PyReadonlyArray2<'_, f64>)],
+        f: impl Fn(&RigidBody, &[&[f64]]) -> PyResult<Vec<f64>>,
+    ) -> PyResult<Matrix2<'py>> {
+        let n = self.body.n_joints();
+        let data = arrays
+            .iter()
+            .map(|(name, a)| rows(a, name, n))
+            .collect::<PyResult<Vec<_>>>()?;
+        let count = data.first().map_or(0, |d| d.len() / n);
+        if let Some(i) = data.iter().position(|d| d.len() != count * n) {
+            let got = data[i].len() / n;
+            let name = arrays[i].0;
+            return Err(input_error(format!("{name}: expected {count} rows, got {got}")));
+        }
+        let mut out = Vec::new();
+        for row in 0..count {
+            let at: Vec<&[f64]> = data.iter().map(|d| &d[row * n..(row + 1) * n]).collect();
+            out.extend(f(&self.body, &at)?);
+        }
+        let width = out.len().checked_div(count).unwrap_or(n);
+        array2(py, out, width)
+    }
+}
+
+#[pymethods]
+impl Robot {
+    /// Read a description in the format `axisight.robot/1`.
+    #[staticmethod]
+    fn from_toml(text: String) -> PyResult<Self> {
+        let description = read_robot(&text).map_err(|e| RobotError::new_err(e.to_string()))?;
+        let body = RigidBody::new(&description);
+        Ok(Self {
+            description,
+            body,
+            source: text,
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let maker = slf.get_type().getattr("from_toml")?;
+        Ok((maker, (slf.get().source.clone(),)))
+    }
+
+    fn __repr__(&self) -> String {
+        let d = &self.description;
+        format!("<Robot {:?}: {} axes, {} joints>", d.name, d.n_axes(), d.n_joints())
+    }
+
+    #[getter]
+    fn toml(&self) -> &str {
+        &self.source
+    }
+    #[getter]
+    fn name(&self) -> &str {
+        &self.description.name
+    }
+    #[getter]
+    fn sample_time_s(&self) -> f64 {
+        self.description.sample_time
+    }
+    #[getter]
+    fn n_axes(&self) -> usize {
+        self.description.n_axes()
+    }
+    #[getter]
+    fn n_joints(&self) -> usize {
+        self.description.n_joints()
+    }
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.description.joints.iter().map(|j| j.name.clone()).collect()
+    }
+    #[getter]
+    fn axis_joints(&self) -> Vec<usize> {
+        self.description.driven().map(|(i, _, _)| i).collect()
+    }
+    #[getter]
+    fn gear_ratio<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.description.driven().map(|(_, _, d)| d.gear_ratio).collect())
+    }
+    #[getter]
+    fn axis_is_prismatic(&self) -> Vec<bool> {
+        let prismatic = |(_, j, _): (_, &axisight_core::robot::Joint, _)| {
+            j.motion == axisight_core::robot::Motion::Prismatic
+        };
+        self.description.driven().map(prismatic).collect()
+    }
+    #[getter]
+    fn axis_is_rigid(&self) -> Vec<bool> {
+        self.description.driven().map(|(_, j, _)| j.compliance.is_none()).collect()
+    }
+    #[getter]
+    fn operating_point<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.description.operating_point.clone())
+    }
+    #[getter]
+    fn position_noise_std(&self) -> f64 {
+        self.description.position_noise_std
+    }
+    #[getter]
+    fn controller_kind(&self) -> &'static str {
+        match self.description.controller {
+            Controller::PiVelocity { .. } => "pi_velocity",
+            Controller::PVelocity { .. } => "p_velocity",
+            Controller::Cascade { .. } => "cascade",
+            Controller::None => "none",
+        }
+    }
+    /// Controller gains by name, one value per axis.
+    #[getter]
+    fn controller_gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        let set = |name: &str, gain: &Vec<f64>| out.set_item(name, array1(py, gain.clone()));
+        match &self.description.controller {
+            Controller::PiVelocity { kp, ki } => {
+                set("kp", kp)?;
+                set("ki", ki)?;
+            }
+            Controller::PVelocity { kp } => set("kp", kp)?,
+            Controller::Cascade { kv, kp, ki } => {
+                set("kv", kv)?;
+                set("kp", kp)?;
+                set("ki", ki)?;
+            }
+            Controller::None => {}
+        }
+        Ok(out)
+    }
+    /// Names and values of all physical parameters.
+    fn parameters(&self) -> Vec<(String, f64)> {
+        let d = &self.description;
+        let all = Parameter::all(d).into_iter();
+        all.map(|p| (p.name(d), p.nominal(d))).collect()
+    }
+
+    fn inertia_matrix<'py>(&self, py: Python<'py>, q: PyReadonlyArray2<'py, f64>) -> PyResult<Matrix3<'py>> {
+        let n = self.body.n_joints();
+        let flat = self.each_row(py, &[("q", &q)], |b, x| b.inertia_matrix(x[0]).map_err(input_error))?;
+        use numpy::PyArrayMethods;
+        flat.reshape([q.as_array().nrows(), n, n])
+    }
+    fn bias<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| b.bias(x[0], x[1]).map_err(input_error))
+    }
+    fn gravity<'py>(&self, py: Python<'py>, q: PyReadonlyArray2<'py, f64>) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q)], |b, x| b.gravity(x[0]).map_err(input_error))
+    }
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        a: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q), ("v", &v), ("a", &a)], |b, x| {
+            b.inverse_dynamics(x[0], x[1], x[2]).map_err(input_error)
+        })
+    }
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        tau: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q), ("v", &v), ("tau", &tau)], |b, x| {
+            b.forward_dynamics(x[0], x[1], x[2]).map_err(input_error)
+        })
+    }
+    fn energy<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| {
+            b.energy(x[0], x[1]).map(|(t, u)| vec![t, u]).map_err(input_error)
+        })
+    }
+    /// Rotation and origin of the frame of joint `joint` (0-based).
+    fn pose<'py>(
+        &self,
+        py: Python<'py>,
+        q: Vec<f64>,
+        joint: usize,
+    ) -> PyResult<(Matrix2<'py>, Bound<'py, PyArray1<f64>>)> {
+        let (r, p) = self.body.pose(&q, joint).map_err(input_error)?;
+        Ok((matrix(py, (3, 3), |i, j| r[i][j])?, array1(py, p.to_vec())))
+    }
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        q: Vec<f64>,
+        joint: usize,
+        point: [f64; 3],
+    ) -> PyResult<Matrix2<'py>> {
+        let j = self.body.jacobian(&q, joint, point).map_err(input_error)?;
+        matrix(py, j.shape(), |r, c| j[(r, c)])
+    }
+
+    #[pyo3(signature = (effects, joint_angle=None))]
+    fn equilibrium<'py>(
+        &self,
+        py: Python<'py>,
+        effects: Vec<EffectTuple>,
+        joint_angle: Option<Vec<f64>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let at = joint_angle.unwrap_or_else(|| self.description.operating_point.clone());
+        let plant = Plant::<f64>::new(&self.description, &[], &settings(effects)).map_err(input_error)?;
+        let rest = equilibrium(&plant, &at).map_err(input_error)?;
+        let out = PyDict::new(py);
+        out.set_item("joint_angle", array1(py, rest.joint_angle))?;
+        out.set_item("motor_angle", array1(py, rest.motor_angle))?;
+        out.set_item("motor_torque", array1(py, rest.motor_torque))?;
+        Ok(out)
+    }
+
+    #[pyo3(signature = (effects, joint_angle=None))]
+    fn linearize<'py>(
+        &self,
+        py: Python<'py>,
+        effects: Vec<EffectTuple>,
+        joint_angle: Option<Vec<f64>>,
+    ) -> PyResult<(Matrix2<'py>, Matrix2<'py>, Matrix2<'py>)> {
+        let l = self.linear(effects, joint_angle)?;
+        Ok((
+            matrix(py, l.a.shape(), |i, j| l.a[(i, j)])?,
+            matrix(py, l.b.shape(), |i, j| l.b[(i, j)])?,
+            matrix(py, l.c.shape(), |i, j| l.c[(i, j)])?,
+        ))
+    }
+
+    /// Eigenvalues (re, im), frequencies, damping ratios and shapes (re, im).
+    #[pyo3(signature = (effects, joint_angle=None))]
+    fn modes<'py>(
+        &self,
+        py: Python<'py>,
+        effects: Vec<EffectTuple>,
+        joint_angle: Option<Vec<f64>>,
+    ) -> PyResult<(Matrix2<'py>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Matrix3<'py>)> {
+        let l = self.linear(effects, joint_angle)?;
+        let all = modes(&l).map_err(|e| AxisightError::new_err(e.to_string()))?;
+        let values = all.iter().flat_map(|m| [m.eigenvalue.re, m.eigenvalue.im]).collect();
+        let shapes = all.iter().flat_map(|m| m.shape.iter().flat_map(|c| [c.re, c.im])).collect();
+        Ok((
+            array2(py, values, 2)?,
+            array1(py, all.iter().map(|m| m.frequency_hz).collect()),
+            array1(py, all.iter().map(|m| m.damping_ratio).collect()),
+            array3(py, shapes, l.a.nrows(), 2)?,
+        ))
+    }
+
+    /// Zero-order-hold response from motor torque to motor angle: `(n_freq, n_axes, 2 n_axes)`,
+    /// real and imaginary parts interleaved along the last axis; NaN at a pole.
+    #[pyo3(signature = (frequency_hz, effects, joint_angle=None))]
+    fn zoh_response<'py>(
+        &self,
+        py: Python<'py>,
+        frequency_hz: Vec<f64>,
+        effects: Vec<EffectTuple>,
+        joint_angle: Option<Vec<f64>>,
+    ) -> PyResult<Matrix3<'py>> {
+        let l = self.linear(effects, joint_angle)?;
+        let n = self.description.n_axes();
+        let mut data = Vec::with_capacity(frequency_hz.len() * n * n * 2);
+        for g in zoh_frequency_response(&l, self.description.sample_time, &frequency_hz) {
+            for i in 0..n {
+                for j in 0..n {
+                    let value = g.as_ref().map_or((f64::NAN, f64::NAN), |g| (g[(i, j)].re, g[(i, j)].im));
+                    data.extend([value.0, value.1]);
+                }
+            }
+        }
+        array3(py, data, n, 2 * n)
+    }
+}

@@ -1,0 +1,25 @@
+"""The exceptions Axisight raises on purpose."""
+
+
+class AxisightError(Exception):
+    """Root of every error raised by Axisight."""
+
+
+class InputError(AxisightError, ValueError):
+    """Misuse or bad data; the message names the field, what was expected and what came."""
+
+
+class LogError(InputError):
+    """A log or its column map cannot be used."""
+
+
+class CaseError(InputError):
+    """A gap case folder cannot be used."""
+
+
+class RobotError(InputError):
+    """A robot model cannot be used."""
+
+
+class ConvergenceError(AxisightError, RuntimeError):
+    """An iteration that the caller demanded to converge did not."""

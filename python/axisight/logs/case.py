@@ -1,0 +1,136 @@
+"""A gap case folder, `axisight.case/1`: one simulator, its measured logs and their roles."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from axisight.errors import CaseError
+from axisight.logs.columns import ColumnMap, describe_validation
+from axisight.logs.log import Log
+from axisight.logs.reading import read_log
+from axisight.logs.validate import check_same_rate
+
+Role = Literal["estimation", "validation"]
+Text = Annotated[str, Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _LogEntry(_Strict):
+    file: Text
+    role: Role
+    excitation: str | None = None
+    period_s: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+
+
+class _CaseFile(_Strict):
+    schema_: Literal["axisight.case/1"] = Field(alias="schema")
+    name: Text
+    robot: Text
+    log: tuple[_LogEntry, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A case with its logs in the file's order; `roles` runs parallel to `logs`."""
+
+    name: str
+    folder: Path
+    robot_path: Path
+    logs: tuple[Log, ...]
+    roles: tuple[Role, ...]
+
+    @property
+    def estimation(self) -> tuple[Log, ...]:
+        """Logs for fitting and choosing."""
+        return self._with_role("estimation")
+
+    @property
+    def validation(self) -> tuple[Log, ...]:
+        """Logs for the final figures only."""
+        return self._with_role("validation")
+
+    def _with_role(self, role: Role) -> tuple[Log, ...]:
+        return tuple(log for log, own in zip(self.logs, self.roles, strict=True) if own == role)
+
+
+def read_case(folder: Path | str, columns: ColumnMap | Path | str | None = None) -> Case:
+    """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
+
+    Raises CaseError naming file and field: case.toml missing or invalid, unknown keys, no
+    estimation log, robot file missing, one file listed twice, logs with different numbers of axes,
+    a period that is not a whole number of samples or is longer than the log. Raises LogError for a
+    log that cannot be read or has another sample rate.
+    """
+    folder = Path(folder)
+    path = folder / "case.toml"
+    content = _parse(path)
+    robot_path = folder / content.robot
+    if not robot_path.is_file():
+        raise CaseError(f"{path}: robot: expected an existing file, got {content.robot!r}")
+    if not any(entry.role == "estimation" for entry in content.log):
+        raise CaseError(
+            f"{path}: log: expected at least one with role 'estimation', got "
+            f"{len(content.log)} logs without it"
+        )
+    seen: set[Path] = set()
+    for number, entry in enumerate(content.log):
+        file = (folder / entry.file).resolve()
+        if file in seen:
+            raise CaseError(
+                f"{path}: log.{number}.file: expected a new file, got {entry.file!r} again"
+            )
+        seen.add(file)
+    logs = tuple(
+        _read_entry(path, number, entry, columns) for number, entry in enumerate(content.log)
+    )
+    for number, log in enumerate(logs):
+        if log.n_axes != logs[0].n_axes:
+            raise CaseError(
+                f"{path}: log.{number}.file: expected {logs[0].n_axes} axes as in the first log, "
+                f"got {log.n_axes}"
+            )
+    check_same_rate(logs)
+    roles = tuple(entry.role for entry in content.log)
+    return Case(content.name, folder, robot_path, logs, roles)
+
+
+def _parse(path: Path) -> _CaseFile:
+    try:
+        return _CaseFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{path}: expected TOML, got: {error}") from error
+    except ValidationError as error:
+        raise CaseError(f"{path}: {describe_validation(error)}") from error
+
+
+def _read_entry(
+    path: Path, number: int, entry: _LogEntry, columns: ColumnMap | Path | str | None
+) -> Log:
+    file = path.parent / entry.file
+    if not file.is_file():
+        raise CaseError(f"{path}: log.{number}.file: expected an existing file, got {entry.file!r}")
+    log = read_log(file, columns)
+    if entry.period_s is not None:
+        samples = entry.period_s / log.sample_time_s
+        if round(samples) < 1 or abs(samples - round(samples)) > 0.01:
+            raise CaseError(
+                f"{path}: log.{number}.period_s: expected a whole number of samples, got "
+                f"{samples:.6g}"
+            )
+        if round(samples) > log.n_samples:
+            raise CaseError(
+                f"{path}: log.{number}.period_s: expected at most the log's {log.duration_s:g} s, "
+                f"got {entry.period_s:g} s"
+            )
+    return dataclasses.replace(log, excitation=entry.excitation, period_s=entry.period_s)

@@ -1,0 +1,102 @@
+"""Looking at a log leniently: every problem is reported, none raised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from axisight.errors import LogError
+from axisight.logs.columns import ColumnMap
+from axisight.logs.findings import Finding
+from axisight.logs.gather import Gathered, gather
+from axisight.logs.log import Floats
+from axisight.logs.quality import check_signal
+from axisight.logs.reading import grid_of
+from axisight.logs.unit_guess import check_units
+from axisight.logs.validate import check_axes, check_finite, check_lengths
+
+_UNITS = {
+    "position": ("rad", "m"),
+    "torque": ("Nm", "N"),
+    "velocity_ref": ("rad/s", "m/s"),
+    "velocity": ("rad/s", "m/s"),
+    "joint_position": ("rad", "m"),
+    "temperature": ("degC", "degC"),
+}
+
+
+@dataclass(frozen=True)
+class LogReport:
+    """What `check_log` found; rate, samples and axes are None where they could not be found out."""
+
+    path: Path
+    findings: tuple[Finding, ...]
+    sample_rate_hz: float | None = None
+    n_samples: int | None = None
+    n_axes: int | None = None
+
+    @property
+    def ok(self) -> bool:
+        """True when there is no error, so that `read_log` reads the file; warnings may remain."""
+        return not any(finding.severity == "error" for finding in self.findings)
+
+
+def check_log(path: Path | str, columns: ColumnMap | Path | str | None = None) -> LogReport:
+    """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
+
+    Takes the files and column maps that `read_log` takes. A file or map that cannot be used at all
+    gives a report with that one error.
+    """
+    path = Path(path)
+    try:
+        found = gather(path, columns)
+    except LogError as error:
+        return LogReport(path, (Finding("error", "file", str(error)),))
+    grid = grid_of(found)
+    findings = [*found.findings, *check_axes(found, None), *check_lengths(found)]
+    findings += [*grid.findings, *check_finite(found)]
+    rate = None if grid.sample_time_s is None else 1.0 / grid.sample_time_s
+    if rate is not None and all(finding.severity != "error" for finding in grid.findings):
+        seconds = grid.n_samples / rate
+        findings.append(Finding("ok", "rate", f"uniform at {rate:.6g} Hz for {seconds:.6g} s"))
+    findings += [Finding("ok", "time", note) for note in grid.notes]
+    findings += [Finding("ok", name, "not a native column, not used") for name in found.unused]
+    findings += _look_at_signals(found)
+    if rate is not None and grid.stamps_s is None:
+        findings += _look_at_units(found, 1.0 / rate)
+    return LogReport(path, tuple(findings), rate, grid.n_samples, len(found.columns.axis))
+
+
+def _usable(values: Floats | None) -> bool:
+    return values is not None and values.size > 0 and bool(np.isfinite(values).all())
+
+
+def _look_at_signals(found: Gathered) -> list[Finding]:
+    findings = []
+    for channel, values in found.signals.items():
+        field, axis = channel
+        unit = _UNITS[field][int(found.columns.axis[axis].prismatic)]
+        finite = values[np.isfinite(values)]  # gaps and NaN are reported apart
+        if finite.size:
+            findings += check_signal(field, found.labels[channel], finite, unit)
+    return findings
+
+
+def _look_at_units(found: Gathered, sample_time_s: float) -> list[Finding]:
+    """Compare the measured velocity, or else the reference, with the position of every axis."""
+    findings = []
+    for axis, columns in enumerate(found.columns.axis):
+        position = found.signals.get(("position", axis))
+        if position is None or not _usable(position):
+            continue
+        field = "velocity" if ("velocity", axis) in found.signals else "velocity_ref"
+        velocity = found.signals.get((field, axis))
+        if not _usable(velocity) or (velocity is not None and velocity.size != position.size):
+            velocity = None
+        label = found.labels.get((field, axis), found.labels[("position", axis)])
+        findings += check_units(
+            position, velocity, label, sample_time_s, prismatic=columns.prismatic
+        )
+    return findings

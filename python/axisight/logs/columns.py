@@ -1,0 +1,191 @@
+"""The column map `axisight.columns/1`: where a foreign file keeps its signals, in which unit."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from axisight.errors import LogError
+from axisight.logs.units import (
+    PRISMATIC_UNITS,
+    REVOLUTE_UNITS,
+    PositionUnit,
+    TemperatureUnit,
+    TimeUnit,
+    TorqueUnit,
+    VelocityUnit,
+)
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Text = Annotated[str, Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class Address(_Strict):
+    """Where one signal is kept.
+
+    `name` is a column of a table or a variable of a MAT, HDF5 or NPZ file; fields of structs and
+    members of groups follow after dots (`rec.meas.q`). `index` picks from a matrix in NumPy order
+    and counts from 0: "1,:" is the second row, ":,2" the third column, a lone integer the entry of
+    the first dimension. `file` names another file in the log's folder that holds this signal.
+    """
+
+    name: Text
+    index: Annotated[str, Field(pattern=r"^\s*(:|-?\d+)(\s*,\s*(:|-?\d+))*\s*$")] | int | None = (
+        None
+    )
+    file: Text | None = None
+
+    @property
+    def label(self) -> str:
+        """Return the address as it appears in messages."""
+        index = "" if self.index is None else f"[{self.index}]"
+        return f"{self.file + ':' if self.file else ''}{self.name}{index}"
+
+
+class TimeColumn(Address):
+    """Time stamps; `resample_hz` interpolates irregular ones linearly onto a uniform grid.
+
+    Resampling is for logs stamped by a host computer. It has no anti-alias filter and bridges gaps
+    by straight lines; the log's notes say so.
+    """
+
+    unit: TimeUnit = "s"
+    resample_hz: Positive | None = None
+
+
+class _Signal(Address):
+    scale: float | Text | None = None
+    sign: Literal[1, -1] = 1
+    counts_per_rev: Positive | None = None
+
+    @model_validator(mode="after")
+    def _counts(self) -> _Signal:
+        unit = getattr(self, "unit", "")
+        if unit in {"counts", "counts/s"} and self.counts_per_rev is None:
+            raise ValueError(f"counts_per_rev is needed with unit {unit!r}")
+        if self.scale == 0:
+            raise ValueError("scale must not be zero")
+        return self
+
+
+class PositionColumn(_Signal):
+    """Position: SI value = sign * scale * value * unit factor. `scale` may name a file scalar."""
+
+    unit: PositionUnit
+
+
+class VelocityColumn(_Signal):
+    """Velocity, measured or reference."""
+
+    unit: VelocityUnit
+
+
+class TorqueColumn(_Signal):
+    """Torque or force; for A and V, `scale` states Nm (or N) per A or V."""
+
+    unit: TorqueUnit
+
+    @model_validator(mode="after")
+    def _scaled(self) -> TorqueColumn:
+        if self.unit in {"A", "V"} and self.scale is None:
+            raise ValueError(f"scale (Nm or N per {self.unit}) is needed with unit {self.unit!r}")
+        return self
+
+
+class TemperatureColumn(_Signal):
+    """Temperature."""
+
+    unit: TemperatureUnit = "degC"
+
+
+class AxisColumns(_Strict):
+    """The signals of one driven axis."""
+
+    position: PositionColumn
+    torque: TorqueColumn
+    velocity_ref: VelocityColumn | None = None
+    velocity: VelocityColumn | None = None
+    joint_position: PositionColumn | None = None
+    temperature: TemperatureColumn | None = None
+
+    @property
+    def prismatic(self) -> bool:
+        """True when the position is in m or mm."""
+        return self.position.unit in PRISMATIC_UNITS
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> AxisColumns:
+        wrong = REVOLUTE_UNITS if self.prismatic else PRISMATIC_UNITS
+        for field in ("torque", "velocity_ref", "velocity", "joint_position"):
+            signal = getattr(self, field)
+            if signal is not None and signal.unit in wrong:
+                raise ValueError(
+                    f"{field} in {signal.unit} does not go with position in {self.position.unit}"
+                )
+        return self
+
+
+class CsvOptions(_Strict):
+    """How a CSV file is written; without a header, columns are named "0", "1" and so on."""
+
+    separator: Text = ","
+    decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
+    header: bool = True
+    skip_rows: Annotated[int, Field(ge=0)] = 0
+
+
+class ColumnMap(_Strict):
+    """A whole map. `sample_rate_hz` is a number, or the name of a scalar in the file."""
+
+    schema_: Literal["axisight.columns/1"] = Field(default="axisight.columns/1", alias="schema")
+    sample_rate_hz: Positive | Text | None = None
+    time: TimeColumn | None = None
+    axis: Annotated[tuple[AxisColumns, ...], Field(min_length=1)]
+    csv: CsvOptions = CsvOptions()
+
+    @model_validator(mode="after")
+    def _rate_known(self) -> ColumnMap:
+        if self.time is None and self.sample_rate_hz is None:
+            raise ValueError("give sample_rate_hz, [time], or both")
+        return self
+
+
+def describe_validation(error: ValidationError) -> str:
+    """Return pydantic's findings as "field: message (got value)", joined by semicolons."""
+    parts = []
+    for item in error.errors():
+        path = ".".join(str(key) for key in item["loc"]) or "(whole file)"
+        if item["type"] == "extra_forbidden":
+            parts.append(f"{path}: expected a known key, got an unknown one")
+        elif item["type"] in {"missing", "value_error"}:
+            parts.append(f"{path}: {item['msg']}")
+        else:
+            parts.append(f"{path}: {item['msg']}, got {item['input']!r}")
+    return "; ".join(parts)
+
+
+def parse_column_map(text: str, where: str = "column map") -> ColumnMap:
+    """Parse the TOML `text` of a column map. Raises LogError naming `where` and each bad field."""
+    try:
+        return ColumnMap.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise LogError(f"{where}: expected TOML, got: {error}") from error
+    except ValidationError as error:
+        raise LogError(f"{where}: {describe_validation(error)}") from error
+
+
+def load_column_map(path: Path | str) -> ColumnMap:
+    """Read a column map file. Raises LogError when it cannot be read or is not valid."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: column map cannot be read: {error}") from error
+    return parse_column_map(text, where=str(path))

@@ -1,0 +1,30 @@
+"""What a look at a log found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from axisight.errors import LogError
+
+Severity = Literal["ok", "warning", "error"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One observation: how bad, about which column, and what was expected and seen."""
+
+    severity: Severity
+    column: str
+    message: str
+
+
+def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
+    """Raise one LogError naming the file and its first error; say how many more there are."""
+    errors = [finding for finding in findings if finding.severity == "error"]
+    if not errors:
+        return
+    more = f" (and {len(errors) - 1} more, see check_log)" if len(errors) > 1 else ""
+    raise LogError(f"{path}: {errors[0].column}: {errors[0].message}{more}")

@@ -1,0 +1,167 @@
+"""Turning time stamps and a declared rate into one uniform time grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from axisight.logs.findings import Finding
+from axisight.logs.log import Floats
+
+JITTER_SAMPLES = 0.01
+"""Largest tolerated error of a time stamp, in samples."""
+RATE_TOLERANCE = 1e-4
+"""Largest relative difference between two rates that still count as equal."""
+SHORTEST_S = 1.0
+"""Shortest log that is read (s)."""
+
+
+@dataclass
+class Grid:
+    """A uniform grid; `stamps_s` are kept only when signals must be interpolated onto it.
+
+    `sample_time_s` is None when no rate could be found out.
+    """
+
+    sample_time_s: float | None = None
+    n_samples: int = 0
+    stamps_s: Floats | None = None
+    findings: list[Finding] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def error(self, column: str, message: str) -> None:
+        """Note an error."""
+        self.findings.append(Finding("error", column, message))
+
+
+def make_grid(
+    time_s: Floats | None,
+    rate_hz: float | None,
+    n_samples: int,
+    *,
+    label: str = "time",
+    resample_hz: float | None = None,
+) -> Grid:
+    """Return the uniform grid of a log and what is wrong with its time stamps.
+
+    `time_s` (n,) in s or None, `rate_hz` declared or None, `n_samples` of the signals. Stamps
+    that are off by up to 1 % of a sample are replaced by the uniform grid.
+    """
+    grid = Grid(n_samples=n_samples)
+    if time_s is None:
+        if rate_hz is not None:
+            grid.sample_time_s = 1.0 / rate_hz
+    elif _usable(grid, time_s, label):
+        if resample_hz is None:
+            _check_uniform(grid, time_s, label)
+            grid.n_samples = time_s.size
+        else:
+            _resample(grid, time_s, resample_hz, label)
+        if rate_hz is not None:
+            _agree(grid, rate_hz, label)
+    if grid.sample_time_s is not None:
+        duration = grid.n_samples * grid.sample_time_s
+        if duration < SHORTEST_S * (1.0 - 1e-6):
+            grid.error(
+                label, f"expected at least {SHORTEST_S:g} s of samples, got {duration:.6g} s"
+            )
+    return grid
+
+
+def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
+    """Check that stamps are finite and increase strictly."""
+    if time_s.size < 2:
+        grid.error(label, f"expected at least 2 time stamps, got {time_s.size}")
+        return False
+    bad = np.flatnonzero(~np.isfinite(time_s))
+    if bad.size:
+        grid.error(
+            label, f"expected finite time stamps, got {bad.size} NaN/inf, first at index {bad[0]}"
+        )
+        return False
+    back = np.flatnonzero(np.diff(time_s) <= 0)
+    if back.size:
+        first = int(back[0])
+        grid.error(
+            label,
+            f"expected strictly increasing time, got {back.size} steps that do not increase, first "
+            f"at index {first + 1} ({time_s[first]:.9g} s then {time_s[first + 1]:.9g} s)",
+        )
+        return False
+    return True
+
+
+def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
+    steps = np.diff(time_s)
+    typical = float(np.median(steps))
+    gaps = np.flatnonzero(steps > 1.5 * typical)
+    if gaps.size:
+        first = int(gaps[0])
+        lost = int(np.rint(steps[gaps] / typical - 1.0).sum())
+        grid.sample_time_s = typical
+        grid.error(
+            label,
+            f"expected uniform sampling, got {gaps.size} gaps ({lost} samples missing), first "
+            f"after index {first} ({steps[first]:.6g} s instead of {typical:.6g} s)",
+        )
+        return
+    mean = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    drift = np.abs(time_s - time_s[0] - mean * np.arange(time_s.size)) / mean
+    # Two stamps, each off by the tolerance, enclose one step
+    jitter = np.abs(steps / mean - 1.0) / 2.0
+    grid.sample_time_s = _round(mean)
+    if jitter.max() > JITTER_SAMPLES * (1.0 + 1e-6) or drift.max() > 0.5:
+        worst = int(jitter.argmax())
+        grid.error(
+            label,
+            f"expected uniform sampling within {JITTER_SAMPLES:.0%} of a sample, got a step of "
+            f"{steps[worst]:.6g} s instead of {mean:.6g} s after index {worst}; if the samples are "
+            "in truth uniform, give sample_rate_hz and no time column; if not, give resample_hz",
+        )
+    elif jitter.max() > 1e-6:
+        grid.notes.append(
+            f"time stamps replaced by the uniform grid (jitter {jitter.max():.2g} of a sample)"
+        )
+
+
+def _resample(grid: Grid, time_s: Floats, resample_hz: float, label: str) -> None:
+    grid.sample_time_s = 1.0 / resample_hz
+    span = float(time_s[-1] - time_s[0])
+    grid.n_samples = int(np.floor(span * resample_hz * (1.0 + 1e-12))) + 1
+    grid.stamps_s = time_s - time_s[0]
+    steps = np.diff(time_s)
+    if steps.max() > 1.5 * np.median(steps):
+        message = (
+            f"steps of up to {steps.max():.4g} s (typically {np.median(steps):.4g} s) bridged by a "
+            "straight line"
+        )
+        grid.findings.append(Finding("warning", label, message))
+        grid.notes.append(message)
+    grid.notes.append(
+        f"resampled linearly from {time_s.size} irregular stamps to {resample_hz:g} Hz"
+    )
+
+
+def _agree(grid: Grid, rate_hz: float, label: str) -> None:
+    if grid.sample_time_s is None or grid.stamps_s is not None:
+        return
+    measured = 1.0 / grid.sample_time_s
+    if abs(measured / rate_hz - 1.0) > RATE_TOLERANCE:
+        grid.error(
+            label,
+            f"expected time stamps at sample_rate_hz = {rate_hz:g} Hz, got {measured:.6g} Hz",
+        )
+    else:
+        grid.sample_time_s = 1.0 / rate_hz
+
+
+def _round(step_s: float) -> float:
+    """Return the step of the nearest whole rate when the two differ by less than 1 ppm.
+
+    That is the rounding of single-precision stamps, and less than any clock's accuracy.
+    """
+    rate = round(1.0 / step_s)
+    if rate > 0 and abs(step_s * rate - 1.0) < 1e-6:
+        return 1.0 / rate
+    return step_s

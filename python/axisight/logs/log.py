@@ -1,0 +1,127 @@
+"""One measured run in SI units on a uniform time grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Floats = NDArray[np.float64]
+AxisKind = Literal["revolute", "prismatic"]
+
+# Log field -> (name in the Dataset, unit of a revolute axis, unit of a prismatic axis)
+_VARIABLES = {
+    "position_rad": ("position", "rad", "m"),
+    "torque_nm": ("torque", "Nm", "N"),
+    "velocity_ref_rad_s": ("velocity_ref", "rad/s", "m/s"),
+    "velocity_rad_s": ("velocity", "rad/s", "m/s"),
+    "joint_position_rad": ("joint_position", "rad", "m"),
+    "temperature_c": ("temperature", "degC", "degC"),
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Log:
+    """A run of `n` samples on `axes` driven axes.
+
+    `time_s` has shape (n,), starts at 0 and is uniform with step `sample_time_s` (s). Every other
+    array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm),
+    `velocity_ref_rad_s` and `velocity_rad_s` (rad/s), joint-side `joint_position_rad` (rad) and
+    `temperature_c` (degC). Optional arrays are None when the log has none of them; a measured
+    optional array holds NaN in the columns of axes without that sensor. On an axis whose
+    `axis_kinds` entry is "prismatic", rad reads m and Nm reads N.
+
+    `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
+    (time grid replaced, resampled). Raises InputError when shapes disagree.
+    """
+
+    name: str
+    sample_time_s: float
+    time_s: Floats
+    torque_nm: Floats
+    position_rad: Floats
+    source: Path
+    velocity_ref_rad_s: Floats | None = None
+    velocity_rad_s: Floats | None = None
+    joint_position_rad: Floats | None = None
+    temperature_c: Floats | None = None
+    excitation: str | None = None
+    period_s: float | None = None
+    axis_kinds: tuple[AxisKind, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the shapes and fill in revolute axes."""
+        if self.time_s.ndim != 1:
+            raise InputError(f"time_s: expected shape (n,), got {self.time_s.shape}")
+        if self.position_rad.ndim != 2:
+            raise InputError(
+                f"position_rad: expected shape (n, axes), got {self.position_rad.shape}"
+            )
+        shape = (self.time_s.size, self.position_rad.shape[1])
+        for field in _VARIABLES:
+            values = getattr(self, field)
+            if values is not None and values.shape != shape:
+                raise InputError(f"{field}: expected shape {shape}, got {values.shape}")
+        if not self.axis_kinds:
+            object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
+        if len(self.axis_kinds) != shape[1]:
+            raise InputError(f"axis_kinds: expected {shape[1]} entries, got {len(self.axis_kinds)}")
+
+    @property
+    def n_axes(self) -> int:
+        """Number of driven axes."""
+        return int(self.position_rad.shape[1])
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return int(self.time_s.size)
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Samples per second."""
+        return 1.0 / self.sample_time_s
+
+    @property
+    def duration_s(self) -> float:
+        """Samples times sample time (s): a whole period of n samples lasts n sample times."""
+        return self.n_samples * self.sample_time_s
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return a Dataset with dims (time, axis), 1-based `axis`, `units` and provenance attrs.
+
+        Where axes of both kinds are mixed, `units` lists one unit per axis.
+        """
+        variables = {}
+        for field, (name, revolute, prismatic) in _VARIABLES.items():
+            values = getattr(self, field)
+            if values is None:
+                continue
+            per_axis = [revolute if kind == "revolute" else prismatic for kind in self.axis_kinds]
+            units = per_axis[0] if len(set(per_axis)) == 1 else ", ".join(per_axis)
+            variables[name] = (("time", "axis"), values, {"units": units})
+        attrs: dict[str, object] = {
+            "name": self.name,
+            "source": self.source.name,
+            "sample_time_s": self.sample_time_s,
+        }
+        if self.excitation is not None:
+            attrs["excitation"] = self.excitation
+        if self.period_s is not None:
+            attrs["period_s"] = self.period_s
+        if self.notes:
+            attrs["notes"] = "; ".join(self.notes)
+        coords = {
+            "time": ("time", self.time_s, {"units": "s"}),
+            "axis": ("axis", np.arange(1, self.n_axes + 1), {"long_name": "driven axis, from 1"}),
+        }
+        return xr.Dataset(variables, coords=coords, attrs=attrs)

@@ -1,0 +1,96 @@
+"""Looks at one signal: stuck, saturated, coarsely quantized."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from axisight.logs.findings import Finding
+from axisight.logs.log import Floats
+
+SATURATED_SAMPLES = 5
+"""Consecutive samples at the extreme that make one saturation."""
+SATURATED_RUNS = 2
+"""Saturations at the same extreme that are no accident."""
+COARSE_LEVELS = 256
+"""A moving signal with fewer levels over its range is called coarse."""
+
+
+@dataclass(frozen=True)
+class Quantization:
+    """Estimated step, in the signal's SI unit, and log2 of the levels that the range holds."""
+
+    step: float
+    bits: float
+
+
+def is_constant(values: Floats) -> bool:
+    """Tell whether every value is the same."""
+    return values.size > 0 and bool(np.ptp(values) == 0.0)
+
+
+def saturation_runs(values: Floats) -> tuple[int, int]:
+    """Count runs of at least 5 equal samples at the minimum and at the maximum of `values` (n,)."""
+    return _runs(values == values.min()), _runs(values == values.max())
+
+
+def _runs(mask: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return int(((edges[1::2] - edges[::2]) >= SATURATED_SAMPLES).sum())
+
+
+def quantization(values: Floats) -> Quantization | None:
+    """Estimate the step of quantized `values` (n,); None when they look continuous.
+
+    The smallest distance between distinct values is the step when the other distances are whole
+    multiples of it.
+    """
+    levels = np.unique(values)
+    if levels.size < 3:
+        return None
+    span = float(levels[-1] - levels[0])
+    distances = np.diff(levels)
+    distances = distances[distances > 1e-9 * max(span, float(np.abs(levels).max()))]
+    if distances.size < 2:
+        return None
+    step = float(distances.min())
+    counts = np.rint(distances / step)
+    step = float(distances.sum() / counts.sum())
+    off = np.abs(distances / step - np.rint(distances / step))
+    if np.mean(off < 0.1) < 0.95:
+        return None
+    return Quantization(step=step, bits=math.log2(span / step + 1.0))
+
+
+def check_signal(field: str, label: str, values: Floats, unit: str) -> list[Finding]:
+    """Return findings about one finite signal (n,) in SI `unit`.
+
+    Saturation is looked for in torque only: positions rest and references run at their extremes.
+    """
+    if is_constant(values):
+        message = f"constant at {values[0]:.6g} {unit} over all {values.size} samples"
+        return [Finding("ok" if field == "temperature" else "warning", label, message)]
+    findings = []
+    if field == "torque":
+        for name, runs, extreme in zip(
+            ("minimum", "maximum"),
+            saturation_runs(values),
+            (float(values.min()), float(values.max())),
+            strict=True,
+        ):
+            if runs >= SATURATED_RUNS and extreme != 0.0:
+                message = (
+                    f"saturates: {runs} times at least {SATURATED_SAMPLES} samples at its {name} "
+                    f"{extreme:.6g} {unit}"
+                )
+                findings.append(Finding("warning", label, message))
+    found = quantization(values)
+    if found is not None:
+        coarse = 2.0**found.bits < COARSE_LEVELS and field != "temperature"
+        message = (
+            f"quantized in steps of {found.step:.4g} {unit} ({found.bits:.1f} bits over its range)"
+        )
+        findings.append(Finding("warning" if coarse else "ok", label, message))
+    return findings

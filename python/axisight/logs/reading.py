@@ -1,0 +1,92 @@
+"""Reading a log strictly: it is right, or a LogError says what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from axisight.logs.columns import ColumnMap
+from axisight.logs.findings import raise_errors
+from axisight.logs.gather import Gathered, gather
+from axisight.logs.grid import Grid, make_grid
+from axisight.logs.log import Floats, Log
+from axisight.logs.validate import check_axes, check_finite, check_lengths
+
+
+def read_log(
+    path: Path | str,
+    columns: ColumnMap | Path | str | None = None,
+    *,
+    n_axes: int | None = None,
+) -> Log:
+    """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5 or .npz.
+
+    `columns` is a column map, the path of one, or None for a file with the native column names
+    of `axisight.case/1`. `n_axes` is the number of driven axes the caller expects. The result is
+    in SI units on a uniform grid that starts at 0.
+
+    Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
+    column or axis missing; NaN or inf; unequal lengths; time that does not increase; gaps or
+    jitter beyond 1 % of a sample; a declared rate that the stamps contradict; less than one
+    second; another number of axes than `n_axes`.
+    """
+    found = gather(path, columns)
+    problems = [*found.findings, *check_axes(found, n_axes), *check_lengths(found)]
+    raise_errors(found.path, problems)
+    grid = grid_of(found)
+    raise_errors(found.path, [*check_finite(found), *grid.findings])
+    return _assemble(found, grid)
+
+
+def grid_of(found: Gathered) -> Grid:
+    """Return the time grid of gathered signals, with findings."""
+    time = found.columns.time
+    n_samples = max((values.size for values in found.signals.values()), default=0)
+    return make_grid(
+        found.time_s,
+        found.rate_hz,
+        n_samples,
+        label=time.label if time is not None else "sample_rate_hz",
+        resample_hz=time.resample_hz if time is not None else None,
+    )
+
+
+def _assemble(found: Gathered, grid: Grid) -> Log:
+    assert grid.sample_time_s is not None  # make_grid without errors always knows it
+    time_s: Floats = grid.sample_time_s * np.arange(grid.n_samples, dtype=np.float64)
+
+    def matrix(field: str) -> Floats | None:
+        columns = [found.signals.get((field, axis)) for axis in range(len(found.columns.axis))]
+        if all(column is None for column in columns):
+            return None
+        missing = np.full(grid.n_samples, np.nan)
+        return np.column_stack(
+            [missing if column is None else _on_grid(column, grid, time_s) for column in columns]
+        )
+
+    position, torque = matrix("position"), matrix("torque")
+    assert position is not None
+    assert torque is not None
+    return Log(
+        name=found.path.stem,
+        sample_time_s=grid.sample_time_s,
+        time_s=time_s,
+        torque_nm=torque,
+        position_rad=position,
+        source=found.path,
+        velocity_ref_rad_s=matrix("velocity_ref"),
+        velocity_rad_s=matrix("velocity"),
+        joint_position_rad=matrix("joint_position"),
+        temperature_c=matrix("temperature"),
+        axis_kinds=tuple(
+            "prismatic" if axis.prismatic else "revolute" for axis in found.columns.axis
+        ),
+        notes=tuple(grid.notes),
+    )
+
+
+def _on_grid(values: Floats, grid: Grid, time_s: Floats) -> Floats:
+    if grid.stamps_s is None:
+        return values
+    return np.asarray(np.interp(time_s, grid.stamps_s, values), dtype=np.float64)

@@ -1,0 +1,39 @@
+"""Fixtures that find the shared data and practice cases, or say plainly what is absent."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("axisight", deadline=None, derandomize=True)
+settings.load_profile("axisight")
+
+_REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def _data_folder() -> Path | None:
+    named = os.environ.get("AXISIGHT_DATA")
+    folder = Path(named) if named else _REPOSITORY.parent / "shared" / "data"
+    return folder if folder.is_dir() else None
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real measured data; the test is skipped, and counted, without it."""
+    folder = _data_folder()
+    if folder is None:
+        pytest.skip("real data not found: set AXISIGHT_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def shared(shared_data: Path) -> Path:
+    """The folder above the real data: practice cases, robot, specifications."""
+    return shared_data.parent
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The root of this repository."""
+    return _REPOSITORY
