@@ -1,1 +1,53 @@
-"""Axisight."""
+"""Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
+
+from axisight.effects import Effect, EffectInfo, effect_info, effect_table
+from axisight.errors import (
+    AxisightError,
+    CaseError,
+    ConvergenceError,
+    InputError,
+    LogError,
+    RobotError,
+)
+from axisight.fitting import (
+    FitOptions,
+    Fitted,
+    Parameter,
+    Weighting,
+    effect_parameter,
+    fit,
+    robot_parameter,
+    robot_parameters,
+)
+from axisight.logs import Case, Log, check_log, read_case, read_log
+from axisight.robot import Robot, load_robot
+from axisight.simulation import simulate
+
+__all__ = [
+    "AxisightError",
+    "Case",
+    "CaseError",
+    "ConvergenceError",
+    "Effect",
+    "EffectInfo",
+    "FitOptions",
+    "Fitted",
+    "InputError",
+    "Log",
+    "LogError",
+    "Parameter",
+    "Robot",
+    "RobotError",
+    "Weighting",
+    "check_log",
+    "effect_info",
+    "effect_parameter",
+    "effect_table",
+    "fit",
+    "load_robot",
+    "read_case",
+    "read_log",
+    "robot_parameter",
+    "robot_parameters",
+    "simulate",
+]

@@ -37,6 +37,7 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
         Acts::TorquePath => "torque_path",
         Acts::Motor => "motor",
         Acts::Transmission => "transmission",
+        Acts::Joint => "joint",
         Acts::Arm => "arm",
         Acts::Sensor => "sensor",
     };

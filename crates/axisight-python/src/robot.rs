@@ -17,6 +17,7 @@ pub struct Robot {
     pub description: RobotDescription,
     body: RigidBody,
     source: String,
+    changes: Vec<(String, f64)>,
 }
 
 type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
@@ -67,12 +68,38 @@ impl Robot {
             description,
             body,
             source: text,
+            changes: Vec::new(),
         })
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        let maker = slf.get_type().getattr("from_toml")?;
-        Ok((maker, (slf.get().source.clone(),)))
+    /// The same robot with some parameters replaced, by name.
+    fn with_parameters(&self, values: Vec<(String, f64)>) -> PyResult<Self> {
+        let mut description = self.description.clone();
+        for (name, value) in &values {
+            let parameter = Parameter::parse(name, &description).map_err(input_error)?;
+            parameter.set(&mut description, *value);
+        }
+        Ok(Self {
+            body: RigidBody::new(&description),
+            description,
+            source: self.source.clone(),
+            changes: [&self.changes[..], &values[..]].concat(),
+        })
+    }
+
+    /// Rebuild a robot from its text and the changes made to it; used by pickle.
+    #[staticmethod]
+    fn _restore(text: String, changes: Vec<(String, f64)>) -> PyResult<Self> {
+        Self::from_toml(text)?.with_parameters(changes)
+    }
+
+    #[allow(clippy::type_complexity)] // pickle's protocol
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
+        let maker = slf.get_type().getattr("_restore")?;
+        let robot = slf.get();
+        Ok((maker, (robot.source.clone(), robot.changes.clone())))
     }
 
     fn __repr__(&self) -> String {

@@ -21,6 +21,8 @@ pub enum Acts {
     Motor,
     /// Between motor and joint.
     Transmission,
+    /// Torque on the driven joint.
+    Joint,
     /// Masses and springs of the arm.
     Arm,
     /// Between true and measured motor position.
@@ -140,6 +142,8 @@ pub struct Motor<S> {
     pub speed: S,
     /// Commanded torque of the sample, u [Nm].
     pub command: S,
+    /// Gear torque the motor carries, motor side [Nm]; zero for a rigid transmission.
+    pub load: S,
 }
 
 /// The parts of a plant an arm or transmission effect may change before a run.
@@ -149,6 +153,10 @@ pub struct PlantParameters<'a, S> {
     pub chain: &'a mut Chain<S>,
     /// Gear stiffness of the axis [Nm/rad]; `None` for arm effects or a rigid transmission.
     pub stiffness: Option<&'a mut S>,
+    /// Gear damping of the axis [Nm s/rad]; `None` as for the stiffness.
+    pub damping: Option<&'a mut S>,
+    /// Motor inertia of the axis [kg m^2]; `None` for arm effects.
+    pub motor_inertia: Option<&'a mut S>,
 }
 
 /// The points where an effect may act; every default is "not here".
@@ -185,6 +193,15 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     }
     /// Gear torque added to the linear spring [Nm, joint side].
     fn gear_torque(&self, _loaded: S) -> S {
+        S::zero()
+    }
+    /// Kinematic error of the gear over the motor angle: joint angle [rad] by which the
+    /// gear runs ahead, and its slope.
+    fn transmission_error(&self, _angle: S) -> Option<(S, S)> {
+        None
+    }
+    /// Torque added on the driven joint, joint side [Nm].
+    fn joint_torque(&self, _joint_angle: S) -> S {
         S::zero()
     }
     /// Error added to the measured motor position [rad].

@@ -56,6 +56,14 @@ effect_table!(
     torque_constant,
     torque_offset,
     payload,
+    motor_inertia,
+    joint_damping,
+    quadratic_drag,
+    load_dependent_friction,
+    gravity_compensation,
+    cable_stiffness,
+    transmission_error,
+    torque_saturation,
 );
 
 /// Description of effect `name`.

@@ -118,7 +118,8 @@ impl InverseDynamics {
             plant.chain.evaluate(&motion[0], &motion[1], &mut state);
             for (i, axis) in plant.axes.iter().enumerate() {
                 let at = |x: &[f64]| S::constant(x[k * n_axes + i]);
-                let joint_force = (0..n).fold(state.bias[axis.joint], |sum, j| {
+                let passive = state.bias[axis.joint] - axis.joint_torque(motion[0][axis.joint]);
+                let joint_force = (0..n).fold(passive, |sum, j| {
                     state.inertia[axis.joint * n + j].fma(motion[2][j], sum)
                 });
                 let speed = at(&record.velocity);
@@ -126,6 +127,7 @@ impl InverseDynamics {
                     angle: at(&record.position),
                     speed,
                     command: at(&record.torque),
+                    load: joint_force * axis.ratio,
                 };
                 let mut torque = joint_force * axis.ratio
                     + axis.motor_inertia * at(&record.acceleration)

@@ -3,7 +3,7 @@
 //! All logs run in lock-step in the lanes of one simulation; derivatives ride
 //! along as dual numbers, a few parameters per pass. Cost of a pass with `d`
 //! derivatives over `n` samples: about `4 n (1 + 2 d)` times one right-hand
-//! side for eight logs.
+//! side for a batch of logs.
 
 use super::gram::{Block, cut};
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Logs simulated in lock-step.
-const LANES: usize = 8;
+const LANES: usize = 4;
 /// Derivatives per pass.
 const SEEDS: usize = 4;
 

@@ -46,7 +46,7 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
     fn from(joint: &Joint) -> Self {
         Self {
             motion: joint.motion,
-            origin: (joint.origin != [0.0; 3]).then_some(joint.origin),
+            origin: joint.origin.iter().any(|x| *x != 0.0).then_some(joint.origin),
             axis: joint.axis,
             body: joint.link.as_ref().map(Body::from),
         }
@@ -228,13 +228,13 @@ impl<S: Scalar> Chain<S> {
                 }
             }
             if i > 0 {
-                self.pass_down(i, state);
+                Self::pass_down(i, state);
             }
         }
     }
 
     /// Hand wrench and composite of joint `i` to its parent.
-    fn pass_down(&self, i: usize, state: &mut ChainState<S>) {
+    fn pass_down(i: usize, state: &mut ChainState<S>) {
         let offset = state.offset[i];
         let force = state.force[i];
         let mut moment = state.moment[i];

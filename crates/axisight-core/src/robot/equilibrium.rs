@@ -96,10 +96,11 @@ fn hold<S: Scalar>(plant: &Plant<S>, q: Vec<S>, gravity: &[S]) -> Equilibrium<S>
     let mut motor_angle = Vec::with_capacity(plant.axes.len());
     let mut motor_torque = Vec::with_capacity(plant.axes.len());
     for axis in &plant.axes {
-        let load = gravity[axis.joint];
-        let deflection = axis.static_deflection(load);
-        motor_angle.push((q[axis.joint] + deflection) * (1.0 / axis.ratio));
-        let mut command = load * axis.ratio;
+        let joint_angle = q[axis.joint];
+        let load = gravity[axis.joint] - axis.joint_torque(joint_angle);
+        let angle = axis.motor_angle_at_rest(joint_angle, load);
+        motor_angle.push(angle);
+        let mut command = axis.motor_torque_at_rest(angle, load);
         for kernel in axis.kernels.iter().rev() {
             command = kernel.drive_inverse(command);
         }

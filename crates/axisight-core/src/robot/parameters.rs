@@ -115,6 +115,28 @@ impl Parameter {
         }
     }
 
+    /// Replace the value in a description; nothing happens where the robot has no such part.
+    pub fn set(self, robot: &mut RobotDescription, value: f64) {
+        let Some(joint) = robot.joints.get_mut(self.joint()) else {
+            return;
+        };
+        let (link, drive) = (joint.link.as_mut(), joint.drive.as_mut());
+        match (self, link, joint.compliance.as_mut(), drive) {
+            (Self::Mass(_), Some(l), ..) => l.mass = value,
+            (Self::InertiaScale(_), Some(l), ..) => l.inertia = l.inertia.map(|x| x * value),
+            (Self::Com(_, k), Some(l), ..) => {
+                if let Some(c) = l.com.get_mut(k) {
+                    *c = value;
+                }
+            }
+            (Self::Stiffness(_), _, Some(c), _) => c.stiffness = value,
+            (Self::Damping(_), _, Some(c), _) => c.damping = value,
+            (Self::MotorInertia(_), .., Some(d)) => d.motor_inertia = value,
+            (Self::ViscousFriction(_), .., Some(d)) => d.viscous_friction = value,
+            _ => {}
+        }
+    }
+
     /// Set a mass property of the chain; other parameters are left to the plant.
     pub(super) fn apply_to_chain<S: Scalar>(self, value: S, chain: &mut Chain<S>) {
         let Some(body) = chain.joints.get_mut(self.joint()).and_then(|j| j.body.as_mut()) else {

@@ -60,6 +60,7 @@ pub struct Axis<S> {
     pub kernels: Vec<Arc<dyn Kernel<S>>>,
     on_motor: Vec<Arc<dyn Kernel<S>>>,
     on_gear: Vec<Arc<dyn Kernel<S>>>,
+    on_joint: Vec<Arc<dyn Kernel<S>>>,
 }
 
 /// A robot with its effects, ready to be integrated.
@@ -126,6 +127,8 @@ impl<S: Scalar> Plant<S> {
             (Scope::Arm, None) => kernel.prepare(&mut PlantParameters {
                 chain: &mut self.chain,
                 stiffness: None,
+                damping: None,
+                motor_inertia: None,
             }),
             (Scope::Arm, Some(i)) => {
                 let got = format!("axis {}", i + 1);
@@ -141,14 +144,21 @@ impl<S: Scalar> Plant<S> {
                     let expected = "an axis with a compliant transmission".to_owned();
                     return Err(misplaced(expected, format!("{got} (rigid)")).into());
                 }
+                let (stiffness, damping) = match &mut axis.gear {
+                    Some(gear) => (Some(&mut gear.stiffness), Some(&mut gear.damping)),
+                    None => (None, None),
+                };
                 kernel.prepare(&mut PlantParameters {
                     chain: &mut self.chain,
-                    stiffness: axis.gear.as_mut().map(|g| &mut g.stiffness),
+                    stiffness,
+                    damping,
+                    motor_inertia: Some(&mut axis.motor_inertia),
                 });
                 axis.kernels.push(Arc::clone(&kernel));
                 match info.acts {
                     effects::Acts::Motor => axis.on_motor.push(kernel),
                     effects::Acts::Transmission => axis.on_gear.push(kernel),
+                    effects::Acts::Joint => axis.on_joint.push(kernel),
                     _ => {}
                 }
             }
@@ -232,17 +242,16 @@ impl<S: Scalar> Plant<S> {
         for (i, axis) in self.axes.iter().enumerate() {
             let torque = self.axis_torque(axis, x, applied[i], command[i]);
             let joint = axis.joint;
-            match &axis.gear {
-                Some(gear) => {
-                    scratch.force[joint] += torque.gear;
-                    let net = torque.motor - torque.gear * axis.ratio;
-                    dx[m + n + gear.slot] = net / axis.motor_inertia;
-                }
-                None => {
-                    let up = 1.0 / axis.ratio;
-                    scratch.matrix[joint * n + joint] += axis.motor_inertia * (up * up);
-                    scratch.force[joint] += torque.motor * up;
-                }
+            for kernel in &axis.on_joint {
+                scratch.force[joint] += kernel.joint_torque(q[joint]);
+            }
+            if let Some(gear) = &axis.gear {
+                scratch.force[joint] += torque.gear;
+                dx[m + n + gear.slot] = (torque.motor - torque.load) / axis.motor_inertia;
+            } else {
+                let up = 1.0 / axis.ratio;
+                scratch.matrix[joint * n + joint] += axis.motor_inertia * (up * up);
+                scratch.force[joint] += torque.motor * up;
             }
         }
         for (joint, stiffness, damping) in &self.elastic {
@@ -252,32 +261,44 @@ impl<S: Scalar> Plant<S> {
         dx[m + n + m..].copy_from_slice(&scratch.force);
     }
 
+    /// Torque that effects add on a motor in state `x` [Nm].
+    pub fn motor_disturbance(&self, axis: &Axis<S>, x: &[S], command: S) -> S {
+        let free = self.axis_torque(axis, x, S::zero(), command).motor;
+        free + axis.viscous_friction * self.motor_speed(axis, x)
+    }
+
     #[inline]
     fn axis_torque(&self, axis: &Axis<S>, x: &[S], applied: S, command: S) -> AxisTorque<S> {
         let (m, n) = (self.n_motors, self.chain.len());
-        let (angle, speed, gear) = match &axis.gear {
-            Some(gear) => {
-                let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
-                let delta = angle * axis.ratio - x[m + axis.joint];
-                let rate = speed * axis.ratio - x[m + n + m + axis.joint];
-                (angle, speed, gear_torque(gear, &axis.on_gear, delta, rate))
+        let (angle, speed, gear, load) = if let Some(gear) = &axis.gear {
+            let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
+            let (mut delta, mut slope) = (angle * axis.ratio, S::constant(axis.ratio));
+            for kernel in &axis.on_gear {
+                if let Some((error, rate)) = kernel.transmission_error(angle) {
+                    delta += error;
+                    slope += rate;
+                }
             }
-            None => {
-                let up = 1.0 / axis.ratio;
-                let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
-                (q * up, v * up, S::zero())
-            }
+            delta -= x[m + axis.joint];
+            let rate = speed * slope - x[m + n + m + axis.joint];
+            let torque = gear_torque(gear, &axis.on_gear, delta, rate);
+            (angle, speed, torque, torque * slope)
+        } else {
+            let up = 1.0 / axis.ratio;
+            let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
+            (q * up, v * up, S::zero(), S::zero())
         };
         let state = Motor {
             angle,
             speed,
             command,
+            load,
         };
         let mut motor = applied - axis.viscous_friction * speed;
         for kernel in &axis.on_motor {
             motor += kernel.motor_torque(&state);
         }
-        AxisTorque { motor, gear }
+        AxisTorque { motor, gear, load }
     }
 }
 
@@ -286,6 +307,8 @@ struct AxisTorque<S> {
     motor: S,
     /// Gear torque on the joint side.
     gear: S,
+    /// What the motor feels of it.
+    load: S,
 }
 
 #[inline]
@@ -329,6 +352,7 @@ fn axes<S: Scalar>(robot: &RobotDescription, value_of: &impl Fn(Parameter) -> S)
                 kernels: Vec::new(),
                 on_motor: Vec::new(),
                 on_gear: Vec::new(),
+                on_joint: Vec::new(),
             }
         })
         .collect()
@@ -364,11 +388,40 @@ fn check_bounds<S: Scalar>(info: &'static EffectInfo, values: &[S]) -> Result<()
 }
 
 impl<S: Scalar> Axis<S> {
+    /// Torque of the effects on the driven joint at `joint_angle` [Nm].
+    pub fn joint_torque(&self, joint_angle: S) -> S {
+        let torques = self.on_joint.iter().map(|k| k.joint_torque(joint_angle));
+        torques.fold(S::zero(), |a, b| a + b)
+    }
+
+    /// Motor angle at rest for a joint angle and a static load [Nm, joint side].
+    ///
+    /// Fixed-point iteration over the transmission error, whose slope is a small
+    /// share of the gear ratio.
+    pub(super) fn motor_angle_at_rest(&self, joint_angle: S, load: S) -> S {
+        let wanted = joint_angle + self.static_deflection(load);
+        let mut angle = wanted * (1.0 / self.ratio);
+        for _ in 0..60 {
+            let errors = self.on_gear.iter().filter_map(|k| k.transmission_error(angle));
+            let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
+                break;
+            };
+            angle = (wanted - error) * (1.0 / self.ratio);
+        }
+        angle
+    }
+
+    /// Motor torque that carries a static load [Nm, joint side] at a motor angle.
+    pub(super) fn motor_torque_at_rest(&self, angle: S, load: S) -> S {
+        let slopes = self.on_gear.iter().filter_map(|k| k.transmission_error(angle));
+        load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
+    }
+
     /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
     ///
     /// Simplified Newton iteration with the linear stiffness as slope; it contracts
     /// by the share of the nonlinear part, so it is run until that is negligible.
-    pub(super) fn static_deflection(&self, load: S) -> S {
+    fn static_deflection(&self, load: S) -> S {
         let Some(gear) = &self.gear else {
             return S::zero();
         };

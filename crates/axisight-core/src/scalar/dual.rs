@@ -59,6 +59,7 @@ impl<R: Scalar, const N: usize> Mul for Dual<R, N> {
 impl<R: Scalar, const N: usize> Div for Dual<R, N> {
     type Output = Self;
     #[inline(always)]
+    #[allow(clippy::suspicious_arithmetic_impl)] // the product rule with the reciprocal
     fn div(self, other: Self) -> Self {
         self * other.recip()
     }

@@ -13,6 +13,7 @@ const HALF_PI_3: f64 = 2.022_266_248_795_950_6e-21;
 
 /// Sine and cosine of `x` [rad].
 #[inline(always)]
+#[allow(clippy::float_cmp)] // quadrant numbers are whole
 pub(super) fn sin_cos(x: f64) -> (f64, f64) {
     let quadrant = (x * std::f64::consts::FRAC_2_PI).round_ties_even();
     let r = quadrant.mul_add(

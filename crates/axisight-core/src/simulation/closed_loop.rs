@@ -3,7 +3,6 @@
 use super::controller::ControlLoop;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{Line, TorquePath};
-use crate::effects::Motor;
 use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
 use crate::scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -219,13 +218,7 @@ impl<S: Scalar> Signals<S> {
     /// Torque that effects add on the motors in the present state.
     fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
         for (i, axis) in plant.axes.iter().enumerate() {
-            let state = Motor {
-                angle: plant.motor_angle(axis, x),
-                speed: plant.motor_speed(axis, x),
-                command: self.command[i],
-            };
-            let sum = axis.kernels.iter().map(|k| k.motor_torque(&state)).reduce(|a, b| a + b);
-            self.torque_disturbance[i] = sum.unwrap_or_else(S::zero);
+            self.torque_disturbance[i] = plant.motor_disturbance(axis, x, self.command[i]);
         }
     }
 

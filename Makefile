@@ -1,0 +1,121 @@
+# One command per task. On a fresh machine `make demo` and `make test` need only
+# git, make, a Rust toolchain and python3.11; everything else goes into VENV.
+#
+#   make setup   environment with the package built and installed
+#   make demo    diagnose a sample case and write a report into demo/
+#   make test    Rust tests, stub check, Python tests against the installed wheel
+#   make lint    formatting, clippy, ruff, mypy
+#   make format  rewrite the sources in the format that lint asks for
+#   make docs    regenerate the generated pages
+#   make bench   criterion benches, then side-by-side runs against other libraries
+#   make clean   remove everything that was built
+
+PYTHON ?= python3.11
+VENV ?= .venv
+CARGO ?= cargo
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+WHEELS := $(TARGET)/wheels
+STAMPS := $(VENV)/.stamps
+
+# The crates that hold Rust tests; the extension module cannot be linked into a test binary.
+RUST_TESTS := -p axisight-core -p axisight-tests
+
+# Whatever goes into the wheel. README and licences are part of its metadata.
+SOURCES := $(sort $(shell find crates python -type f \
+	-not -path '*/__pycache__/*' -not -name '*.so' -not -name '.*') \
+	$(wildcard .cargo/config.toml rust-toolchain.toml README.md LICENSE-APACHE LICENSE-MIT) \
+	Cargo.toml Cargo.lock pyproject.toml)
+
+.PHONY: setup demo test test-rust test-python lint format docs bench clean force
+.DELETE_ON_ERROR:
+
+setup: $(STAMPS)/test-tools
+
+demo: $(STAMPS)/installed
+	rm -rf demo
+	$(BIN)/axisight demo --out demo
+	@report=$$(find demo -name '*.html' | sort | head -n 1); \
+	if [ -z "$$report" ]; then echo "demo: no HTML report in demo" >&2; exit 1; fi; \
+	echo "Report: $$report"
+
+test: test-rust test-python
+
+test-rust:
+	$(CARGO) test --release --locked --no-fail-fast $(RUST_TESTS)
+
+test-python: $(STAMPS)/test-tools
+	$(BIN)/python -m mypy.stubtest axisight._core
+	$(BIN)/pytest
+
+lint: $(STAMPS)/test-tools
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: $(STAMPS)/test-tools
+	$(CARGO) fmt --all
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+docs: $(STAMPS)/installed
+	$(BIN)/python docs/make_effects.py
+
+bench: $(STAMPS)/bench-tools
+	$(CARGO) bench --locked -p axisight-benches
+	@for script in $(wildcard benches/peers/*.py); do \
+		echo "$$script"; $(BIN)/python $$script || exit 1; \
+	done
+
+clean:
+	$(CARGO) clean
+	rm -rf $(VENV) $(WHEELS) demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+# --- set-up, each step done once -------------------------------------------------------
+
+$(STAMPS)/venv:
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) not found: install it or set PYTHON=" >&2; exit 1; }
+	@command -v $(CARGO) >/dev/null || { echo "$(CARGO) not found: install a Rust toolchain (https://rustup.rs)" >&2; exit 1; }
+	$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV)
+	mkdir -p $(STAMPS)
+	touch $@
+
+$(STAMPS)/maturin: $(STAMPS)/venv
+	$(PIP) install 'maturin>=1.9,<2'
+	touch $@
+
+# Written anew only when a file was added or removed, so that the wheel notices that too.
+$(WHEELS)/.sources: force
+	@mkdir -p $(WHEELS)
+	@printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
+
+# Dated from the start of the build: a source edited meanwhile counts as newer.
+$(WHEELS)/.built: $(WHEELS)/.sources $(SOURCES) | $(STAMPS)/maturin
+	@rm -f $(WHEELS)/axisight-*.whl
+	@touch $@.begun
+	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS)
+	@mv $@.begun $@
+
+# An editable install (`maturin develop`) is replaced: tests and demo use the wheel.
+ifneq ($(wildcard $(VENV)/lib/python*/site-packages/axisight.pth),)
+$(STAMPS)/installed: force
+endif
+$(STAMPS)/installed: $(WHEELS)/.built
+	$(PIP) install $(WHEELS)/axisight-*.whl
+	$(PIP) install --force-reinstall --no-deps $(WHEELS)/axisight-*.whl
+	touch $@
+
+# The dependencies of an extra change only with pyproject.toml.
+$(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/installed
+	touch $@
+
+$(STAMPS)/bench-tools: $(STAMPS)/bench-extra $(STAMPS)/installed
+	touch $@
+
+$(STAMPS)/%-extra: pyproject.toml | $(STAMPS)/installed
+	$(PIP) install "$$(ls $(WHEELS)/axisight-*.whl)[$*]"
+	touch $@

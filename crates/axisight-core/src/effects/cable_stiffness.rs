@@ -1,0 +1,36 @@
+//! Stiffness of cables and hoses along the joint.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "cable_stiffness",
+    summary: "cables and hoses pull the joint back in proportion to its angle",
+    equation: "tau_j = -k q on the joint",
+    source: "Hooke's law on the joint angle",
+    scope: Scope::Axis,
+    acts: Acts::Joint,
+    parameters: &[
+        ParameterInfo {
+            name: "stiffness_nm_rad",
+            unit: "Nm/rad (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e7,
+            upper: 1e7,
+            typical: 500.0,
+        },
+    ],
+};
+
+struct Cable<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Cable(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Cable<S> {
+    fn joint_torque(&self, joint_angle: S) -> S {
+        -(self.0 * joint_angle)
+    }
+}

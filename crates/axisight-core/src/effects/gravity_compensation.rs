@@ -1,0 +1,52 @@
+//! Torque of a gravity balancer on the joint.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "gravity_compensation",
+    summary: "a balancer (spring or counterweight) the simulator lacks, or has wrong",
+    equation: "tau_j = a sin q + b cos q on the joint",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.3",
+    scope: Scope::Axis,
+    acts: Acts::Joint,
+    parameters: &[
+        ParameterInfo {
+            name: "sine_nm",
+            unit: "Nm (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e6,
+            upper: 1e6,
+            typical: 1e3,
+        },
+        ParameterInfo {
+            name: "cosine_nm",
+            unit: "Nm (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e6,
+            upper: 1e6,
+            typical: 1e3,
+        },
+    ],
+};
+
+struct Balancer<S> {
+    sine: S,
+    cosine: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Balancer {
+        sine: p[0],
+        cosine: p[1],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Balancer<S> {
+    fn joint_torque(&self, joint_angle: S) -> S {
+        let (s, c) = joint_angle.sin_cos();
+        self.sine.fma(s, self.cosine * c)
+    }
+}

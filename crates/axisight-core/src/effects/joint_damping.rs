@@ -1,0 +1,38 @@
+//! Gear damping other than the simulator's.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "joint_damping",
+    summary: "gear damping off by more than its tolerance",
+    equation: "d (1 + s)",
+    source: "Wernholt (2004), eq. (9.4)",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    parameters: &[
+        ParameterInfo {
+            name: "relative_change",
+            unit: "1",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1.0,
+            upper: 100.0,
+            typical: 1.0,
+        },
+    ],
+};
+
+struct Damping<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Damping(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Damping<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(damping) = plant.damping.as_deref_mut() {
+            *damping = *damping * (self.0 + 1.0);
+        }
+    }
+}

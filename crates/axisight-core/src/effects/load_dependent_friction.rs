@@ -1,0 +1,52 @@
+//! Coulomb friction in proportion to the gear load.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "load_dependent_friction",
+    summary: "friction in proportion to the torque the gear carries",
+    equation: "tau_f = mu |tau_load| tanh(phi' / v_0)",
+    source: "Hamon, Gautier, Garrec (2010), Dynamic identification of robots with a dry friction model depending on load and velocity, IROS",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "coefficient",
+            unit: "1",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 2.0,
+            typical: 0.05,
+        },
+        ParameterInfo {
+            name: "smoothing_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 0.1,
+            lower: 0.01,
+            upper: 2.0,
+            typical: 0.1,
+        },
+    ],
+};
+
+struct LoadFriction<S> {
+    coefficient: S,
+    inverse_width: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(LoadFriction {
+        coefficient: p[0],
+        inverse_width: p[1].recip(),
+    })
+}
+
+impl<S: Scalar> Kernel<S> for LoadFriction<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        let sign = (motor.speed * self.inverse_width).tanh();
+        -(self.coefficient * motor.load.abs() * sign)
+    }
+}

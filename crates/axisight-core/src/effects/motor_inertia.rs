@@ -1,0 +1,38 @@
+//! Motor inertia other than the simulator's.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "motor_inertia",
+    summary: "motor inertia off by more than its tolerance",
+    equation: "J_m (1 + s)",
+    source: "Wernholt (2004), eq. (9.4)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "relative_change",
+            unit: "1",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -0.9,
+            upper: 10.0,
+            typical: 0.2,
+        },
+    ],
+};
+
+struct Inertia<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Inertia(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Inertia<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(inertia) = plant.motor_inertia.as_deref_mut() {
+            *inertia = *inertia * (self.0 + 1.0);
+        }
+    }
+}

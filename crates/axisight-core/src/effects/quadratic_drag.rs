@@ -1,0 +1,36 @@
+//! Drag that grows with the square of the speed.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "quadratic_drag",
+    summary: "friction that grows with the square of the speed",
+    equation: "tau_f = c phi' |phi'|",
+    source: "Bona, Indri (2005), Friction compensation in robotics: an overview, IEEE CDC",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "drag_nm_s2_rad2",
+            unit: "Nm s^2/rad^2",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e3,
+            upper: 1e3,
+            typical: 1e-3,
+        },
+    ],
+};
+
+struct Drag<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Drag(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Drag<S> {
+    fn motor_torque(&self, motor: &Motor<S>) -> S {
+        -(self.0 * motor.speed * motor.speed.abs())
+    }
+}

@@ -1,0 +1,37 @@
+//! Torque limit of the drive.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "torque_saturation",
+    summary: "the drive limits the torque",
+    equation: "tau = clip(u, -L, L)",
+    source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 9.4",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    parameters: &[
+        ParameterInfo {
+            name: "limit_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 1e6,
+            lower: 1e-3,
+            upper: 1e6,
+            typical: 10.0,
+        },
+    ],
+};
+
+struct Limit<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Limit(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Limit<S> {
+    fn drive(&self, torque: S) -> S {
+        let low = (torque + self.0).if_positive(torque, -self.0);
+        (self.0 - low).if_positive(low, self.0)
+    }
+}

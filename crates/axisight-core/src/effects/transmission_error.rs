@@ -1,0 +1,65 @@
+//! Kinematic error of the gear over the motor angle.
+
+use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "transmission_error",
+    summary: "the gear runs ahead and behind periodically over the motor angle",
+    equation: "delta = r phi + a cos(n phi) + b sin(n phi) - q",
+    source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    parameters: &[
+        ParameterInfo {
+            name: "order",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 2.0,
+            lower: 0.0,
+            upper: 500.0,
+            typical: 1.0,
+        },
+        ParameterInfo {
+            name: "cosine_rad",
+            unit: "rad (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -0.1,
+            upper: 0.1,
+            typical: 2e-4,
+        },
+        ParameterInfo {
+            name: "sine_rad",
+            unit: "rad (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -0.1,
+            upper: 0.1,
+            typical: 2e-4,
+        },
+    ],
+};
+
+struct TransmissionError<S> {
+    order: S,
+    cosine: S,
+    sine: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(TransmissionError {
+        order: p[0],
+        cosine: p[1],
+        sine: p[2],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for TransmissionError<S> {
+    fn transmission_error(&self, angle: S) -> Option<(S, S)> {
+        let (s, c) = (self.order * angle).sin_cos();
+        let error = self.cosine.fma(c, self.sine * s);
+        let slope = self.order * self.sine.fma(c, -(self.cosine * s));
+        Some((error, slope))
+    }
+}

@@ -1,0 +1,419 @@
+"""The compiled core: thin bindings, no defaults beyond those shown.
+
+Arrays are row-major in meaning, ``(n_samples, n_axes)``, and are copied on the way in; array
+arguments must be float64 (other types raise TypeError). Units are SI; "axis" means a driven
+axis, "joint" any joint of the chain. On a prismatic axis rad reads m and Nm reads N. Axes of
+effects count from 1; indices of joints, logs, effects and parameters in lists count from 0.
+
+Misuse raises `axisight.errors.InputError` naming the field. Calls that take ``cancel`` release
+the interpreter lock and raise KeyboardInterrupt on Ctrl-C. After `CancelToken.cancel` a
+simulation returns early with status "cancelled" and a fit raises KeyboardInterrupt.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, Protocol, TypeAlias, TypedDict, final, type_check_only
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "CancelToken",
+    "FitResult",
+    "Robot",
+    "__version__",
+    "effect_table",
+    "fit_inverse_dynamics",
+    "fit_simulation",
+    "measurement_noise",
+    "simulate",
+]
+
+__version__: str
+
+_Array: TypeAlias = NDArray[np.float64]
+_Numbers: TypeAlias = Sequence[float] | NDArray[np.float64]
+# Name in the effect table, 1-based axis (None for the whole arm), parameters in table order.
+_Effect: TypeAlias = tuple[str, int | None, _Numbers]
+_Effects: TypeAlias = Sequence[_Effect]
+# Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
+_Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
+_Method: TypeAlias = Literal["rk4", "dopri5"]
+
+@type_check_only
+class ParameterInfo(TypedDict):
+    """One row of an effect's parameter table; numbers are in ``unit``."""
+
+    name: str
+    unit: str
+    role: Literal["amplitude", "shape"]
+    neutral: float
+    lower: float
+    upper: float
+    typical: float
+
+@type_check_only
+class EffectInfo(TypedDict):
+    """One effect; ``parameters`` are in the order in which `simulate` and the fits take them."""
+
+    name: str
+    summary: str
+    equation: str
+    source: str
+    scope: Literal["axis", "arm"]
+    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "sensor"]
+    parameters: list[ParameterInfo]
+
+@type_check_only
+class Equilibrium(TypedDict):
+    """A robot at rest: ``joint_angle`` (n_joints,) [rad], the others (n_axes,) [rad], [Nm]."""
+
+    joint_angle: _Array
+    motor_angle: _Array
+    motor_torque: _Array
+
+@type_check_only
+class SimulationOutput(TypedDict):
+    """What a simulated run recorded; fewer samples than asked for if it did not complete.
+
+    Arrays have shape (n_samples, n_axes) except ``joint_position_rad`` (n_samples, n_joints).
+    ``position_rad`` is the measurement: ``motor_position_rad`` plus
+    ``position_disturbance_rad``, which includes the noise. ``stopped_at`` is the sample
+    (from 0) at which a run that did not complete ended. ``evaluations``, ``steps`` and
+    ``rejections`` count right-hand sides and sub-steps.
+    """
+
+    torque_cmd_nm: _Array
+    position_rad: _Array
+    motor_position_rad: _Array
+    joint_position_rad: _Array
+    torque_disturbance_nm: _Array
+    position_disturbance_rad: _Array
+    status: Literal["completed", "diverged", "step_size_collapsed", "cancelled"]
+    stopped_at: int | None
+    evaluations: int
+    steps: int
+    rejections: int
+
+@type_check_only
+class ParameterSpec(Protocol):
+    """One number to fit: any object with these attributes.
+
+    Exactly one of ``robot`` (a name from `Robot.parameters`) and ``effect`` (position in the
+    list of effects, then in that effect's parameter table, both from 0) is not None.
+    ``initial``, ``lower``, ``upper``, ``scale`` and ``prior`` (mean, standard deviation) are in
+    the parameter's unit; ``scale`` is the natural size of a change. A ``nuisance`` parameter's
+    Jacobian column is computed once and refreshed only after the search has settled.
+    """
+
+    @property
+    def robot(self) -> str | None: ...
+    @property
+    def effect(self) -> tuple[int, int] | None: ...
+    @property
+    def initial(self) -> float: ...
+    @property
+    def lower(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def prior(self) -> tuple[float, float] | None: ...
+    @property
+    def frozen(self) -> bool: ...
+    @property
+    def nuisance(self) -> bool: ...
+
+@type_check_only
+class OptionSpec(Protocol):
+    """Settings of a fit: any object with these attributes.
+
+    ``loss`` is "squared", "huber" or "soft_l1"; ``loss_scale`` is in standard deviations.
+    ``loss_tolerance`` is a share of the loss, ``step_tolerance`` a share of each parameter's
+    scale. ``block_s`` [s] is the length of the blocks of `FitResult.blocks`. ``method`` is
+    "rk4" (with ``substeps`` per sample) or "dopri5" (with a relative ``tolerance`` per
+    sub-step); `fit_inverse_dynamics` ignores these three.
+    """
+
+    @property
+    def max_iterations(self) -> int: ...
+    @property
+    def loss_tolerance(self) -> float: ...
+    @property
+    def step_tolerance(self) -> float: ...
+    @property
+    def loss(self) -> str: ...
+    @property
+    def loss_scale(self) -> float: ...
+    @property
+    def nuisance_refreshes(self) -> int: ...
+    @property
+    def block_s(self) -> float: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def substeps(self) -> int: ...
+    @property
+    def tolerance(self) -> float: ...
+
+@final
+class CancelToken:
+    """Lets one thread stop the long calls of others."""
+
+    def __new__(cls) -> CancelToken: ...
+    def cancel(self) -> None:
+        """Ask every call that holds this token to stop."""
+
+@final
+class Robot:
+    """A robot description with its rigid-body algorithms; made by `from_toml`, picklable.
+
+    The algorithms see the chain of all joints without motors and springs; their arguments
+    and results have shape (n, n_joints), one configuration per row: ``q`` [rad], ``v`` [rad/s],
+    ``a`` [rad/s^2], ``tau`` [Nm], joint side.
+    """
+
+    @staticmethod
+    def from_toml(text: str) -> Robot:
+        """Read a description in the format ``axisight.robot/1``; raises RobotError."""
+    @property
+    def toml(self) -> str:
+        """The text the robot was read from."""
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+    @property
+    def sample_time_s(self) -> float:
+        """Sample time of controller and logs [s]."""
+    @property
+    def n_axes(self) -> int:
+        """Number of driven axes."""
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, driven and elastic."""
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of all joints, base to tip."""
+    @property
+    def axis_joints(self) -> list[int]:
+        """Index (from 0) of the joint each axis drives."""
+    @property
+    def gear_ratio(self) -> _Array:
+        """Joint angle per motor angle r, shape (n_axes,)."""
+    @property
+    def axis_is_prismatic(self) -> list[bool]:
+        """Whether each axis slides."""
+    @property
+    def axis_is_rigid(self) -> list[bool]:
+        """Whether each axis has a rigid transmission."""
+    @property
+    def operating_point(self) -> _Array:
+        """Driven joint angles at rest [rad], shape (n_axes,)."""
+    @property
+    def position_noise_std(self) -> float:
+        """Standard deviation of the motor position measurement [rad], white, per sample."""
+    @property
+    def controller_kind(self) -> Literal["pi_velocity", "p_velocity", "cascade", "none"]:
+        """Kind of controller."""
+    @property
+    def controller_gains(self) -> dict[str, _Array]:
+        """Gains by name, shape (n_axes,) each, motor side.
+
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
+        """
+    def parameters(self) -> list[tuple[str, float]]:
+        """Names (``<joint>.<quantity>``) and SI values of all physical parameters."""
+    def with_parameters(self, values: Sequence[tuple[str, float]]) -> Robot:
+        """Return the same robot with some parameters replaced, by name, in SI units.
+
+        Raises InputError for a name that `parameters` does not list.
+        """
+    def inertia_matrix(self, q: _Array) -> _Array:
+        """M(q) [kg m^2], shape (n, n_joints, n_joints)."""
+    def bias(self, q: _Array, v: _Array) -> _Array:
+        """Coriolis, centrifugal and gravity torques c(q, v) + g(q) [Nm]."""
+    def gravity(self, q: _Array) -> _Array:
+        """Gravity torques g(q) [Nm]."""
+    def inverse_dynamics(self, q: _Array, v: _Array, a: _Array) -> _Array:
+        """Torques M(q) a + c(q, v) + g(q) [Nm]."""
+    def forward_dynamics(self, q: _Array, v: _Array, tau: _Array) -> _Array:
+        """Accelerations [rad/s^2] under the torques ``tau``."""
+    def energy(self, q: _Array, v: _Array) -> _Array:
+        """Kinetic and potential energy of the links [J], shape (n, 2)."""
+    def pose(self, q: _Numbers, joint: int) -> tuple[_Array, _Array]:
+        """Rotation (3, 3) and origin (3,) [m] of the frame of ``joint`` (from 0), base frame.
+
+        ``q`` is one configuration (n_joints,) [rad].
+        """
+    def jacobian(self, q: _Numbers, joint: int, point: _Numbers) -> _Array:
+        """Jacobian (6, n_joints) of a point fixed in the frame of ``joint`` (from 0).
+
+        Rows: linear velocity [m], then angular velocity, base frame. ``q`` is one configuration
+        (n_joints,) [rad], ``point`` three coordinates [m] in the joint's frame.
+        """
+    def equilibrium(self, effects: _Effects, joint_angle: _Numbers | None = None) -> Equilibrium:
+        """Equilibrium with the driven joints at ``joint_angle`` (n_axes,) [rad].
+
+        None is the operating point; elastic joints settle under gravity.
+        """
+    def linearize(
+        self, effects: _Effects, joint_angle: _Numbers | None = None
+    ) -> tuple[_Array, _Array, _Array]:
+        """Matrices A, B, C about the equilibrium, states [phi, q, phi', q'].
+
+        Input motor torque [Nm], output motor angle [rad]; shapes (n_states, n_states),
+        (n_states, n_axes), (n_axes, n_states). ``joint_angle`` as for `equilibrium`.
+        """
+    def modes(
+        self, effects: _Effects, joint_angle: _Numbers | None = None
+    ) -> tuple[_Array, _Array, _Array, _Array]:
+        """Modes of the linearization, slowest first; a complex pair appears once.
+
+        Eigenvalues (n_modes, 2) [rad/s], frequencies (n_modes,) [Hz], damping ratios
+        (n_modes,) [1], shapes (n_modes, n_states, 2); a last axis of 2 is real, imaginary.
+        """
+    def zoh_response(
+        self, frequency_hz: _Numbers, effects: _Effects, joint_angle: _Numbers | None = None
+    ) -> _Array:
+        """Zero-order-hold response from motor torque [Nm] to motor angle [rad].
+
+        Shape (n_freq, n_axes, 2 n_axes): output, then input with real and imaginary part
+        interleaved; NaN where a frequency hits a pole. ``frequency_hz`` is (n_freq,) [Hz].
+        """
+
+@final
+class FitResult:
+    """Result of a fit. Arrays are copies.
+
+    Residuals are whitened, model minus measurement, in the order log, axis, sample; matrices
+    are over the ``free`` parameters. The loss is the sum over residuals of rho, rho = r^2 near
+    zero (twice the usual half sum of squares).
+    """
+
+    @property
+    def status(self) -> Literal["loss_converged", "step_converged", "max_iterations", "stalled"]:
+        """How the search ended."""
+    @property
+    def theta(self) -> _Array:
+        """All parameters, frozen ones included, in their units, shape (n_parameters,)."""
+    @property
+    def loss(self) -> float:
+        """Loss at the end, prior excluded."""
+    @property
+    def initial_loss(self) -> float:
+        """Loss at the start, prior excluded."""
+    @property
+    def n_residuals(self) -> int:
+        """Number of residuals."""
+    @property
+    def iterations(self) -> int:
+        """Accepted steps."""
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the problem."""
+    @property
+    def free(self) -> list[int]:
+        """Indices (from 0) of the free parameters, the order of all matrices."""
+    @property
+    def covariance(self) -> _Array:
+        """Inverse of the normal matrix, prior included, shape (n_free, n_free).
+
+        The covariance when whitened residuals are white with unit variance; NaN if singular.
+        """
+    @property
+    def sandwich(self) -> _Array:
+        """Covariance from the scatter of block gradients, shape (n_free, n_free)."""
+    @property
+    def condition(self) -> float:
+        """Condition number of the normal matrix scaled to unit diagonal."""
+    @property
+    def at_bound(self) -> list[int]:
+        """Indices (from 0) of the free parameters that ended on a bound."""
+    @property
+    def residual(self) -> _Array:
+        """Whitened residuals, shape (n_residuals,)."""
+    @property
+    def jacobian(self) -> _Array:
+        """Derivatives of the residuals, shape (n_free, n_residuals): one row per parameter."""
+    @property
+    def blocks(self) -> list[tuple[int, int, int, int]]:
+        """Blocks of the residual vector: (log, axis, start, length), all from 0."""
+    @property
+    def block_matrix(self) -> _Array:
+        """J^T W J by block, shape (n_blocks, n_free, n_free)."""
+    @property
+    def block_gradient(self) -> _Array:
+        """J^T W r by block, shape (n_blocks, n_free)."""
+    @property
+    def block_loss(self) -> _Array:
+        """Loss by block, shape (n_blocks,)."""
+
+def effect_table() -> list[EffectInfo]:
+    """Every effect with its description and parameters."""
+
+def simulate(
+    robot: Robot,
+    effects: _Effects,
+    input: _Array,
+    *,
+    reference: bool,
+    noise: _Array | None = None,
+    start: _Numbers | None = None,
+    method: _Method | str = "dopri5",
+    substeps: int = 1,
+    tolerance: float = 1e-7,
+    cancel: CancelToken | None = None,
+) -> SimulationOutput:
+    """Simulate one run from rest.
+
+    ``input`` (n_samples, n_axes) is a motor-side velocity reference [rad/s] through the
+    controller if ``reference``, else a commanded torque [Nm]. ``noise`` [rad], of the same
+    shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
+    angles at rest, None the operating point. ``method`` is "rk4" with ``substeps`` per sample or
+    "dopri5" with a relative ``tolerance`` per sub-step.
+    """
+
+def measurement_noise(seed: int, run: int, n_samples: int, n_axes: int, std: float) -> _Array:
+    """White Gaussian position noise, shape (n_samples, n_axes), in the unit of ``std`` [rad].
+
+    A function of ``seed``, ``run`` and axis alone, so that any run can be made again.
+    """
+
+def fit_simulation(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[ParameterSpec],
+    records: Sequence[tuple[_Array, _Array]],
+    weighting: Sequence[_Weighting],
+    options: OptionSpec,
+    *,
+    input: Literal["reference", "torque"] = "reference",
+    output: Literal["torque", "position"] = "torque",
+    warm: Sequence[tuple[int, _Array]] = ...,
+    cancel: CancelToken | None = None,
+) -> FitResult:
+    """Fit a free-running simulation to logs.
+
+    ``records`` are pairs (input, target) of shape (n_samples, n_axes), one per log: a velocity
+    reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or measured motor
+    position [rad], as ``input`` and ``output`` say. Every log starts at rest at the operating
+    point. ``weighting`` has one entry per axis. ``warm`` gives Jacobian columns (n_residuals,)
+    of nuisance parameters from an earlier fit, by parameter index (from 0).
+    """
+
+def fit_inverse_dynamics(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[ParameterSpec],
+    records: Sequence[tuple[_Array, _Array, _Array, _Array]],
+    weighting: Sequence[_Weighting],
+    options: OptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> FitResult:
+    """Fit the torque predicted from measured motions, transmissions taken as rigid.
+
+    ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm]) of
+    shape (n_samples, n_axes), motor side, one per log. ``weighting`` has one entry per axis.
+    ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
+    """

@@ -1,0 +1,158 @@
+"""The candidates of a diagnosis: every effect on every axis, with start values from the data."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, effect_info, effect_table
+from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.orders import strongest_orders
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Effects that an inverse-dynamics prediction cannot contain.
+_DYNAMIC = {"transmission", "sensor"}
+_TIMING = {"input_delay", "actuator_bandwidth"}
+_HARMONIC = ("torque_ripple", "resolver_ripple")
+_N_ORDERS = 3
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What start values are taken from: logs and baseline residual torque on a common grid.
+
+    ``residual[log][axis]`` weighted residual torque, ``angle`` and ``speed``
+    motor side at the same samples, ``bandwidth_hz`` below which the residual
+    torque follows a torque on the motor.
+    """
+
+    residual: list[list[Array]]
+    angle: list[list[Array]]
+    speed: list[list[Array]]
+    bandwidth_hz: float
+
+
+def situation(robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, bandwidth_hz: float) -> Situation:
+    """Return residual, angle and speed by log and axis at the decimated rate."""
+    residual: list[list[Array]] = []
+    angle: list[list[Array]] = []
+    speed: list[list[Array]] = []
+    for i, log in enumerate(logs):
+        rows: list[Array] = []
+        angles: list[Array] = []
+        speeds: list[Array] = []
+        for axis in range(robot.n_axes):
+            mine = (baseline.log == i) & (baseline.axis == axis)
+            first = int(baseline.start[mine].min())
+            count = int(baseline.size[mine].sum())
+            rows.append(baseline.residual[first : first + count])
+            position = log.position_rad[:, axis]
+            rate = np.gradient(position, log.sample_time_s)
+            # A short running mean takes the quantization and noise off the speed.
+            rate = np.convolve(rate, np.ones(9) / 9, mode="same")
+            angles.append(position[::decimation][:count])
+            speeds.append(rate[::decimation][:count])
+        residual.append(rows)
+        angle.append(angles)
+        speed.append(speeds)
+    return Situation(residual, angle, speed, bandwidth_hz)
+
+
+def all_candidates(
+    robot: Robot, logs: Sequence[Log], at: Situation, *, inverse_dynamics: bool = False
+) -> list[FreeEffect]:
+    """Return one candidate per effect and axis (or arm) that can act on this robot."""
+    out = []
+    rigid = robot.core.axis_is_rigid
+    for info in effect_table().values():
+        impossible = info.acts in _DYNAMIC or info.name in _TIMING
+        if inverse_dynamics and impossible and info.name != "motor_inertia":
+            continue
+        if info.scope == "arm":
+            if _has_gravity(robot):
+                out.append(_payload(robot))
+            continue
+        for axis in robot.axis_numbers():
+            if info.acts == "transmission" and rigid[axis - 1]:
+                continue
+            candidate = _axis_candidate(robot, logs, at, info.name, axis)
+            if candidate is not None:
+                out.append(candidate)
+    return out
+
+
+def _has_gravity(robot: Robot) -> bool:
+    """Whether a mass on the last link shows at all: more than a single axis."""
+    return robot.n_joints > 1
+
+
+def _axis_candidate(
+    robot: Robot, logs: Sequence[Log], at: Situation, name: str, axis: int
+) -> FreeEffect | None:
+    if name in _HARMONIC:
+        return _ripple(at, name, axis)
+    if name == "torque_saturation":
+        return _saturation(logs, axis)
+    if name == "transmission_error":
+        return FreeEffect(
+            Effect(name, axis, {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0}),
+            ("cosine_rad", "sine_rad"),
+            {},
+        )
+    parameters = effect_info(name).parameters
+    start = {p.name: p.neutral for p in parameters}
+    return FreeEffect(Effect(name, axis, start), tuple(p.name for p in parameters), {})
+
+
+def _ripple(at: Situation, name: str, axis: int) -> FreeEffect | None:
+    i = axis - 1
+    orders = strongest_orders(
+        [r[i] for r in at.residual],
+        [a[i] for a in at.angle],
+        [v[i] for v in at.speed],
+        count=_N_ORDERS,
+        bandwidth_hz=at.bandwidth_hz,
+        speed_power=2 if name == "resolver_ripple" else 0,
+    )
+    if not orders:
+        return None
+    unit = "nm" if name == "torque_ripple" else "rad"
+    start: dict[str, float] = {}
+    free: list[str] = []
+    for k, order in enumerate(orders, start=1):
+        start[f"order_{k}"] = float(order)
+        free += [f"cosine_{k}_{unit}", f"sine_{k}_{unit}"]
+    # Terms without an order are switched off.
+    for k in range(len(orders) + 1, 5):
+        start[f"order_{k}" if (name == "resolver_ripple" or k < 4) else "order_u"] = 0.0
+    start.update(dict.fromkeys(free, 0.0))
+    return FreeEffect(Effect(name, axis, start), tuple(free), {})
+
+
+def _saturation(logs: Sequence[Log], axis: int) -> FreeEffect:
+    largest = max(float(np.abs(log.torque_nm[:, axis - 1]).max()) for log in logs)
+    typical = np.median([np.abs(log.torque_nm[:, axis - 1]).max() for log in logs])
+    start = 0.9 * min(largest, float(typical))
+    return FreeEffect(Effect("torque_saturation", axis, {"limit_nm": start}), ("limit_nm",), {})
+
+
+def _payload(robot: Robot) -> FreeEffect:
+    """Return a point mass that starts at the centre of mass of the last link that has one."""
+    joints = tomllib.loads(robot.core.toml)["joint"]
+    x, y, z = next(j["link"]["com"] for j in reversed(joints) if "link" in j)
+    reach = sum(float(np.linalg.norm(j["origin"])) for j in joints) or 1.0
+    centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
+    # Tools reach about as far as the last links do.
+    spread = 0.3 * reach
+    return FreeEffect(
+        Effect("payload", None, {"mass_kg": 0.0, **centre}),
+        ("mass_kg", "x_m", "y_m", "z_m"),
+        {name: (value, spread) for name, value in centre.items()},
+    )

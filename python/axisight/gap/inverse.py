@@ -1,0 +1,128 @@
+"""Inverse-dynamics mode: torque predicted from the measured motion, no reference needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.fitting import FitOptions, Parameter, Weighting, core_spec
+from axisight.gap.model import ModelFitter
+from axisight.gap.noise import Floor, position_noise_std
+from axisight.gap.settings import Settings
+from axisight.gap.torques import Variant
+from axisight.logs import Log, differentiate, lowpass
+from axisight.robot import Robot
+from axisight.simulation import white_noise
+
+Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array, Array]
+
+
+def motion(log: Log, cutoff_hz: float) -> Motion:
+    """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike."""
+    velocity, acceleration = differentiate(log.position_rad, log.sample_time_s, cutoff_hz)
+    smooth = lowpass(log.position_rad, log.sample_time_s, cutoff_hz)
+    torque = lowpass(log.torque_nm, log.sample_time_s, cutoff_hz)
+    out = tuple(np.ascontiguousarray(x) for x in (smooth, velocity, acceleration, torque))
+    return out[0], out[1], out[2], out[3]
+
+
+class InverseDynamicsFitter(ModelFitter):
+    """Error of the torque predicted from the measured motion."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        motions: Sequence[Motion],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, weighting, tolerances, block_s)
+        self.motions = list(motions)
+
+    def takes_part(self, name: str) -> bool:
+        """Springs and their damping do not show in a rigid prediction."""
+        quantity = name.rsplit(".", 1)[1]
+        return quantity not in ("stiffness", "damping")
+
+    def solve(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.FitResult:
+        """Run the fit in the core; sensitivities are cheap here, so none are kept."""
+        del warm
+        return _core.fit_inverse_dynamics(
+            self.robot.core,
+            core_effects(effects),
+            [core_spec(p, effects) for p in parameters],
+            self.motions,
+            self.weighting.core(),
+            options,
+            cancel=self.cancel,
+        )
+
+
+def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
+    """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
+    changed = robot.core.with_parameters(list(variant.robot_values.items()))
+    result = _core.fit_inverse_dynamics(
+        changed,
+        core_effects([*robot.effects, *variant.effects]),
+        [],
+        [at],
+        Weighting.flat(robot.n_axes).core(),
+        FitOptions(max_iterations=0),
+    )
+    # The residual is prediction minus measurement, axis by axis.
+    residual = result.residual.reshape(robot.n_axes, -1).T
+    return np.asarray(residual + at[3])
+
+
+def inverse_floor(robot: Robot, logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> Floor:
+    """Return the floor of a predicted torque: position noise through the inertia, and torque noise."""
+    std = position_noise_std(list(logs))
+    log = logs[0]
+    rate = 1.0 / log.sample_time_s
+    noise = inverse_noise(robot, log, std, cutoff_hz, settings.seed)
+    variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
+    noise_variance = np.var(noise, axis=0)
+    total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
+    decimation = max(1, int(rate / (2 * cutoff_hz)))
+    weighting = Weighting(np.zeros(1), 1 / np.sqrt(total)[:, None] / np.sqrt(decimation), decimation)
+    flat = np.ones((len(variance), 1))
+    return Floor(std, np.zeros(1), noise_variance[:, None] * flat, weighting, noise_variance / total)
+
+
+def inverse_noise(robot: Robot, log: Log, std_rad: Array, cutoff_hz: float, seed: int, run: int = 0) -> Array:
+    """Return the error (n, n_axes) [Nm] that sensor noise alone causes in a predicted torque."""
+    noise = white_noise(seed, run, log.n_samples, robot.n_axes) * std_rad
+    _, acceleration = differentiate(noise, log.sample_time_s, cutoff_hz)
+    torque = white_noise(seed, run + 1, log.n_samples, robot.n_axes) * _torque_noise_std(log)
+    return np.asarray(acceleration * _inertia(robot) - lowpass(torque, log.sample_time_s, cutoff_hz))
+
+
+def _inertia(robot: Robot) -> Array:
+    """Return the inertia felt by each motor at the operating point (n_axes,) [kg m^2]."""
+    q = robot.equilibrium()["joint_angle_rad"].values
+    joints = robot.core.axis_joints
+    ratio = robot.core.gear_ratio
+    arm = np.diag(robot.inertia_matrix(q))[joints] * ratio**2
+    own = dict(robot.core.parameters())
+    motors = [own[f"{robot.joint_names[j]}.motor_inertia"] for j in joints]
+    return np.asarray(arm + np.array(motors))
+
+
+def _torque_noise_std(log: Log) -> Array:
+    rate = 1.0 / log.sample_time_s
+    f, density = welch(log.torque_nm, rate, nperseg=min(2048, log.n_samples // 2), axis=0)
+    top = (f > 0.4 * rate) & (f < 0.49 * rate)
+    return np.asarray(np.sqrt(np.mean(density[top], axis=0) * rate / 2))

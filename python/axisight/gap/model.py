@@ -1,0 +1,250 @@
+"""A model under trial: the robot's own parameters, effects, and the fit of both to logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.fitting import (
+    FitOptions,
+    Parameter,
+    Weighting,
+    core_spec,
+    effect_parameter,
+    robot_parameter,
+    robot_parameters,
+)
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FreeEffect:
+    """An effect under trial: start values, the parameters to fit, priors on some of them."""
+
+    effect: Effect
+    free: tuple[str, ...]
+    priors: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A fitted model and what the data say of it.
+
+    ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
+    fitted values and ``std`` per effect parameter. Normal equations by block
+    (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
+    ``loss`` (n_blocks,); ``log``, ``axis``, ``size`` (n_blocks,);
+    ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters`` names the p
+    columns: (None, robot parameter) or (effect position, parameter).
+    """
+
+    effects: tuple[Effect, ...]
+    free: tuple[FreeEffect, ...]
+    robot_values: dict[str, float]
+    std: dict[tuple[int | None, str], float]
+    parameters: tuple[tuple[int | None, str], ...]
+    status: str
+    condition: float
+    at_bound: tuple[tuple[int | None, str], ...]
+    matrix: Array
+    gradient: Array
+    loss: Array
+    log: NDArray[np.int64]
+    axis: NDArray[np.int64]
+    start: NDArray[np.int64]
+    size: NDArray[np.int64]
+    prior_matrix: Array
+    prior_gradient: Array
+    residual: Array
+    nuisance_columns: dict[str, Array]
+
+    @property
+    def total(self) -> float:
+        """Loss of the estimation logs."""
+        return float(self.loss.sum())
+
+
+class ModelFitter:
+    """Fits models to one set of logs; subclasses say by which error."""
+
+    def __init__(
+        self, robot: Robot, weighting: Weighting, tolerances: Mapping[str, float], block_s: float
+    ) -> None:
+        self.robot = robot
+        self.weighting = weighting
+        self.block_s = block_s
+        self.cancel = _core.CancelToken()
+        self.own = [
+            robot_parameter(robot, name, relative_tolerance=tolerances[quantity])
+            for name in robot_parameters(robot)
+            if (quantity := name.rsplit(".", 1)[1]) in tolerances and self.takes_part(name)
+        ]
+
+    def takes_part(self, name: str) -> bool:
+        """Whether a robot parameter matters to this error."""
+        return bool(name)
+
+    def solve(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.FitResult:
+        """Run the fit in the core."""
+        raise NotImplementedError
+
+    def fit(
+        self,
+        free: Sequence[FreeEffect],
+        start: Evidence | None = None,
+        *,
+        lazy: bool = False,
+        max_iterations: int = 15,
+    ) -> Evidence:
+        """Fit the simulator's own parameters and the effects ``free``.
+
+        ``start`` gives the simulator's parameters to begin with; ``lazy`` also
+        takes their sensitivities from there instead of computing them.
+        """
+        effects = [*self.robot.effects, *(f.effect for f in free)]
+        first = len(self.robot.effects)
+        same = {_same_quantity(self.robot, f.effect) for f in free}
+        own = [
+            replace(p, frozen=True)
+            if p.name in same
+            else replace(
+                p,
+                initial=p.initial if start is None else start.robot_values[p.name],
+                nuisance=lazy,
+            )
+            for p in self.own
+        ]
+        added = [
+            replace(effect_parameter(effects, first + i, name), prior=f.priors.get(name))
+            for i, f in enumerate(free)
+            for name in f.free
+        ]
+        parameters = own + added
+        warm = []
+        if lazy and start is not None:
+            columns = start.nuisance_columns
+            warm = [(i, columns[p.name]) for i, p in enumerate(own) if p.name in columns]
+        options = FitOptions(
+            max_iterations=max_iterations,
+            loss_tolerance=1e-4,
+            step_tolerance=1e-4,
+            nuisance_refreshes=0,
+            block_s=self.block_s,
+        )
+        result = self.solve(effects, parameters, options, warm)
+        return _evidence(result, parameters, own, effects, list(free), first)
+
+
+# Effects that change a quantity the simulator has a tolerance for.
+_SAME = {
+    "joint_stiffness": "stiffness",
+    "joint_damping": "damping",
+    "motor_inertia": "motor_inertia",
+    "viscous_friction": "viscous_friction",
+}
+
+
+def _same_quantity(robot: Robot, effect: Effect) -> str | None:
+    """Return the robot parameter that an effect stands in for: it is then held at its value."""
+    if effect.axis is None or effect.name not in _SAME:
+        return None
+    joint = robot.joint_names[robot.core.axis_joints[effect.axis - 1]]
+    return f"{joint}.{_SAME[effect.name]}"
+
+
+def _evidence(
+    result: _core.FitResult,
+    parameters: Sequence[Parameter],
+    own: Sequence[Parameter],
+    effects: Sequence[Effect],
+    free: Sequence[FreeEffect],
+    first: int,
+) -> Evidence:
+    every = [(None if p.effect is None else p.effect - first, p.name) for p in parameters]
+    values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
+    for (place, name), value in zip(every, result.theta, strict=True):
+        if place is not None:
+            values[place][name] = float(value)
+    robot_values = {p.name: float(result.theta[i]) for i, p in enumerate(own)}
+    columns = result.free
+    theta = result.theta[columns]
+    names = tuple(every[i] for i in columns)
+    used = [parameters[i] for i in columns]
+    fitted = tuple(
+        Effect(f.effect.name, f.effect.axis, v) for f, v in zip(free, values, strict=True)
+    )
+    precision = np.array([0.0 if p.prior is None else p.prior[1] ** -2 for p in used])
+    mean = np.array([0.0 if p.prior is None else p.prior[0] for p in used])
+    blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
+    jacobian = result.jacobian
+    std = np.sqrt(np.maximum(np.diag(result.sandwich), 0.0))
+    return Evidence(
+        effects=fitted,
+        free=tuple(replace(f, effect=e) for f, e in zip(free, fitted, strict=True)),
+        robot_values=robot_values,
+        std={n: float(s) for n, s in zip(names, std, strict=True)},
+        parameters=names,
+        status=result.status,
+        condition=result.condition,
+        at_bound=tuple(every[i] for i in result.at_bound),
+        matrix=result.block_matrix,
+        gradient=result.block_gradient,
+        loss=result.block_loss,
+        log=blocks[:, 0],
+        axis=blocks[:, 1],
+        start=blocks[:, 2],
+        size=blocks[:, 3],
+        prior_matrix=np.diag(precision),
+        prior_gradient=precision * (theta - mean),
+        residual=result.residual,
+        nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(names) if e is None},
+    )
+
+
+class ClosedLoopFitter(ModelFitter):
+    """Error of the commanded torque, simulator and machine driven by the same references."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        records: list[tuple[Array, Array]],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, weighting, tolerances, block_s)
+        self.records = records
+
+    def solve(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.FitResult:
+        """Run the fit in the core."""
+        return _core.fit_simulation(
+            self.robot.core,
+            core_effects(effects),
+            [core_spec(p, effects) for p in parameters],
+            self.records,
+            self.weighting.core(),
+            options,
+            input="reference",
+            output="torque",
+            warm=warm,
+            cancel=self.cancel,
+        )

@@ -1,0 +1,319 @@
+"""The pipeline: a simulator and measured logs in, a diagnosis out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import CaseError, InputError
+from axisight.fitting import records, robot_parameters
+from axisight.gap.candidates import all_candidates, situation
+from axisight.gap.howfar import Stage, gap_figures, gap_reduction, overlays, stage
+from axisight.gap.inverse import (
+    InverseDynamicsFitter,
+    inverse_floor,
+    inverse_noise,
+    motion,
+    predicted_torque,
+)
+from axisight.gap.model import ClosedLoopFitter, Evidence, FreeEffect, ModelFitter
+from axisight.gap.noise import Floor, closed_loop_floor, noise_torque
+from axisight.gap.result import Cause, Diagnosis, Gap, Interval, Mode, Overlay
+from axisight.gap.search import Progress, Search, search
+from axisight.gap.settings import Settings
+from axisight.gap.torques import AS_GIVEN, Variant, simulated_torque
+from axisight.gap.verdict import Conclusion, conclude
+from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.logs import Case, Log, check_same_rate, read_case
+from axisight.robot import Robot, load_robot
+
+Array = NDArray[np.float64]
+
+# Below the first resonance of most machines, above the spectrum of their motions.
+INVERSE_CUTOFF_HZ = 60.0
+# A torque ripple is followed by the controller one to one up to about here.
+_RIPPLE_BANDWIDTH_HZ = 20.0
+
+
+def _silent(_label: str, _done: int, _total: int) -> None:
+    """Report nothing."""
+
+
+def diagnose(
+    case: Case | Path | str | None = None,
+    *,
+    robot: Robot | Path | str | None = None,
+    estimation: Sequence[Log] = (),
+    validation: Sequence[Log] = (),
+    settings: Settings | None = None,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
+
+    Parameters
+    ----------
+    case : a case, or the folder of one (``axisight.case/1``); or give
+    robot, estimation, validation : the simulator (or its file or preset), logs to
+        fit and choose on, and logs that only the final figures see.
+    settings : tolerances of the simulator's parameters, thresholds, seed.
+    progress : called with (what, done, total).
+
+    Returns
+    -------
+    The diagnosis. Closed loop when the robot has a controller and every log its
+    velocity references, inverse dynamics otherwise. The same input, settings
+    and version give the same result.
+
+    Raises
+    ------
+    CaseError, LogError, RobotError, InputError for bad input.
+
+    """
+    started = time.monotonic()
+    chosen = settings or Settings()
+    name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    closed = machine.core.controller_kind != "none" and all(
+        log.velocity_ref_rad_s is not None for log in [*fit_logs, *held_logs]
+    )
+    view = ClosedLoopView(machine, fit_logs, chosen) if closed else InverseView(machine, fit_logs, chosen)
+    found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    progress("measuring the gap", 0, 1)
+    conclusion = conclude(found, chosen)
+    out = _assemble(name, machine, view, held_logs, found, conclusion, chosen)
+    progress("measuring the gap", 1, 1)
+    out.provenance["seconds"] = round(time.monotonic() - started, 1)
+    return out
+
+
+def _inputs(
+    case: Case | Path | str | None,
+    robot: Robot | Path | str | None,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+) -> tuple[str, Robot, list[Log], list[Log]]:
+    if case is not None:
+        read = case if isinstance(case, Case) else read_case(Path(case))
+        name, source = read.name, robot if robot is not None else read.robot_path
+        fit_logs, held_logs = list(read.estimation), list(read.validation)
+    elif robot is not None:
+        name, source = "logs", robot
+        fit_logs, held_logs = list(estimation), list(validation)
+    else:
+        raise InputError("diagnose: expected a case, or a robot with estimation and validation logs")
+    machine = source if isinstance(source, Robot) else load_robot(source)
+    if not fit_logs or not held_logs:
+        raise CaseError(
+            f"{name}: expected at least one estimation and one validation log, "
+            f"got {len(fit_logs)} and {len(held_logs)}"
+        )
+    check_same_rate([*fit_logs, *held_logs])
+    for log in [*fit_logs, *held_logs]:
+        _check_log(machine, log)
+    return name, machine, fit_logs, held_logs
+
+
+def _check_log(robot: Robot, log: Log) -> None:
+    if log.n_axes != robot.n_axes:
+        raise CaseError(f"{log.source}: expected {robot.n_axes} axes as in the robot, got {log.n_axes}")
+    if abs(log.sample_time_s / robot.sample_time_s - 1) > 1e-4:
+        raise CaseError(
+            f"{log.source}: expected the robot's sample time {robot.sample_time_s:g} s, "
+            f"got {log.sample_time_s:g} s"
+        )
+
+
+@dataclass
+class View:
+    """One way of comparing simulator and logs: what to fit, what error it leaves, what floor."""
+
+    mode: Mode
+    robot: Robot
+    logs: list[Log]
+    settings: Settings
+    fitter: ModelFitter
+    floor: Floor
+
+    def candidates(self, model: Evidence) -> list[FreeEffect]:
+        """Return the candidates, with start values from the residual of a model."""
+        at = situation(
+            self.robot, self.logs, model, self.fitter.weighting.decimation, _RIPPLE_BANDWIDTH_HZ
+        )
+        inverse = self.mode == "inverse_dynamics"
+        return all_candidates(self.robot, self.logs, at, inverse_dynamics=inverse)
+
+    def measured(self, log: Log) -> Array:
+        """Return the torque errors are taken from (n, n_axes) [Nm]."""
+        raise NotImplementedError
+
+    def torque(self, variant: Variant, log: Log) -> Array:
+        """Return the torque of a simulator on a log (n, n_axes) [Nm]."""
+        raise NotImplementedError
+
+    def noise(self, log: Log, run: int) -> Array:
+        """Return the torque error of noise alone (n, n_axes) [Nm]."""
+        raise NotImplementedError
+
+
+class ClosedLoopView(View):
+    """Simulator and machine driven by the same references."""
+
+    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+        floor = closed_loop_floor(robot, logs, settings)
+        data = records(logs, closed=True)
+        fitter = ClosedLoopFitter(robot, data, floor.weighting, settings.tolerances, settings.block_s)
+        super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+
+    def measured(self, log: Log) -> Array:
+        """Return the logged torque."""
+        return log.torque_nm
+
+    def torque(self, variant: Variant, log: Log) -> Array:
+        """Return the simulated torque."""
+        return simulated_torque(self.robot, variant, log)
+
+    def noise(self, log: Log, run: int) -> Array:
+        """Return the torque that sensor noise causes through the loop."""
+        return noise_torque(self.robot, log, self.floor.position_std_rad, self.settings.seed, run)
+
+
+class InverseView(View):
+    """Torque predicted from the measured motion."""
+
+    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+        cutoff = min(INVERSE_CUTOFF_HZ, 0.2 / robot.sample_time_s)
+        self.cutoff_hz = cutoff
+        floor = inverse_floor(robot, logs, cutoff, settings)
+        fitter = InverseDynamicsFitter(
+            robot,
+            [motion(log, cutoff) for log in logs],
+            floor.weighting,
+            settings.tolerances,
+            settings.block_s,
+        )
+        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
+
+    def measured(self, log: Log) -> Array:
+        """Return the low-passed torque."""
+        return motion(log, self.cutoff_hz)[3]
+
+    def torque(self, variant: Variant, log: Log) -> Array:
+        """Return the predicted torque."""
+        return predicted_torque(self.robot, variant, motion(log, self.cutoff_hz))
+
+    def noise(self, log: Log, run: int) -> Array:
+        """Return the error that noise of position and torque causes."""
+        std = self.floor.position_std_rad
+        return inverse_noise(self.robot, log, std, self.cutoff_hz, self.settings.seed, 2 * run)
+
+
+def _errors(view: View, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+    return [view.torque(variant, log) - view.measured(log) for log in logs]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The gap on the validation logs at each stage of the search."""
+
+    gap: Gap
+    reductions: list[Interval]
+    overlays: tuple[Overlay, ...]
+
+
+def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings: Settings) -> Reach:
+    """Measure the gap on validation logs; the first ``named`` causes are in ``after``."""
+    models = [found.baseline, *(r.start for r in found.rounds[1:]), found.model]
+    steps = models[1 : named + 1] if named else []
+    variants = [Variant(m.robot_values, m.effects) for m in steps]
+    if variants:
+        last = found.model
+        variants[-1] = Variant(last.robot_values, last.effects)
+    refit = Variant(found.baseline.robot_values)
+
+    def measure(errors: Sequence[Array]) -> Stage:
+        return stage(logs, errors, settings.block_s)
+
+    given_errors = _errors(view, AS_GIVEN, logs)
+    given, refitted = measure(given_errors), measure(_errors(view, refit, logs))
+    floor = measure([view.noise(log, run) for run, log in enumerate(logs, start=1)])
+    stages = [measure(_errors(view, v, logs)) for v in variants]
+    after = stages[-1] if stages else refitted
+    # The first cause is credited from the simulator as given: that is what the user had.
+    earlier = [given, *stages]
+    reductions = [
+        gap_reduction(a, b, given, floor, draws=settings.bootstrap, seed=settings.seed)
+        for a, b in zip(earlier, stages, strict=False)
+    ]
+    final = variants[-1] if variants else refit
+    drawn = overlays(
+        logs,
+        [view.torque(AS_GIVEN, log) for log in logs],
+        [view.torque(final, log) for log in logs],
+    )
+    return Reach(gap_figures(given, refitted, after, floor), reductions, drawn)
+
+
+def _assemble(
+    name: str,
+    robot: Robot,
+    view: View,
+    held_logs: Sequence[Log],
+    found: Search,
+    conclusion: Conclusion,
+    settings: Settings,
+) -> Diagnosis:
+    refit = Variant(found.baseline.robot_values)
+    error_logs = [
+        ErrorLog(log, view.torque(refit, log) - view.measured(log), view.noise(log, 0))
+        for log in view.logs
+    ]
+    bands = band_map(error_logs, settings.block_s)
+    regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
+    reach = _reach(view, held_logs, found, len(conclusion.causes), settings)
+    causes = tuple(
+        Cause(c.effect, c.axis, c.probability, c.parameters, c.units, r)
+        for c, r in zip(conclusion.causes, reach.reductions, strict=True)
+    )
+    places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
+    nominal = robot_parameters(robot)
+    return Diagnosis(
+        name=name,
+        mode=view.mode,
+        verdict=conclusion.verdict,
+        headline=conclusion.headline(reach.gap, causes, places),
+        gap=reach.gap,
+        where=places,
+        causes=causes,
+        alternatives=conclusion.alternatives,
+        equivalent=conclusion.equivalent,
+        next_experiment=conclusion.next_experiment,
+        ranking=conclusion.ranking,
+        band_map=bands,
+        regime_maps=regimes,
+        overlays=reach.overlays,
+        refit={k: _relative(found.model, k, nominal[k]) for k in found.model.robot_values},
+        checks=conclusion.checks,
+        provenance={
+            "axisight_version": version("axisight"),
+            "seed": settings.seed,
+            "robot": robot.name,
+            "estimation_logs": [log.name for log in view.logs],
+            "validation_logs": [log.name for log in held_logs],
+            "position_noise_std_rad": view.floor.position_std_rad.tolist(),
+        },
+    )
+
+
+def _relative(model: Evidence, name: str, nominal: float) -> Interval:
+    """Return the relative change of a re-fitted parameter with its 95 % interval."""
+    size = abs(nominal) or 1.0
+    change = (model.robot_values[name] - nominal) / size
+    spread = 1.96 * model.std.get((None, name), 0.0) / size
+    return Interval(change, change - spread, change + spread)
+
+

@@ -1,0 +1,214 @@
+"""What a diagnosis says: data only, so that a figure or a page can be made again."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
+Mode = Literal["closed_loop", "inverse_dynamics"]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Relative torque error on the validation logs, rms over axes and logs [1].
+
+    ``before``: the simulator as given; ``refitted``: its own parameters fitted
+    within their tolerances, no effect added; ``after``: with the causes added;
+    ``floor``: what a perfect model would still leave (sensor noise). The
+    ``*_per_axis`` arrays have shape (n_axes,).
+    """
+
+    before: float
+    refitted: float
+    after: float
+    floor: float
+    before_per_axis: Array
+    refitted_per_axis: Array
+    after_per_axis: Array
+    floor_per_axis: Array
+
+
+@dataclass(frozen=True)
+class Where:
+    """One place where the gap lies. ``share`` of the squared gap above the floor [1]."""
+
+    axis: int
+    share: float
+    band_hz: tuple[float, float] | None
+    regime: str | None
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm."""
+
+    effect: str
+    axis: int | None
+    probability: float
+    parameters: dict[str, Interval]
+    units: dict[str, str]
+    gap_reduction: Interval
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect on one axis as it was ranked, held out.
+
+    ``score``: share of the explainable squared error on held-out estimation
+    data that the candidate removes [1]; ``significance``: how many standard
+    errors (block jackknife) that is from zero.
+    """
+
+    effect: str
+    axis: int | None
+    probability: float
+    score: float
+    significance: float
+    status: str
+
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return self.effect if self.axis is None else f"{self.effect}@{self.axis}"
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Measured and simulated torque on one axis of one held-out log, for plotting.
+
+    Arrays have shape (n,); torque in Nm (N on a prismatic axis).
+    """
+
+    log: str
+    axis: int
+    time_s: Array
+    measured_nm: Array
+    before_nm: Array
+    after_nm: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found.
+
+    ``band_map``: dims (axis, band), ``regime_maps[name]``: dims (axis, bin);
+    each a Dataset with ``share`` (of that axis's squared baseline error above
+    the floor), ``excess`` (ratio of the squared error to the floor) and
+    ``significance`` (in standard errors). Band and bin coordinates are labels.
+    """
+
+    name: str
+    mode: Mode
+    verdict: VerdictKind
+    headline: str
+    gap: Gap
+    where: tuple[Where, ...]
+    causes: tuple[Cause, ...]
+    alternatives: tuple[Candidate, ...]
+    equivalent: tuple[tuple[str, ...], ...]
+    next_experiment: str | None
+    ranking: tuple[Candidate, ...]
+    band_map: xr.Dataset
+    regime_maps: dict[str, xr.Dataset]
+    overlays: tuple[Overlay, ...]
+    refit: dict[str, Interval]
+    checks: tuple[str, ...]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def to_verdict(self) -> dict[str, Any]:
+        """Return the verdict as ``axisight.verdict/1`` (plus keys that readers may ignore)."""
+        gap = self.gap
+        return {
+            "schema": "axisight.verdict/1",
+            "mode": self.mode,
+            "verdict": self.verdict,
+            "headline": self.headline,
+            "gap": {
+                "before": gap.before,
+                "after": gap.after,
+                "floor": gap.floor,
+                "refitted": gap.refitted,
+                "per_axis": {
+                    "before": gap.before_per_axis.tolist(),
+                    "after": gap.after_per_axis.tolist(),
+                    "floor": gap.floor_per_axis.tolist(),
+                    "refitted": gap.refitted_per_axis.tolist(),
+                },
+            },
+            "where": [
+                {
+                    "axis": w.axis,
+                    "share": w.share,
+                    "band_hz": None if w.band_hz is None else list(w.band_hz),
+                    "regime": w.regime,
+                    "evidence": w.evidence,
+                }
+                for w in self.where
+            ],
+            "causes": [_cause(c) for c in self.causes],
+            "alternatives": [
+                {"effect": c.effect, "axis": c.axis, "probability": c.probability}
+                for c in self.alternatives
+            ],
+            "equivalent": [list(group) for group in self.equivalent],
+            "next_experiment": self.next_experiment,
+            "provenance": self.provenance,
+        }
+
+    def save_verdict(self, path: Path | str) -> None:
+        """Write the verdict as JSON; the file appears whole or not at all."""
+        write_whole(Path(path), json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n")
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.effect,
+        "axis": cause.axis,
+        "probability": cause.probability,
+        "parameters": {
+            name: {
+                "value": p.value,
+                "ci95": [p.low, p.high],
+                "unit": cause.units.get(name, "1"),
+            }
+            for name, p in cause.parameters.items()
+        },
+        "gap_reduction": {
+            "value": cause.gap_reduction.value,
+            "ci95": [cause.gap_reduction.low, cause.gap_reduction.high],
+        },
+    }
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write ``text`` through a temporary file beside ``path``, so no half file is ever left."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

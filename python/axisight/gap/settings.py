@@ -1,0 +1,56 @@
+"""Settings of a diagnosis: what counts as scatter, as noise and as significant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+# Standard deviation of a simulator's own parameters, relative [1]. About one
+# per cent in masses, stiffness and motor inertia, two in viscous friction, five
+# in damping is ordinary scatter between machines of one type; a half more is
+# allowed here so that such scatter is never called an effect.
+DEFAULT_TOLERANCES: Mapping[str, float] = MappingProxyType(
+    {
+        "mass": 0.015,
+        "inertia_scale": 0.02,
+        "stiffness": 0.015,
+        "damping": 0.08,
+        "motor_inertia": 0.015,
+        "viscous_friction": 0.03,
+    }
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a diagnosis.
+
+    ``tolerances``: relative standard deviation of the simulator's parameters by
+    quantity; quantities left out are taken as exact. ``model_error``: error of
+    a perfect diagnosis relative to the torque spectrum (formulas differ from
+    nature), part of the weight of residuals. ``bandwidth_hz``: residuals above
+    are not used. ``block_s``: length of data blocks for cross-validation and
+    bootstrap. ``max_causes``: forward selection stops there.
+    A cause must remove at least ``smallest_gain`` from the mean square of the
+    weighted residual (in units of noise plus model error), ``smallest_score`` of
+    what is left to explain, ``smallest_share`` of what there was, and by
+    ``significance`` standard errors. A mean square up to ``largest_scatter`` above
+    the floor counts as scatter of the simulator. ``explained_share``: below it, the causes
+    found do not explain the gap. ``seed`` rules every random choice.
+    """
+
+    tolerances: Mapping[str, float] = field(default_factory=lambda: DEFAULT_TOLERANCES)
+    model_error: float = 0.01
+    bandwidth_hz: float = 125.0
+    block_s: float = 1.0
+    max_causes: int = 3
+    smallest_gain: float = 0.05
+    largest_scatter: float = 0.3
+    smallest_score: float = 0.3
+    smallest_share: float = 0.005
+    explained_share: float = 0.7
+    significance: float = 3.0
+    bootstrap: int = 1000
+    seed: int = 0
+    threads: int = 2

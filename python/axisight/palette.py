@@ -1,0 +1,41 @@
+"""The colours of figures and pages: safe for colour-blind readers and in grey print."""
+
+from __future__ import annotations
+
+import math
+
+BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#222222"
+MUTED = "#eeeeee"
+
+# Light to dark in one hue, even steps of lightness
+_STOPS = ((0xE3, 0xEE, 0xF9), (0xB7, 0xD4, 0xEA), (0x6A, 0xAE, 0xD6), (0x2E, 0x7E, 0xBC), (8, 64, 129))
+
+
+def scale_hex() -> list[str]:
+    """The stops of the sequential scale, light to dark."""
+    return [_hex(stop) for stop in _STOPS]
+
+
+def cell_colors(share: float, limit: float) -> tuple[str, str]:
+    """Background and text colour of a cell whose share [1] lies on a scale from 0 to ``limit``."""
+    if math.isnan(share):
+        return MUTED, "#767676"
+    position = min(1.0, max(0.0, share / limit)) * (len(_STOPS) - 1)
+    index = min(int(position), len(_STOPS) - 2)
+    mix = position - index
+    low, high = _STOPS[index], _STOPS[index + 1]
+    color = tuple(round(a + mix * (b - a)) for a, b in zip(low, high, strict=True))
+    return _hex(color), "#ffffff" if _luminance(color) < 0.22 else "#111111"
+
+
+def _hex(color: tuple[int, ...]) -> str:
+    return "#" + "".join(f"{part:02x}" for part in color)
+
+
+def _luminance(color: tuple[int, ...]) -> float:
+    """Relative luminance as the contrast rule of WCAG 2 defines it."""
+    red, green, blue = (
+        c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4
+        for c in (part / 255 for part in color)
+    )
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

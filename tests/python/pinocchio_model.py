@@ -1,0 +1,55 @@
+"""The robots of this project as Pinocchio models, built from the TOML text alone.
+
+Written from the file format's specification and from nothing of the package, so
+that agreement with the core means something.
+"""
+
+import tomllib
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def build(text: str) -> pin.Model:
+    """Chain of all joints; frame of joint ``i`` is parallel to its parent's at zero angle."""
+    data: dict[str, Any] = tomllib.loads(text)
+    model = pin.Model()
+    model.gravity = pin.Motion(np.array(data["gravity"]), np.zeros(3))
+    parent = 0
+    for joint in data["joint"]:
+        axis = np.array(joint["axis"])
+        kind = (
+            pin.JointModelPrismaticUnaligned
+            if joint.get("motion") == "prismatic"
+            else pin.JointModelRevoluteUnaligned
+        )
+        placement = pin.SE3(np.eye(3), np.array(joint["origin"]))
+        parent = model.addJoint(parent, kind(axis), placement, joint["name"])
+        if "link" in joint:
+            xx, yy, zz, xy, xz, yz = joint["link"]["inertia"]
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            body = pin.Inertia(joint["link"]["mass"], np.array(joint["link"]["com"]), inertia)
+            model.appendBodyToJoint(parent, body, pin.SE3.Identity())
+    return model
+
+
+def inertia_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
+    """Full symmetric inertia matrix (older versions fill the upper triangle only)."""
+    upper = np.triu(np.array(pin.crba(model, data, q)))
+    return upper + np.triu(upper, 1).T
+
+
+def point_jacobian(model: pin.Model, data: pin.Data, q: Array, joint: int, point: Array) -> Array:
+    """Linear then angular velocity of a point of link ``joint`` (0-based), base axes."""
+    frame = pin.Frame("point", joint + 1, pin.SE3(np.eye(3), point), pin.FrameType.OP_FRAME)
+    extended = model.copy()
+    number = extended.addFrame(frame)
+    return np.array(
+        pin.computeFrameJacobian(
+            extended, extended.createData(), q, number, pin.LOCAL_WORLD_ALIGNED
+        )
+    )

@@ -1,0 +1,260 @@
+//! Integrators, ends of a run, and the torque path against closed forms.
+
+use axisight_core::robot::{Controller, RobotDescription};
+use axisight_core::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
+use axisight_tests::{ARM, PRESET, ROTOR, effect, plant, relative, robot, sines, trace};
+use std::sync::atomic::AtomicBool;
+
+/// State at `time` of a fall from rest with `per_second` samples of one step each.
+fn fall(robot: &RobotDescription, per_second: usize, method: Method) -> Vec<f64> {
+    let mut robot = robot.clone();
+    robot.sample_time = 1.0 / per_second as f64;
+    let n = per_second / 20 + 1;
+    let torque = vec![0.0; n * robot.n_axes()];
+    let plant = plant::<f64>(&robot, &[]);
+    let run = trace(&plant, &robot, Drive::Torque(&[&torque]), &[], method);
+    run.last().to_vec()
+}
+
+/// Slope of error over step size between successive halvings, the finest pair.
+fn observed_order(robot: &RobotDescription, method: Method, rates: [usize; 3]) -> f64 {
+    let exact = fall(robot, 64_000, Method::RungeKutta4 { substeps: 4 });
+    let error = |rate: usize| relative(&fall(robot, rate, method), &exact);
+    let (coarse, fine) = (error(rates[1]), error(rates[2]));
+    // The reference and rounding must stand far below the finest error.
+    assert!(fine > 1e-12 && error(rates[0]) > coarse, "{coarse:.1e} {fine:.1e}");
+    (coarse / fine).log2() / (rates[2] as f64 / rates[1] as f64).log2()
+}
+
+/// The next term of the error expansion is smaller by w h = 0.1 to 0.2 at these steps, which
+/// moves the observed order by about as much.
+#[test]
+fn runge_kutta_converges_with_order_four() {
+    for text in [PRESET, ARM] {
+        let robot = robot(text);
+        let order = observed_order(&robot, Method::RungeKutta4 { substeps: 1 }, [2000, 4000, 8000]);
+        assert!((order - 4.0).abs() < 0.3, "{}: {order}", robot.name);
+    }
+}
+
+/// A tolerance no step can miss leaves one step per sample.
+#[test]
+fn dormand_prince_converges_with_order_five() {
+    for text in [PRESET, ARM] {
+        let robot = robot(text);
+        let method = Method::DormandPrince { tolerance: 1e9 };
+        let order = observed_order(&robot, method, [500, 1000, 2000]);
+        assert!((order - 5.0).abs() < 0.3, "{}: {order}", robot.name);
+    }
+}
+
+/// In the closed loop sub-steps converge too: the torque is held, so the order stays.
+#[test]
+fn substeps_converge_in_the_closed_loop() {
+    let robot = robot(PRESET);
+    let reference = sines(100, 3, robot.sample_time, 1.0);
+    let at = |substeps: usize| {
+        let plant = plant::<f64>(&robot, &[]);
+        let method = Method::RungeKutta4 { substeps };
+        trace(&plant, &robot, Drive::Reference(&[&reference]), &[], method).command
+    };
+    let exact = at(64);
+    let (coarse, fine) = (relative(&at(2), &exact), relative(&at(4), &exact));
+    let order = (coarse / fine).log2();
+    assert!((order - 4.0).abs() < 0.3, "{order} {coarse:.1e}");
+}
+
+/// The local error is held to the tolerance in each of 200 steps, and the damped loop
+/// forgets, so the error of the run stays within a few hundred tolerances.
+#[test]
+fn tolerance_bounds_the_error_and_costs_effort() {
+    let robot = robot(PRESET);
+    let reference = sines(200, 3, robot.sample_time, 1.0);
+    let at = |method: Method| {
+        trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method)
+    };
+    let exact = at(Method::RungeKutta4 { substeps: 64 });
+    let mut effort = 0;
+    for tolerance in [1e-5, 1e-7, 1e-9] {
+        let run = at(Method::DormandPrince { tolerance });
+        let error = relative(&run.measured, &exact.measured);
+        assert!(error < 200.0 * tolerance, "{tolerance:.0e}: {error:.1e}");
+        assert!(run.evaluations >= effort, "effort fell");
+        effort = run.evaluations;
+    }
+    assert!(effort > 7 * 200);
+}
+
+#[test]
+fn unstable_gain_diverges() {
+    let mut robot = robot(PRESET);
+    robot.controller = Controller::PVelocity { kp: vec![4000.0, 4.0, 3.4] };
+    let reference = sines(4000, 3, robot.sample_time, 1.0);
+    let method = Method::RungeKutta4 { substeps: 1 };
+    let run = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method);
+    match run.status {
+        Status::Diverged(k) => assert_eq!(run.states.len(), k + 1),
+        other => panic!("expected divergence, got {other:?}"),
+    }
+}
+
+#[test]
+fn absurd_stiffness_collapses_the_step() {
+    for stiffness in [1e18, 1e24, 1e30] {
+        let mut robot = robot(ARM);
+        robot.joints[0].compliance.as_mut().expect("spring").stiffness = stiffness;
+        let reference = sines(20, 1, robot.sample_time, 1.0);
+        let method = Method::DormandPrince { tolerance: 1e-9 };
+        let run = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method);
+        assert!(matches!(run.status, Status::StepSizeCollapsed(_)), "{stiffness:e}: {:?}", run.status);
+    }
+}
+
+fn run_of<'a>(robot: &'a RobotDescription, drive: Drive<'a>, noise: &'a [&'a [f64]]) -> Run<'a> {
+    Run {
+        controller: &robot.controller,
+        sample_time: robot.sample_time,
+        start: &robot.operating_point,
+        drive,
+        noise,
+        method: Method::default(),
+        cancel: None,
+    }
+}
+
+fn outcome(robot: &RobotDescription, run: &Run<'_>) -> Result<Status, SimulationError> {
+    let plant = plant::<f64>(robot, &[]);
+    simulate(&plant, run, &mut Stepper::new(&plant), &mut |_| {})
+}
+
+#[test]
+fn cancelled_run_stops_before_its_sample() {
+    let robot = robot(ARM);
+    let flag = AtomicBool::new(true);
+    let mut run = run_of(&robot, Drive::Reference(&[&[0.0; 5]]), &[]);
+    run.cancel = Some(&flag);
+    assert_eq!(outcome(&robot, &run), Ok(Status::Cancelled(0)));
+}
+
+#[test]
+fn misuse_is_refused_by_name() {
+    let robot = robot(PRESET);
+    let good = [0.0; 6];
+    let bad = [0.0, 0.0, 0.0, 0.0, f64::NAN, 0.0];
+    let none = RobotDescription { controller: Controller::None, ..robot.clone() };
+    let cases: [(&RobotDescription, Drive<'_>, &[&[f64]], &str); 6] = [
+        (&robot, Drive::Reference(&[&good[..5]]), &[], "velocity_ref: expected samples of 3 axes, got 5 numbers"),
+        (&robot, Drive::Torque(&[&bad]), &[], "torque: expected finite numbers, got NaN at sample 1"),
+        (&robot, Drive::Torque(&[]), &[], "torque: expected 1 to 1 runs, got 0"),
+        (&robot, Drive::Torque(&[&good, &good]), &[], "torque: expected 1 to 1 runs, got 2"),
+        (&robot, Drive::Reference(&[&good]), &[&bad], "noise: expected finite numbers, got NaN at sample 1"),
+        (&none, Drive::Reference(&[&good]), &[], "controller: expected one for a run driven by velocity references, got kind `none`"),
+    ];
+    for (robot, drive, noise, message) in cases {
+        let error = outcome(robot, &run_of(robot, drive, noise)).expect_err(message);
+        assert_eq!(error.to_string(), message);
+    }
+    let lanes: [&[f64]; 1] = [&good];
+    let mut run = run_of(&robot, Drive::Reference(&lanes), &[]);
+    run.sample_time = 0.0;
+    let error = outcome(&robot, &run).expect_err("zero sample time").to_string();
+    assert_eq!(error, "sample_time: expected a positive time in seconds, got 0");
+    run.sample_time = 1e-3;
+    run.start = &[0.0];
+    let error = outcome(&robot, &run).expect_err("short start").to_string();
+    assert_eq!(error, "joint_angle: expected 3 driven joint angles, got 1");
+}
+
+/// A delay of whole samples is the torque list shifted, after the torque at rest. The sample
+/// number `n T / T` rounds by 1e-16 samples; the springs amplify that by below 1e4.
+#[test]
+fn whole_sample_delay_shifts_the_torque() {
+    let robot = robot(PRESET);
+    let rest = axisight_core::robot::equilibrium(&plant::<f64>(&robot, &[]), &[0.0; 3]).expect("rest");
+    let mut torque = sines(60, 3, robot.sample_time, 2.0);
+    for (i, u) in torque.iter_mut().enumerate() {
+        *u += rest.motor_torque[i % 3] + 0.3;
+    }
+    for samples in [1_usize, 3, 7] {
+        for substeps in [1, 3] {
+            let method = Method::RungeKutta4 { substeps };
+            let delay = samples as f64 * robot.sample_time;
+            let settings: Vec<_> = (0..3).map(|a| effect("input_delay", Some(a), &[delay])).collect();
+            let late = trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method);
+            let mut shifted = rest.motor_torque.repeat(samples);
+            shifted.extend(&torque[..torque.len() - 3 * samples]);
+            let base = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Torque(&[&shifted]), &[], method);
+            let error = relative(&late.measured, &base.measured);
+            assert!(error < 1e-12, "{samples} {substeps}: {error:.1e}");
+        }
+    }
+}
+
+/// Angle of `J phi'' = tau(t)` at each sample, `tau` the held torque list through a delay
+/// and then a lag (none if zero), integrated piece by piece in closed form.
+fn closed_form(torque: &[f64], t: f64, inertia: f64, delay: f64, lag: f64) -> Vec<f64> {
+    let (mut angle, mut speed, mut lagged) = (0.0, 0.0, 0.0);
+    let whole = (delay / t).floor();
+    let switch = delay - whole * t;
+    let held = |k: usize, back: f64| {
+        let index = k as f64 - back;
+        if index < 0.0 { 0.0 } else { torque[index as usize] }
+    };
+    let mut out = Vec::new();
+    for k in 0..torque.len() {
+        out.push(angle);
+        for (u, h) in [(held(k, whole + 1.0), switch), (held(k, whole), t - switch)] {
+            if h <= 0.0 {
+                continue;
+            }
+            // Excess over u decays; its integral and double integral in closed form.
+            let excess = if lag > 0.0 { lagged - u } else { 0.0 };
+            let gone = if lag > 0.0 { -(-h / lag).exp_m1() } else { 0.0 };
+            angle += h * speed + (u * h * h / 2.0 + excess * lag * (h - lag * gone)) / inertia;
+            speed += (u * h + excess * lag * gone) / inertia;
+            lagged = u + excess * (1.0 - gone);
+        }
+    }
+    out
+}
+
+/// For a rigid inertia the straight-line torque with the right two moments is exact, so only
+/// rounding is left: 1e-16 per sample and sub-step, summed twice over 40 samples.
+#[test]
+fn delay_and_lag_are_exact_on_a_rigid_inertia() {
+    let robot = robot(ROTOR);
+    let inertia = 0.25 + 3.0 * 0.5 * 0.5;
+    let torque = axisight_tests::Random(9).vector(40, 2.0);
+    let t = robot.sample_time;
+    for (delay, lag) in [(0.4e-3, 0.0), (2.37e-3, 0.0), (0.0, 0.7e-3), (0.0, 20e-3), (0.0, 0.02e-3), (1.6e-3, 0.9e-3)] {
+        for substeps in [1, 2, 5] {
+            let mut settings = Vec::new();
+            if delay > 0.0 {
+                settings.push(effect("input_delay", Some(0), &[delay]));
+            }
+            if lag > 0.0 {
+                settings.push(effect("actuator_bandwidth", Some(0), &[lag]));
+            }
+            for method in [Method::RungeKutta4 { substeps }, Method::DormandPrince { tolerance: 1e-6 }] {
+                let run = trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method);
+                // A lag of T_c is made T_c + 1e-12 s by the core: 1e-12 / 2e-5 = 5e-8 at worst.
+                let tolerance = if lag > 0.0 { 1e-13 + 2e-12 / lag } else { 1e-13 };
+                let error = relative(&run.measured, &closed_form(&torque, t, inertia, delay, lag));
+                assert!(error < tolerance, "{delay} {lag} {method:?}: {error:.1e}");
+            }
+        }
+    }
+}
+
+/// Two delays (or lags) on one axis act one after the other: the sum of the delays.
+#[test]
+fn delays_add() {
+    let robot = robot(ROTOR);
+    let torque = axisight_tests::Random(10).vector(30, 2.0);
+    let run = |delays: &[f64]| {
+        let settings: Vec<_> = delays.iter().map(|d| effect("input_delay", Some(0), &[*d])).collect();
+        let method = Method::RungeKutta4 { substeps: 1 };
+        trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method).measured
+    };
+    assert!(relative(&run(&[0.4e-3, 1.1e-3]), &run(&[1.5e-3])) < 1e-13);
+}

@@ -1,0 +1,261 @@
+//! Every effect in the table: neutral means absent, derivatives are exact, misuse is refused.
+//!
+//! The tests walk the table, so that a new effect is tested without being named here.
+
+use axisight_core::effects::{Acts, EFFECTS, EffectInfo, Role, Scope, build};
+use axisight_core::robot::{EffectSetting, Plant, RobotDescription, equilibrium};
+use axisight_core::scalar::{Dual, Scalar};
+use axisight_core::simulation::{Drive, Method, Status};
+use axisight_tests::{PRESET, Trace, effect, plant, relative, robot, sines, trace};
+
+const SAMPLES: usize = 120;
+
+/// Axes (or the arm) an effect can act on.
+fn places(info: &EffectInfo, n_axes: usize) -> Vec<Option<usize>> {
+    match info.scope {
+        Scope::Arm => vec![None],
+        Scope::Axis => (0..n_axes).map(Some).collect(),
+    }
+}
+
+fn neutral(info: &EffectInfo) -> Vec<f64> {
+    info.parameters.iter().map(|p| p.neutral).collect()
+}
+
+/// The effect at work: amplitudes well off neutral, every term on.
+fn at_work(info: &EffectInfo) -> Vec<f64> {
+    let value = |(i, p): (usize, &axisight_core::effects::ParameterInfo)| match p.role {
+        // A limit that is neutral when far away, and bites when near.
+        Role::Amplitude if p.neutral >= p.upper => 0.1 * p.typical,
+        // Off whole and half samples, where the slope of a delay has a corner.
+        Role::Amplitude => p.neutral + 0.7 * p.typical,
+        // Orders of harmonics that are switched off; different ones.
+        Role::Shape if p.neutral <= p.lower && p.name.starts_with("order") => 2.0 + i as f64 / 3.0,
+        Role::Shape => p.neutral,
+    };
+    info.parameters.iter().enumerate().map(value).collect()
+}
+
+fn closed_loop<S: Scalar>(robot: &RobotDescription, settings: &[EffectSetting<S>]) -> Trace<S> {
+    let plant = plant::<S>(robot, settings);
+    let reference = sines(SAMPLES, robot.n_axes(), robot.sample_time, 1.5);
+    let method = Method::RungeKutta4 { substeps: 1 };
+    let out = trace(&plant, robot, Drive::Reference(&[&reference]), &[], method);
+    assert_eq!(out.status, Status::Completed);
+    out
+}
+
+#[test]
+fn neutral_effects_vanish() {
+    let mut robot = robot(PRESET);
+    robot.operating_point = vec![0.1, 0.3, -0.2];
+    let base = closed_loop::<f64>(&robot, &[]);
+    let mut failed = Vec::new();
+    for info in EFFECTS {
+        for place in places(info, robot.n_axes()) {
+            let run = closed_loop(&robot, &[effect(info.name, place, &neutral(info))]);
+            // Amplitudes at zero add exact zeros or multiply by one; the delay and the
+            // body sums may round once per sample, 1e-16 amplified by the gear stiffness.
+            for (got, want) in [(&run.command, &base.command), (&run.measured, &base.measured)] {
+                let error = relative(got, want);
+                if error.is_nan() || error > 1e-12 {
+                    failed.push(format!("{} {place:?}: {error:.1e}", info.name));
+                }
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// The counterpart: at work, every effect shows, so that the test above can fail.
+#[test]
+fn effects_at_work_show() {
+    let mut robot = robot(PRESET);
+    robot.operating_point = vec![0.1, 0.3, -0.2];
+    let base = closed_loop::<f64>(&robot, &[]);
+    for info in EFFECTS {
+        for place in places(info, robot.n_axes()) {
+            let run = closed_loop(&robot, &[effect(info.name, place, &at_work(info))]);
+            let seen = relative(&run.command, &base.command).max(relative(&run.measured, &base.measured));
+            assert!(seen > 1e-9, "{} {place:?}: {seen:.1e}", info.name);
+        }
+    }
+}
+
+/// Central differences through the loop at steps h and h / 2: their difference is three times
+/// the truncation left in the finer one. Added to it is rounding: a motor angle of 70 rad is
+/// known to 7e-15, the differenced speed times kp to 4 / 5e-4 times that, 6e-11 Nm, ten of
+/// these over h. A tolerance above 1e-3 of the derivative would say nothing.
+#[test]
+fn derivatives_agree_with_finite_differences() {
+    let mut failed = Vec::new();
+    let mut robot = robot(PRESET);
+    robot.operating_point = vec![0.1, 0.3, -0.2];
+    for info in EFFECTS {
+        // Axis 2 carries gravity, so that its gear does not leave its side of a gap.
+        let place = if info.scope == Scope::Arm { None } else { Some(1) };
+        let start = at_work(info);
+        for (i, p) in info.parameters.iter().enumerate() {
+            // Orders multiply a motor angle of 70 rad.
+            let share = if p.name.starts_with("order") { 1e-4 } else { 1e-2 };
+            let h = share * p.typical.max(0.1 * start[i].abs());
+            let mut setting = effect::<Dual<f64, 1>>(info.name, place, &start);
+            setting.parameters[i] = setting.parameters[i].seeded(0);
+            let exact: Vec<f64> =
+                closed_loop(&robot, &[setting]).command.iter().map(|u| u.partials[0]).collect();
+            let at = |x: f64| {
+                let mut parameters = start.clone();
+                parameters[i] = x;
+                closed_loop::<f64>(&robot, &[effect(info.name, place, &parameters)]).command
+            };
+            let central = |h: f64| -> Vec<f64> {
+                let (high, low) = (at(start[i] + h), at(start[i] - h));
+                high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * h)).collect()
+            };
+            let (coarse, fine) = (central(h), central(0.5 * h));
+            let size = axisight_tests::largest(&exact);
+            let truncation = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let tolerance = truncation + 6e-10 / h;
+            let error = exact.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // A gap that never opens shifts the motor once and for all: no torque, nothing to see.
+            let blind = size > 0.0 && tolerance > 1e-3 * size;
+            if error.is_nan() || error > tolerance || blind {
+                let label = format!("{}.{}: {error:.1e} of {size:.1e}", info.name, p.name);
+                failed.push(format!("{label}, tolerance {tolerance:.1e}"));
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// Delay and lag have a derivative at zero too, where fits start: one-sided differences of
+/// first order, Richardson-extrapolated, `2 D(h/2) - D(h)`.
+#[test]
+fn timing_effects_have_a_derivative_at_zero() {
+    let robot = robot(PRESET);
+    for (name, tolerance) in [("input_delay", 1e-4), ("actuator_bandwidth", 1e-2)] {
+        let mut setting = effect::<Dual<f64, 1>>(name, Some(0), &[0.0]);
+        setting.parameters[0] = setting.parameters[0].seeded(0);
+        let exact: Vec<f64> =
+            closed_loop(&robot, &[setting]).command.iter().map(|u| u.partials[0]).collect();
+        let at = |x: f64| closed_loop::<f64>(&robot, &[effect(name, Some(0), &[x])]).command;
+        let base = at(0.0);
+        let slope = |h: f64| -> Vec<f64> { at(h).iter().zip(&base).map(|(a, b)| (a - b) / h).collect() };
+        // Lags far below the sample time; the delay's slope changes over a sample.
+        let h = 1e-6;
+        let (coarse, fine) = (slope(h), slope(0.5 * h));
+        let extrapolated: Vec<f64> = coarse.iter().zip(&fine).map(|(c, f)| 2.0 * f - c).collect();
+        let error = relative(&extrapolated, &exact);
+        assert!(error < tolerance, "{name}: {error:.1e}");
+    }
+}
+
+fn refusal(robot: &RobotDescription, setting: &EffectSetting<f64>) -> String {
+    match Plant::new(robot, &[], std::slice::from_ref(setting)) {
+        Ok(_) => "accepted".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn bounds_are_refused_by_name() {
+    let robot = robot(PRESET);
+    for info in EFFECTS {
+        let place = if info.scope == Scope::Arm { None } else { Some(0) };
+        for (i, p) in info.parameters.iter().enumerate() {
+            let width = p.upper - p.lower;
+            for bad in [p.lower - 1e-3 * width, p.upper + 1e-3 * width, f64::NAN, f64::INFINITY] {
+                let mut values = neutral(info);
+                values[i] = bad;
+                let message = refusal(&robot, &effect(info.name, place, &values));
+                let start = format!("effect `{}`: parameter `{}`: expected ", info.name, p.name);
+                assert!(message.starts_with(&start), "{bad}: {message}");
+            }
+            let inside = (p.lower..=p.upper).contains(&p.neutral) && p.typical > 0.0;
+            assert!(inside && p.lower < p.upper, "{}.{}", info.name, p.name);
+        }
+    }
+}
+
+#[test]
+fn wrong_axis_count_and_name_are_refused() {
+    let robot = robot(PRESET);
+    for info in EFFECTS {
+        let (bad, expected) = match info.scope {
+            Scope::Axis => (vec![None, Some(3), Some(usize::MAX)], "expected an axis from 1 to 3"),
+            Scope::Arm => (vec![Some(0)], "expected no axis"),
+        };
+        for place in bad {
+            if place == Some(usize::MAX) {
+                continue; // printed 1-based; see `axis_zero_is_refused`
+            }
+            let message = refusal(&robot, &effect(info.name, place, &neutral(info)));
+            assert!(message.contains(expected), "{message}");
+        }
+        let mut long = neutral(info);
+        long.push(0.0);
+        for parameters in [&long[..], &long[..info.parameters.len() - 1]] {
+            let place = if info.scope == Scope::Arm { None } else { Some(0) };
+            let message = refusal(&robot, &effect(info.name, place, parameters));
+            let count = format!("expected {} parameters, got {}", info.parameters.len(), parameters.len());
+            assert!(message.ends_with(&count), "{message}");
+        }
+    }
+    let message = refusal(&robot, &effect("colour", Some(0), &[]));
+    assert!(message.starts_with("effect `colour`: expected one of viscous_friction, "), "{message}");
+    assert!(build::<f64>("", &[]).is_err());
+}
+
+#[test]
+fn transmission_effects_need_a_compliant_gear() {
+    let mut robot = robot(PRESET);
+    robot.joints[0].compliance = None;
+    for info in EFFECTS.iter().filter(|e| e.acts == Acts::Transmission) {
+        let message = refusal(&robot, &effect(info.name, Some(0), &neutral(info)));
+        assert!(message.contains("expected an axis with a compliant transmission"), "{message}");
+        assert_eq!(refusal(&robot, &effect(info.name, Some(1), &neutral(info))), "accepted");
+    }
+}
+
+/// At rest every effect keeps the arm still: accelerations of the spring forces' rounding only.
+/// Effects on the motor need not vanish at rest, and a torque limit below the load cannot hold it.
+#[test]
+fn rest_is_rest_with_every_effect() {
+    let mut robot = robot(PRESET);
+    robot.operating_point = vec![0.1, 0.3, -0.2];
+    let holds = |e: &&&EffectInfo| e.acts != Acts::Motor && e.name != "torque_saturation";
+    for info in EFFECTS.iter().filter(holds) {
+        for place in places(info, robot.n_axes()) {
+            let plant = plant::<f64>(&robot, &[effect(info.name, place, &at_work(info))]);
+            let rest = equilibrium(&plant, &robot.operating_point).expect("rest");
+            let x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+            let delivered: Vec<f64> = plant
+                .axes
+                .iter()
+                .zip(&rest.motor_torque)
+                .map(|(axis, u)| axis.kernels.iter().fold(*u, |t, k| k.drive(t)))
+                .collect();
+            let mut dx = vec![0.0; x.len()];
+            plant.derivative(&x, &delivered, &rest.motor_torque, &mut plant.scratch(), &mut dx);
+            // Gear forces of 1e4 Nm rounded at 1e-16 on motors of 1e-2 kg m^2 and links of
+            // 1 kg m^2; the nonlinear spring is iterated to 1e-12 of the load.
+            let moved = axisight_tests::largest(&dx);
+            assert!(moved < 1e-6, "{} {place:?}: {moved:.1e}", info.name);
+        }
+    }
+}
+
+/// A cubic spring far stiffer under load than at rest (within its bounds) still rests.
+#[test]
+fn strongly_nonlinear_spring_finds_its_rest() {
+    let robot = robot(PRESET);
+    for cubic in [1e11, 1e12, 1e13, 1e14] {
+        let plant = plant::<f64>(&robot, &[effect("nonlinear_stiffness", Some(1), &[cubic])]);
+        let rest = equilibrium(&plant, &robot.operating_point).expect("rest");
+        let deflection = rest.motor_angle[1] * plant.axes[1].ratio - rest.joint_angle[1];
+        let gear = plant.axes[1].gear.as_ref().expect("gear");
+        let torque = gear.stiffness * deflection + cubic * deflection.powi(3);
+        let load = rest.motor_torque[1] / plant.axes[1].ratio;
+        assert!((torque / load - 1.0).abs() < 1e-9, "{cubic:e}: {torque} {load}");
+    }
+}
