@@ -24,8 +24,12 @@ fn rigid_body(c: &mut Criterion) {
 
 fn right_hand_side<S: Scalar>(c: &mut Criterion, label: &str) {
     let robot = preset();
-    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else { return };
-    let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5]) else { return };
+    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else {
+        return;
+    };
+    let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5]) else {
+        return;
+    };
     let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
     for (i, rate) in x.iter_mut().skip(10).enumerate() {
         *rate = S::constant(0.1 * i as f64 - 0.4).seeded(i % 4);
@@ -34,7 +38,13 @@ fn right_hand_side<S: Scalar>(c: &mut Criterion, label: &str) {
     let torque = &rest.motor_torque;
     c.bench_function(&format!("right_hand_side/{label}"), |b| {
         b.iter(|| {
-            plant.derivative(black_box(&x), black_box(torque), torque, &mut scratch, &mut dx);
+            plant.derivative(
+                black_box(&x),
+                black_box(torque),
+                torque,
+                &mut scratch,
+                &mut dx,
+            );
             black_box(&dx);
         });
     });
@@ -45,13 +55,16 @@ fn right_hand_sides(c: &mut Criterion) {
     right_hand_side::<Lanes<4>>(c, "lanes4");
     right_hand_side::<Lanes<8>>(c, "lanes8");
     right_hand_side::<Dual<f64, 4>>(c, "dual4");
+    right_hand_side::<Dual<Lanes<4>, 4>>(c, "dual4_lanes4");
     right_hand_side::<Dual<Lanes<8>, 4>>(c, "dual4_lanes8");
 }
 
 /// One second at 2 kHz, one Runge-Kutta step per sample.
 fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
     let robot = preset();
-    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else { return };
+    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else {
+        return;
+    };
     let input = reference(2000, robot.n_axes(), robot.sample_time);
     let inputs = vec![&input[..]; S::LANES];
     let run = Run {
@@ -79,6 +92,7 @@ fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
 
 fn closed_loops(c: &mut Criterion) {
     closed_loop::<f64>(c, "f64");
+    closed_loop::<Lanes<4>>(c, "lanes4");
     closed_loop::<Lanes<8>>(c, "lanes8");
 }
 

@@ -19,6 +19,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.logs import Case, Log, check_log, read_case, read_log
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
@@ -28,6 +29,7 @@ __all__ = [
     "Case",
     "CaseError",
     "ConvergenceError",
+    "Diagnosis",
     "Effect",
     "EffectInfo",
     "FitOptions",
@@ -38,8 +40,10 @@ __all__ = [
     "Parameter",
     "Robot",
     "RobotError",
+    "Settings",
     "Weighting",
     "check_log",
+    "diagnose",
     "effect_info",
     "effect_parameter",
     "effect_table",

@@ -387,7 +387,7 @@ def fit_simulation(
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
-    input: Literal["reference", "torque"] = "reference",
+    input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
     warm: Sequence[tuple[int, _Array]] = ...,
     cancel: CancelToken | None = None,

@@ -51,7 +51,15 @@ def effect_table() -> Mapping[str, EffectInfo]:
     table = {}
     for row in _core.effect_table():
         parameters = tuple(EffectParameter(**p) for p in row["parameters"])
-        table[row["name"]] = EffectInfo(**{**row, "parameters": parameters})
+        table[row["name"]] = EffectInfo(
+            name=row["name"],
+            summary=row["summary"],
+            equation=row["equation"],
+            source=row["source"],
+            scope=row["scope"],
+            acts=row["acts"],
+            parameters=parameters,
+        )
     return MappingProxyType(table)
 
 

@@ -32,7 +32,14 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("summary", info.summary)?;
     out.set_item("equation", info.equation)?;
     out.set_item("source", info.source)?;
-    out.set_item("scope", if info.scope == Scope::Axis { "axis" } else { "arm" })?;
+    out.set_item(
+        "scope",
+        if info.scope == Scope::Axis {
+            "axis"
+        } else {
+            "arm"
+        },
+    )?;
     let acts = match info.acts {
         Acts::TorquePath => "torque_path",
         Acts::Motor => "motor",
@@ -47,7 +54,14 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
         let row = PyDict::new(py);
         row.set_item("name", p.name)?;
         row.set_item("unit", p.unit)?;
-        row.set_item("role", if p.role == Role::Amplitude { "amplitude" } else { "shape" })?;
+        row.set_item(
+            "role",
+            if p.role == Role::Amplitude {
+                "amplitude"
+            } else {
+                "shape"
+            },
+        )?;
         row.set_item("neutral", p.neutral)?;
         row.set_item("lower", p.lower)?;
         row.set_item("upper", p.upper)?;

@@ -130,13 +130,30 @@ impl FitResult {
     #[getter]
     fn block_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let n = self.fit.free.len();
-        array3(py, self.fit.blocks.iter().flat_map(|g| g.matrix.clone()).collect(), n, n)
+        array3(
+            py,
+            self.fit
+                .blocks
+                .iter()
+                .flat_map(|g| g.matrix.clone())
+                .collect(),
+            n,
+            n,
+        )
     }
     /// `J^T W r` by block, `(n_blocks, n_free)`.
     #[getter]
     fn block_gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let n = self.fit.free.len();
-        array2(py, self.fit.blocks.iter().flat_map(|g| g.gradient.clone()).collect(), n)
+        array2(
+            py,
+            self.fit
+                .blocks
+                .iter()
+                .flat_map(|g| g.gradient.clone())
+                .collect(),
+            n,
+        )
     }
     /// Loss by block.
     #[getter]
@@ -151,7 +168,9 @@ fn parameters(specs: Vec<ParameterSpec>, robot: &RobotDescription) -> PyResult<V
         .enumerate()
         .map(|(i, s)| {
             let target = match (&s.robot, s.effect) {
-                (Some(name), None) => Target::Robot(Parameter::parse(name, robot).map_err(input_error)?),
+                (Some(name), None) => {
+                    Target::Robot(Parameter::parse(name, robot).map_err(input_error)?)
+                }
                 (None, Some((e, j))) => Target::Effect(e, j),
                 _ => {
                     let text = "expected either a robot parameter or an effect parameter";
@@ -203,7 +222,9 @@ fn weightings(specs: Vec<WeightingTuple>) -> Vec<Weighting> {
 }
 
 fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Vec<f64>)> {
-    warm.iter().map(|(i, c)| (*i, c.as_array().to_vec())).collect()
+    warm.iter()
+        .map(|(i, c)| (*i, c.as_array().to_vec()))
+        .collect()
 }
 
 fn problem_error(e: ProblemError) -> PyErr {
@@ -263,12 +284,21 @@ pub fn fit_simulation(
         input: match input {
             "reference" => SimulationInput::Reference,
             "torque" => SimulationInput::Torque,
-            _ => return Err(input_error(format!("input: expected reference or torque, got {input}"))),
+            "tracking" => SimulationInput::Tracking,
+            _ => {
+                return Err(input_error(format!(
+                    "input: expected reference, torque or tracking, got {input}"
+                )));
+            }
         },
         output: match output {
             "torque" => SimulationOutput::Torque,
             "position" => SimulationOutput::Position,
-            _ => return Err(input_error(format!("output: expected torque or position, got {output}"))),
+            _ => {
+                return Err(input_error(format!(
+                    "output: expected torque or position, got {output}"
+                )));
+            }
         },
         weighting: weightings(weighting),
         method: method(&options.method, options.substeps, options.tolerance)?,
@@ -277,7 +307,14 @@ pub fn fit_simulation(
     };
     problem.validate().map_err(problem_error)?;
     let fit_options = self::options(&options)?;
-    solve(py, &cancel, &problem, &problem.parameters, fit_options, &warm)
+    solve(
+        py,
+        &cancel,
+        &problem,
+        &problem.parameters,
+        fit_options,
+        &warm,
+    )
 }
 
 /// A motion as (position, velocity, acceleration, torque), each `(n, n_axes)`, motor side.
@@ -323,5 +360,12 @@ pub fn fit_inverse_dynamics(
     };
     problem.validate().map_err(problem_error)?;
     let fit_options = self::options(&options)?;
-    solve(py, &flag(cancel), &problem, &problem.parameters, fit_options, &[])
+    solve(
+        py,
+        &flag(cancel),
+        &problem,
+        &problem.parameters,
+        fit_options,
+        &[],
+    )
 }

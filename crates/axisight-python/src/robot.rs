@@ -45,7 +45,9 @@ impl Robot {
         if let Some(i) = data.iter().position(|d| d.len() != count * n) {
             let got = data[i].len() / n;
             let name = arrays[i].0;
-            return Err(input_error(format!("{name}: expected {count} rows, got {got}")));
+            return Err(input_error(format!(
+                "{name}: expected {count} rows, got {got}"
+            )));
         }
         let mut out = Vec::new();
         for row in 0..count {
@@ -104,7 +106,12 @@ impl Robot {
 
     fn __repr__(&self) -> String {
         let d = &self.description;
-        format!("<Robot {:?}: {} axes, {} joints>", d.name, d.n_axes(), d.n_joints())
+        format!(
+            "<Robot {:?}: {} axes, {} joints>",
+            d.name,
+            d.n_axes(),
+            d.n_joints()
+        )
     }
 
     #[getter]
@@ -129,7 +136,11 @@ impl Robot {
     }
     #[getter]
     fn joint_names(&self) -> Vec<String> {
-        self.description.joints.iter().map(|j| j.name.clone()).collect()
+        self.description
+            .joints
+            .iter()
+            .map(|j| j.name.clone())
+            .collect()
     }
     #[getter]
     fn axis_joints(&self) -> Vec<usize> {
@@ -137,7 +148,13 @@ impl Robot {
     }
     #[getter]
     fn gear_ratio<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array1(py, self.description.driven().map(|(_, _, d)| d.gear_ratio).collect())
+        array1(
+            py,
+            self.description
+                .driven()
+                .map(|(_, _, d)| d.gear_ratio)
+                .collect(),
+        )
     }
     #[getter]
     fn axis_is_prismatic(&self) -> Vec<bool> {
@@ -148,7 +165,10 @@ impl Robot {
     }
     #[getter]
     fn axis_is_rigid(&self) -> Vec<bool> {
-        self.description.driven().map(|(_, j, _)| j.compliance.is_none()).collect()
+        self.description
+            .driven()
+            .map(|(_, j, _)| j.compliance.is_none())
+            .collect()
     }
     #[getter]
     fn operating_point<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -194,9 +214,15 @@ impl Robot {
         all.map(|p| (p.name(d), p.nominal(d))).collect()
     }
 
-    fn inertia_matrix<'py>(&self, py: Python<'py>, q: PyReadonlyArray2<'py, f64>) -> PyResult<Matrix3<'py>> {
+    fn inertia_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix3<'py>> {
         let n = self.body.n_joints();
-        let flat = self.each_row(py, &[("q", &q)], |b, x| b.inertia_matrix(x[0]).map_err(input_error))?;
+        let flat = self.each_row(py, &[("q", &q)], |b, x| {
+            b.inertia_matrix(x[0]).map_err(input_error)
+        })?;
         use numpy::PyArrayMethods;
         flat.reshape([q.as_array().nrows(), n, n])
     }
@@ -206,10 +232,18 @@ impl Robot {
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| b.bias(x[0], x[1]).map_err(input_error))
+        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| {
+            b.bias(x[0], x[1]).map_err(input_error)
+        })
     }
-    fn gravity<'py>(&self, py: Python<'py>, q: PyReadonlyArray2<'py, f64>) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q)], |b, x| b.gravity(x[0]).map_err(input_error))
+    fn gravity<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Matrix2<'py>> {
+        self.each_row(py, &[("q", &q)], |b, x| {
+            b.gravity(x[0]).map_err(input_error)
+        })
     }
     fn inverse_dynamics<'py>(
         &self,
@@ -240,7 +274,9 @@ impl Robot {
         v: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
         self.each_row(py, &[("q", &q), ("v", &v)], |b, x| {
-            b.energy(x[0], x[1]).map(|(t, u)| vec![t, u]).map_err(input_error)
+            b.energy(x[0], x[1])
+                .map(|(t, u)| vec![t, u])
+                .map_err(input_error)
         })
     }
     /// Rotation and origin of the frame of joint `joint` (0-based).
@@ -272,7 +308,8 @@ impl Robot {
         joint_angle: Option<Vec<f64>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let at = joint_angle.unwrap_or_else(|| self.description.operating_point.clone());
-        let plant = Plant::<f64>::new(&self.description, &[], &settings(effects)).map_err(input_error)?;
+        let plant =
+            Plant::<f64>::new(&self.description, &[], &settings(effects)).map_err(input_error)?;
         let rest = equilibrium(&plant, &at).map_err(input_error)?;
         let out = PyDict::new(py);
         out.set_item("joint_angle", array1(py, rest.joint_angle))?;
@@ -303,11 +340,22 @@ impl Robot {
         py: Python<'py>,
         effects: Vec<EffectTuple>,
         joint_angle: Option<Vec<f64>>,
-    ) -> PyResult<(Matrix2<'py>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Matrix3<'py>)> {
+    ) -> PyResult<(
+        Matrix2<'py>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Matrix3<'py>,
+    )> {
         let l = self.linear(effects, joint_angle)?;
         let all = modes(&l).map_err(|e| AxisightError::new_err(e.to_string()))?;
-        let values = all.iter().flat_map(|m| [m.eigenvalue.re, m.eigenvalue.im]).collect();
-        let shapes = all.iter().flat_map(|m| m.shape.iter().flat_map(|c| [c.re, c.im])).collect();
+        let values = all
+            .iter()
+            .flat_map(|m| [m.eigenvalue.re, m.eigenvalue.im])
+            .collect();
+        let shapes = all
+            .iter()
+            .flat_map(|m| m.shape.iter().flat_map(|c| [c.re, c.im]))
+            .collect();
         Ok((
             array2(py, values, 2)?,
             array1(py, all.iter().map(|m| m.frequency_hz).collect()),
@@ -332,7 +380,9 @@ impl Robot {
         for g in zoh_frequency_response(&l, self.description.sample_time, &frequency_hz) {
             for i in 0..n {
                 for j in 0..n {
-                    let value = g.as_ref().map_or((f64::NAN, f64::NAN), |g| (g[(i, j)].re, g[(i, j)].im));
+                    let value = g
+                        .as_ref()
+                        .map_or((f64::NAN, f64::NAN), |g| (g[(i, j)].re, g[(i, j)].im));
                     data.extend([value.0, value.1]);
                 }
             }

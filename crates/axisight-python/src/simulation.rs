@@ -5,7 +5,9 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::robot::Plant;
-use axisight_core::simulation::{self, Drive, Method, Run, Sample, SimulationError, Status, Stepper};
+use axisight_core::simulation::{
+    self, Drive, Method, Run, Sample, SimulationError, Status, Stepper,
+};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -14,10 +16,16 @@ use pyo3::types::PyDict;
 pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
     match name {
         "rk4" if substeps >= 1 => Ok(Method::RungeKutta4 { substeps }),
-        "rk4" => Err(input_error(format!("substeps: expected at least 1, got {substeps}"))),
+        "rk4" => Err(input_error(format!(
+            "substeps: expected at least 1, got {substeps}"
+        ))),
         "dopri5" if tolerance > 0.0 && tolerance < 1.0 => Ok(Method::DormandPrince { tolerance }),
-        "dopri5" => Err(input_error(format!("tolerance: expected between 0 and 1, got {tolerance}"))),
-        _ => Err(input_error(format!("method: expected rk4 or dopri5, got {name}"))),
+        "dopri5" => Err(input_error(format!(
+            "tolerance: expected between 0 and 1, got {tolerance}"
+        ))),
+        _ => Err(input_error(format!(
+            "method: expected rk4 or dopri5, got {name}"
+        ))),
     }
 }
 
@@ -31,7 +39,11 @@ pub fn measurement_noise(
     n_axes: usize,
     std: f64,
 ) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    array2(py, simulation::measurement_noise(seed, run, n_samples, n_axes, std), n_axes)
+    array2(
+        py,
+        simulation::measurement_noise(seed, run, n_samples, n_axes, std),
+        n_axes,
+    )
 }
 
 /// Everything a run records, row-major.
@@ -78,14 +90,19 @@ pub fn simulate<'py>(
     }
     let start = start.unwrap_or_else(|| robot.description.operating_point.clone());
     let method = self::method(method, substeps, tolerance)?;
-    let plant = Plant::<f64>::new(&robot.description, &[], &settings(effects)).map_err(input_error)?;
+    let plant =
+        Plant::<f64>::new(&robot.description, &[], &settings(effects)).map_err(input_error)?;
     let cancel = flag(cancel);
     let (arrays, noises) = ([&input[..]], noise.as_deref().map(|n| [n]));
     let run = Run {
         controller: &robot.description.controller,
         sample_time: robot.description.sample_time,
         start: &start,
-        drive: if reference { Drive::Reference(&arrays) } else { Drive::Torque(&arrays) },
+        drive: if reference {
+            Drive::Reference(&arrays)
+        } else {
+            Drive::Torque(&arrays)
+        },
         noise: noises.as_ref().map_or(&[], |n| &n[..]),
         method,
         cancel: Some(&*cancel),
@@ -96,9 +113,18 @@ pub fn simulate<'py>(
     out.set_item("torque_cmd_nm", array2(py, traces.command, n_axes)?)?;
     out.set_item("position_rad", array2(py, traces.measured, n_axes)?)?;
     out.set_item("motor_position_rad", array2(py, traces.motor, n_axes)?)?;
-    out.set_item("joint_position_rad", array2(py, traces.joint, robot.description.n_joints())?)?;
-    out.set_item("torque_disturbance_nm", array2(py, traces.torque_disturbance, n_axes)?)?;
-    out.set_item("position_disturbance_rad", array2(py, traces.position_disturbance, n_axes)?)?;
+    out.set_item(
+        "joint_position_rad",
+        array2(py, traces.joint, robot.description.n_joints())?,
+    )?;
+    out.set_item(
+        "torque_disturbance_nm",
+        array2(py, traces.torque_disturbance, n_axes)?,
+    )?;
+    out.set_item(
+        "position_disturbance_rad",
+        array2(py, traces.position_disturbance, n_axes)?,
+    )?;
     let (status, at) = match outcome.status {
         Status::Completed => ("completed", None),
         Status::Diverged(k) => ("diverged", Some(k)),
@@ -119,10 +145,17 @@ fn record(plant: &Plant<f64>, run: &Run<'_>) -> Result<Outcome, SimulationError>
     let mut observe = |sample: &Sample<'_, f64>| {
         traces.command.extend(sample.command);
         traces.measured.extend(sample.measured);
-        traces.motor.extend(plant.axes.iter().map(|a| plant.motor_angle(a, sample.state)));
+        traces.motor.extend(
+            plant
+                .axes
+                .iter()
+                .map(|a| plant.motor_angle(a, sample.state)),
+        );
         traces.joint.extend(plant.joint_angles(sample.state));
         traces.torque_disturbance.extend(sample.torque_disturbance);
-        traces.position_disturbance.extend(sample.position_disturbance);
+        traces
+            .position_disturbance
+            .extend(sample.position_disturbance);
     };
     let status = simulation::simulate(plant, run, &mut stepper, &mut observe)?;
     Ok(Outcome {

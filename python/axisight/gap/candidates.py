@@ -100,15 +100,47 @@ def _axis_candidate(
         return _ripple(at, name, axis)
     if name == "torque_saturation":
         return _saturation(logs, axis)
+    if name in ("motor_inertia", "joint_damping") and not _own(robot, name, axis):
+        return None
     if name == "transmission_error":
         return FreeEffect(
             Effect(name, axis, {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0}),
             ("cosine_rad", "sine_rad"),
-            {},
         )
+    if name == "backlash":
+        return _backlash(robot, logs, axis)
     parameters = effect_info(name).parameters
     start = {p.name: p.neutral for p in parameters}
-    return FreeEffect(Effect(name, axis, start), tuple(p.name for p in parameters), {})
+    bounds = {}
+    # Speeds that shape a friction law are shares of the speeds seen.
+    top = max(float(np.abs(v[axis - 1]).max()) for v in at.speed) or 1.0
+    for p, share in (("smoothing_rad_s", 0.003), ("stribeck_speed_rad_s", 0.1)):
+        if p in start:
+            start[p] = share * top
+            bounds[p] = (0.1 * share * top, 10 * share * top)
+    return FreeEffect(Effect(name, axis, start), tuple(p.name for p in parameters), bounds=bounds)
+
+
+def _backlash(robot: Robot, logs: Sequence[Log], axis: int) -> FreeEffect:
+    """Start at several widths, as shares of the deflection the largest torque gives."""
+    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
+    stiffness = dict(robot.core.parameters())[f"{joint}.stiffness"]
+    ratio = abs(float(robot.core.gear_ratio[axis - 1]))
+    spread = max(float(np.std(log.torque_nm[:, axis - 1])) for log in logs)
+    deflection = spread / ratio / stiffness
+    # The valley around the true width is narrow: impacts must stay in phase.
+    shares = np.geomspace(0.04, 0.8, 18)
+    starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
+    return FreeEffect(
+        Effect("backlash", axis, {"half_width_rad": 0.0}), ("half_width_rad",), starts=starts
+    )
+
+
+def _own(robot: Robot, effect: str, axis: int) -> float:
+    """Return the simulator's value of what a relative effect changes."""
+    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
+    quantity = {"motor_inertia": "motor_inertia", "joint_damping": "damping"}[effect]
+    return dict(robot.core.parameters())[f"{joint}.{quantity}"]
 
 
 def _ripple(at: Situation, name: str, axis: int) -> FreeEffect | None:
@@ -133,14 +165,14 @@ def _ripple(at: Situation, name: str, axis: int) -> FreeEffect | None:
     for k in range(len(orders) + 1, 5):
         start[f"order_{k}" if (name == "resolver_ripple" or k < 4) else "order_u"] = 0.0
     start.update(dict.fromkeys(free, 0.0))
-    return FreeEffect(Effect(name, axis, start), tuple(free), {})
+    return FreeEffect(Effect(name, axis, start), tuple(free))
 
 
 def _saturation(logs: Sequence[Log], axis: int) -> FreeEffect:
     largest = max(float(np.abs(log.torque_nm[:, axis - 1]).max()) for log in logs)
     typical = np.median([np.abs(log.torque_nm[:, axis - 1]).max() for log in logs])
     start = 0.9 * min(largest, float(typical))
-    return FreeEffect(Effect("torque_saturation", axis, {"limit_nm": start}), ("limit_nm",), {})
+    return FreeEffect(Effect("torque_saturation", axis, {"limit_nm": start}), ("limit_nm",))
 
 
 def _payload(robot: Robot) -> FreeEffect:

@@ -59,17 +59,27 @@ def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
     return Trial(candidate, evidence, held_out_loss(evidence))
 
 
-def block_significance(gain: Array, logs: NDArray[np.int64]) -> float:
-    """Return a total gain in standard errors, from its scatter over (log, stretch) blocks."""
-    total = gain.sum()
-    n = len(gain)
-    if n < 2:
-        return 0.0
-    # Consecutive blocks of a log are correlated: quarters of a log are not.
+def block_significance(current: Array, new: Array, logs: NDArray[np.int64]) -> float:
+    """Return how many standard errors a fall of held-out loss is from zero.
+
+    Neighbouring blocks are correlated, quarters of a log nearly not: the fall is
+    averaged over quarters, each relative to its own loss (so that one loud log
+    does not drown the others), and compared with its scatter. An effect may
+    show in a few loud stretches only; the plain mean is tried as well, and the
+    larger of the two counts.
+    """
     groups = _quarters(logs)
-    sums = np.bincount(groups, gain)
-    spread = float(np.sqrt(len(sums) * np.var(sums, ddof=1)))
-    return float(total / spread) if spread > 0 else 0.0
+    before = np.bincount(groups, current) / np.bincount(groups)
+    after = np.bincount(groups, new) / np.bincount(groups)
+    fall = before - after
+    return max(_standard_errors(fall), _standard_errors(fall / np.maximum(before + after, 1e-300)))
+
+
+def _standard_errors(x: Array) -> float:
+    if len(x) < 2:
+        return 0.0
+    spread = float(np.std(x, ddof=1) / np.sqrt(len(x)))
+    return float(x.mean() / max(spread, 1e-12 * abs(x.mean()), 1e-300))
 
 
 def _quarters(logs: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -102,12 +112,17 @@ def rank(trials: Sequence[Trial], current: Array, floor: Array, logs: NDArray[np
         Ranked(
             t,
             float((current - t.held_out).sum() / explainable),
-            block_significance(current - t.held_out, logs),
+            block_significance(current, t.held_out, logs),
             float(p),
         )
         for t, p in zip(trials, probability, strict=True)
     ]
     return sorted(out, key=lambda r: (-r.probability, -r.score, r.trial.label))
+
+
+def clearly_worse(loss: float, than: float) -> bool:
+    """Whether a held-out loss is worse by more than a likelihood ratio of e^2."""
+    return 0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0
 
 
 # A rival this likely beside the winner leaves the cause open.

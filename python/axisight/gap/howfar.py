@@ -44,8 +44,12 @@ def stage(logs: Sequence[Log], errors: Sequence[Array], block_s: float) -> Stage
 
 def gap_figures(given: Stage, refitted: Stage, after: Stage, floor: Stage) -> Gap:
     """Return the gap before, re-fitted and after, and its floor."""
-    figures = [combine(s.per_log()) for s in (given, refitted, after, floor)]
-    return Gap(*(f[0] for f in figures), *(f[1] for f in figures))
+    (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
+        combine(s.per_log()) for s in (given, refitted, after, floor)
+    )
+    return Gap(
+        before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes
+    )
 
 
 def gap_reduction(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FreeEffect:
-    """An effect under trial: start values, the parameters to fit, priors on some of them."""
+    """An effect under trial: start values, the parameters to fit, priors and bounds of some.
+
+    ``starts`` are further start values worth trying, for effects whose fit may
+    end in the wrong valley.
+    """
 
     effect: Effect
     free: tuple[str, ...]
-    priors: Mapping[str, tuple[float, float]]
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    starts: tuple[Mapping[str, float], ...] = ()
+
+    def at(self, values: Mapping[str, float]) -> FreeEffect:
+        """Return the same with other start values."""
+        effect = self.effect
+        merged = {**(effect.parameters or {}), **values}
+        return replace(self, effect=Effect(effect.name, effect.axis, merged))
 
 
 @dataclass(frozen=True)
@@ -83,8 +95,11 @@ class ModelFitter:
         self.cancel = _core.CancelToken()
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerances[quantity])
-            for name in robot_parameters(robot)
-            if (quantity := name.rsplit(".", 1)[1]) in tolerances and self.takes_part(name)
+            for name, value in robot_parameters(robot).items()
+            if (quantity := name.rsplit(".", 1)[1]) in tolerances
+            # What the simulator leaves out has no tolerance: it would be an effect.
+            and value != 0
+            and self.takes_part(name)
         ]
 
     def takes_part(self, name: str) -> bool:
@@ -106,14 +121,19 @@ class ModelFitter:
         free: Sequence[FreeEffect],
         start: Evidence | None = None,
         *,
+        robot_values: Mapping[str, float] | None = None,
         lazy: bool = False,
         max_iterations: int = 15,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
-        ``start`` gives the simulator's parameters to begin with; ``lazy`` also
-        takes their sensitivities from there instead of computing them.
+        The simulator's parameters begin at ``robot_values``, else where
+        ``start`` ended, else at their nominal values; ``lazy`` takes their
+        sensitivities from ``start`` instead of computing them.
         """
+        begin: Mapping[str, float] = {} if start is None else start.robot_values
+        if robot_values is not None:
+            begin = robot_values
         effects = [*self.robot.effects, *(f.effect for f in free)]
         first = len(self.robot.effects)
         same = {_same_quantity(self.robot, f.effect) for f in free}
@@ -122,15 +142,13 @@ class ModelFitter:
             if p.name in same
             else replace(
                 p,
-                initial=p.initial if start is None else start.robot_values[p.name],
+                initial=begin.get(p.name, p.initial),
                 nuisance=lazy,
             )
             for p in self.own
         ]
         added = [
-            replace(effect_parameter(effects, first + i, name), prior=f.priors.get(name))
-            for i, f in enumerate(free)
-            for name in f.free
+            _trial_parameter(effects, first + i, f, name) for i, f in enumerate(free) for name in f.free
         ]
         parameters = own + added
         warm = []
@@ -146,6 +164,15 @@ class ModelFitter:
         )
         result = self.solve(effects, parameters, options, warm)
         return _evidence(result, parameters, own, effects, list(free), first)
+
+
+def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: str) -> Parameter:
+    parameter = effect_parameter(effects, i, name)
+    lower, upper = free.bounds.get(name, (parameter.lower, parameter.upper))
+    initial = min(max(parameter.initial, lower), upper)
+    return replace(
+        parameter, initial=initial, lower=lower, upper=upper, prior=free.priors.get(name)
+    )
 
 
 # Effects that change a quantity the simulator has a tolerance for.
@@ -215,7 +242,13 @@ def _evidence(
 
 
 class ClosedLoopFitter(ModelFitter):
-    """Error of the commanded torque, simulator and machine driven by the same references."""
+    """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
+
+    In a linear loop this is the torque by which a run driven by the references
+    would be off; in a nonlinear one the simulator also stays in phase with the
+    log, without which lost motion and stiction have no smooth error to fit.
+    ``records``: (position [rad], torque [Nm]) of each log, (n, n_axes).
+    """
 
     def __init__(
         self,
@@ -243,7 +276,7 @@ class ClosedLoopFitter(ModelFitter):
             self.records,
             self.weighting.core(),
             options,
-            input="reference",
+            input="tracking",
             output="torque",
             warm=warm,
             cancel=self.cancel,

@@ -57,10 +57,12 @@ def position_noise_std(logs: list[Log]) -> Array:
     estimates = []
     for log in logs:
         rate = 1.0 / log.sample_time_s
-        f, density = welch(log.position_rad, rate, nperseg=_segment(log), axis=0, detrend="linear")
+        # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
+        f, density = welch(np.diff(log.position_rad, n=2, axis=0), rate, nperseg=_segment(log), axis=0)
         top = (f > 0.4 * rate) & (f < 0.49 * rate)
-        estimates.append(np.sqrt(np.mean(density[top], axis=0) * rate / 2))
-    return np.median(np.array(estimates), axis=0)
+        gain = (2 * np.sin(np.pi * f[top] / rate)) ** 4
+        estimates.append(np.sqrt(np.mean(density[top] / gain[:, None], axis=0) * rate / 2))
+    return np.asarray(np.median(np.array(estimates), axis=0))
 
 
 def _segment(log: Log) -> int:

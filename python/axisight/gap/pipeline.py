@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import CaseError, InputError
-from axisight.fitting import records, robot_parameters
+from axisight.fitting import robot_parameters
 from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.howfar import Stage, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.inverse import (
@@ -51,6 +51,7 @@ def diagnose(
     robot: Robot | Path | str | None = None,
     estimation: Sequence[Log] = (),
     validation: Sequence[Log] = (),
+    name: str | None = None,
     settings: Settings | None = None,
     progress: Progress = _silent,
 ) -> Diagnosis:
@@ -61,6 +62,7 @@ def diagnose(
     case : a case, or the folder of one (``axisight.case/1``); or give
     robot, estimation, validation : the simulator (or its file or preset), logs to
         fit and choose on, and logs that only the final figures see.
+    name : what to call the case.
     settings : tolerances of the simulator's parameters, thresholds, seed.
     progress : called with (what, done, total).
 
@@ -77,7 +79,7 @@ def diagnose(
     """
     started = time.monotonic()
     chosen = settings or Settings()
-    name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     closed = machine.core.controller_kind != "none" and all(
         log.velocity_ref_rad_s is not None for log in [*fit_logs, *held_logs]
     )
@@ -85,7 +87,7 @@ def diagnose(
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     conclusion = conclude(found, chosen)
-    out = _assemble(name, machine, view, held_logs, found, conclusion, chosen)
+    out = _assemble(name or found_name, machine, view, held_logs, found, conclusion, chosen)
     progress("measuring the gap", 1, 1)
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
@@ -165,7 +167,7 @@ class ClosedLoopView(View):
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         floor = closed_loop_floor(robot, logs, settings)
-        data = records(logs, closed=True)
+        data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
         fitter = ClosedLoopFitter(robot, data, floor.weighting, settings.tolerances, settings.block_s)
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
@@ -180,6 +182,10 @@ class ClosedLoopView(View):
     def noise(self, log: Log, run: int) -> Array:
         """Return the torque that sensor noise causes through the loop."""
         return noise_torque(self.robot, log, self.floor.position_std_rad, self.settings.seed, run)
+
+
+def _contiguous(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=np.float64)
 
 
 class InverseView(View):

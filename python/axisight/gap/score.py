@@ -40,7 +40,12 @@ def _step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
         # Parameters this part of the data says nothing about stay where they are.
         ridge = 1e-9 * np.diag(np.diag(evidence.matrix.sum(axis=0)))[np.ix_(free, free)]
         step[free] = -np.linalg.solve(a + ridge + 1e-30 * np.eye(len(a)), gradient[free])
-    return step
+    return step / max(1.0, _prior_lengths(evidence, step))
+
+
+def _prior_lengths(evidence: Evidence, step: Array) -> float:
+    """Return the largest move in prior standard deviations: beyond one, a linear step is no guide."""
+    return float(np.abs(step * np.sqrt(np.diag(evidence.prior_matrix))).max(initial=0.0))
 
 
 def _pinned(evidence: Evidence) -> NDArray[np.bool_]:
@@ -48,6 +53,11 @@ def _pinned(evidence: Evidence) -> NDArray[np.bool_]:
     influence = np.einsum("bii->i", evidence.matrix)
     bound = np.array([name in evidence.at_bound for name in evidence.parameters])
     return np.asarray(bound | (influence <= 0))
+
+
+def predictable(evidence: Evidence) -> NDArray[np.bool_]:
+    """Return which blocks (n_blocks,) the model can follow at all; a chaotic one has no derivative."""
+    return np.asarray(np.einsum("bii->b", evidence.matrix) > 0)
 
 
 def predicted_loss(evidence: Evidence, blocks: NDArray[np.bool_], step: Array) -> Array:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Trial, rank, trial
+from axisight.gap.decide import Ranked, Trial, clearly_worse, rank, trial
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
-from axisight.gap.score import held_out_loss, linear_gain
+from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.settings import Settings
 
 Array = NDArray[np.float64]
@@ -55,9 +56,10 @@ class Search:
 
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
-        before = held_out_loss(self.baseline)
-        after = held_out_loss(self.model)
-        explainable = float((before - self.floor).sum())
+        used = predictable(self.model)
+        before = held_out_loss(self.baseline)[used]
+        after = held_out_loss(self.model)[used]
+        explainable = float((before - self.floor[used]).sum())
         return float((before - after).sum() / explainable) if explainable > 0 else 0.0
 
 
@@ -82,17 +84,30 @@ def search(
         options = _new(candidates(out.model), out.model)
         trials = _round(fitter, out, options, settings, progress, number)
         current = held_out_loss(out.model)
-        ranked = rank(trials, current, floor, out.model.log)
+        ranked = _polished(fitter, trials, current, floor, out.model, progress, number)
         accepted = _acceptable(ranked, out, current, settings)
+        if accepted is not None and _parts_do(accepted, ranked, fitter):
+            ranked = _without_composite(ranked)
+            accepted = ranked[0]
         out.rounds.append(Round(out.model, ranked, accepted))
         if accepted is None:
             break
         progress(f"adding {accepted.trial.label}", 0, 1)
-        out.model = fitter.fit(accepted.trial.evidence.free, accepted.trial.evidence)
+        start = accepted.trial.evidence
+        out.model = fitter.fit(start.free, start, max_iterations=4)
         progress(f"adding {accepted.trial.label}", 1, 1)
         if _settled(out, settings):
             break
     return out
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Where the fit of a candidate begins, and the gain it promises."""
+
+    option: FreeEffect
+    robot_values: Mapping[str, float]
+    gain: float
 
 
 def _new(options: Sequence[FreeEffect], model: Evidence) -> list[FreeEffect]:
@@ -111,27 +126,41 @@ def _round(
     """Screen all candidates by one linear step, fit the promising ones in full."""
     model = state.model
 
-    def attempt(option: FreeEffect, iterations: int) -> Evidence | None:
+    def attempt(option: FreeEffect, iterations: int, start: _Start | None = None) -> Evidence | None:
+        effects = [*model.free, option if start is None else start.option]
+        values = None if start is None else start.robot_values
         try:
-            return fitter.fit([*model.free, option], model, lazy=True, max_iterations=iterations)
+            return fitter.fit(
+                effects, model, robot_values=values, lazy=True, max_iterations=iterations
+            )
         except InputError as error:
             # A candidate that cannot be simulated is out, and the result says so.
             state.skipped[option.effect.label] = str(error)
             return None
 
-    def screened(option: FreeEffect) -> float:
+    def screened(option: FreeEffect) -> _Start:
         evidence = attempt(option, 0)
-        return -np.inf if evidence is None else model.total - evidence.total + linear_gain(evidence)
+        best = _Start(option, model.robot_values, -np.inf)
+        if evidence is not None:
+            gain = model.total - evidence.total + linear_gain(evidence)
+            best = replace(best, gain=gain)
+        for values in option.starts:
+            # A large effect bends the re-fitted simulator: its own starts begin without.
+            start = _Start(option.at(values), {}, -np.inf)
+            evidence = attempt(option, 0, start)
+            if evidence is not None and model.total - evidence.total > best.gain:
+                best = replace(start, gain=model.total - evidence.total)
+        return best
 
-    def fitted(option: FreeEffect) -> Trial | None:
-        evidence = attempt(option, 15)
-        return None if evidence is None else trial(option, evidence)
+    def fitted(start: _Start) -> Trial | None:
+        evidence = attempt(start.option, 15, start)
+        return None if evidence is None else trial(start.option, evidence)
 
     with ThreadPoolExecutor(settings.threads) as pool:
         try:
-            gains = _each(pool, screened, options, progress, f"screening candidates, round {number}")
-            keep = _promising(np.array(gains, dtype=float))
-            chosen = [options[i] for i in keep]
+            starts = _each(pool, screened, options, progress, f"screening candidates, round {number}")
+            keep = _promising(np.array([s.gain for s in starts]))
+            chosen = [starts[i] for i in keep]
             trials = _each(pool, fitted, chosen, progress, f"fitting candidates, round {number}")
         except BaseException:
             fitter.cancel.cancel()
@@ -178,6 +207,83 @@ def _acceptable(
     real = best.significance > settings.significance and gain / size > settings.smallest_gain
     worth = best.score > settings.smallest_score and gain / first > settings.smallest_share
     return best if real and worth else None
+
+
+# Fitted with sensitivities of their own: the leaders of the ranking.
+_POLISHED = 2
+
+
+def _polished(
+    fitter: ModelFitter,
+    trials: list[Trial],
+    current: Array,
+    floor: Array,
+    model: Evidence,
+    progress: Progress,
+    number: int,
+) -> list[Ranked]:
+    """Rank the trials, the leaders fitted again with the simulator's sensitivities renewed.
+
+    A large effect bends the re-fitted simulator, and the sensitivities taken from
+    it; the leaders deserve better before one of them is believed.
+    """
+    done: set[str] = set()
+    label = f"refining the leaders, round {number}"
+    for k in range(_POLISHED):
+        ranked = rank(trials, current, floor, model.log)
+        todo = [r for r in ranked[:_POLISHED] if r.trial.label not in done]
+        if not todo or not _worth_polishing(todo[0], ranked[0]):
+            break
+        old = todo[0].trial
+        progress(label, k, _POLISHED)
+        better = fitter.fit(old.evidence.free, old.evidence, max_iterations=3)
+        done.add(old.label)
+        if better.total < old.evidence.total:
+            trials = [trial(old.candidate, better) if t is old else t for t in trials]
+    progress(label, _POLISHED, _POLISHED)
+    return rank(trials, current, floor, model.log)
+
+
+def _worth_polishing(candidate: Ranked, leader: Ranked) -> bool:
+    """Whether a candidate explains anything, and is not out of the leader's reach."""
+    return candidate.score > 0.02 and candidate.score > 0.3 * leader.score
+
+
+# An effect that two simpler ones imitate: both named if they fit as well.
+_PARTS = {"asymmetric_friction": ("coulomb_friction", "torque_offset")}
+
+
+def _first_part(winner: Ranked, ranked: Sequence[Ranked]) -> Ranked | None:
+    effect = winner.trial.candidate.effect
+    if effect.name not in _PARTS:
+        return None
+    label = Effect(_PARTS[effect.name][0], effect.axis).label
+    return next((r for r in ranked if r.trial.label == label), None)
+
+
+def _parts_do(winner: Ranked, ranked: Sequence[Ranked], fitter: ModelFitter) -> bool:
+    """Whether the parts of a composite winner together fit held-out data no worse than it."""
+    part = _first_part(winner, ranked)
+    if part is None:
+        return False
+    effect = winner.trial.candidate.effect
+    second = _PARTS[effect.name][1]
+    other = FreeEffect(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
+    try:
+        both = fitter.fit([*part.trial.evidence.free, other], part.trial.evidence, lazy=True)
+    except InputError:
+        return False
+    return not clearly_worse(held_out_loss(both).sum(), winner.trial.held_out.sum())
+
+
+def _without_composite(ranked: Sequence[Ranked]) -> list[Ranked]:
+    """Put the first part in the place of its composite, with the probability of both."""
+    winner = ranked[0]
+    part = _first_part(winner, ranked)
+    if part is None:
+        return list(ranked)
+    merged = replace(part, probability=part.probability + winner.probability)
+    return [merged, *(r for r in ranked[1:] if r is not part)]
 
 
 def _settled(state: Search, settings: Settings) -> bool:

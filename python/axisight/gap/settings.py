@@ -49,7 +49,7 @@ class Settings:
     largest_scatter: float = 0.3
     smallest_score: float = 0.3
     smallest_share: float = 0.005
-    explained_share: float = 0.7
+    explained_share: float = 0.6
     significance: float = 3.0
     bootstrap: int = 1000
     seed: int = 0

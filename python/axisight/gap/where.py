@@ -132,17 +132,17 @@ def _edges(name: str, prepared: Sequence[_Prepared]) -> Array:
     if name in ("direction", "time"):
         return np.zeros((n_axes, 2))
     pooled = np.concatenate([getattr(p, name) for p in prepared])
-    return np.quantile(pooled, [1 / 3, 2 / 3], axis=0).T
+    return np.asarray(np.quantile(pooled, [1 / 3, 2 / 3], axis=0).T)
 
 
 def _place(p: _Prepared, name: str, edges: Array, axis: int) -> NDArray[np.int64]:
     if name == "speed":
-        return np.digitize(np.abs(p.speed[:, axis]), edges[axis])
+        return np.asarray(np.digitize(np.abs(p.speed[:, axis]), edges[axis]))
     if name == "time":
-        return np.minimum((3 * np.arange(len(p.time))) // max(len(p.time), 1), 2)
+        return np.asarray(np.minimum((3 * np.arange(len(p.time))) // max(len(p.time), 1), 2))
     if name == "direction":
         return _direction(p, axis)
-    return np.digitize(getattr(p, name)[:, axis], edges[axis])
+    return np.asarray(np.digitize(getattr(p, name)[:, axis], edges[axis]))
 
 
 def _direction(p: _Prepared, axis: int) -> NDArray[np.int64]:

@@ -123,7 +123,8 @@ pub fn sines(n_samples: usize, n_axes: usize, sample_time: f64, size: f64) -> Ve
         for axis in 0..n_axes {
             let shift = axis as f64;
             let tone = |f: f64, a: f64| a * (std::f64::consts::TAU * f * t).sin();
-            let sum = tone(2.3 + shift, 1.0) + tone(9.1 + 1.7 * shift, 0.5) + tone(31.0 - shift, 0.3);
+            let sum =
+                tone(2.3 + shift, 1.0) + tone(9.1 + 1.7 * shift, 0.5) + tone(31.0 - shift, 0.3);
             out.push(size * sum);
         }
     }
@@ -185,7 +186,13 @@ pub fn trace<S: Scalar>(
 
 /// Largest absolute value.
 pub fn largest(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |a, b| if b.is_nan() { f64::NAN } else { f64::max(a, b.abs()) })
+    x.iter().fold(0.0, |a, b| {
+        if b.is_nan() {
+            f64::NAN
+        } else {
+            f64::max(a, b.abs())
+        }
+    })
 }
 
 /// Largest difference of two series, over the largest value of the second.

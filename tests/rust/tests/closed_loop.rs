@@ -22,7 +22,10 @@ fn observed_order(robot: &RobotDescription, method: Method, rates: [usize; 3]) -
     let error = |rate: usize| relative(&fall(robot, rate, method), &exact);
     let (coarse, fine) = (error(rates[1]), error(rates[2]));
     // The reference and rounding must stand far below the finest error.
-    assert!(fine > 1e-12 && error(rates[0]) > coarse, "{coarse:.1e} {fine:.1e}");
+    assert!(
+        fine > 1e-12 && error(rates[0]) > coarse,
+        "{coarse:.1e} {fine:.1e}"
+    );
     (coarse / fine).log2() / (rates[2] as f64 / rates[1] as f64).log2()
 }
 
@@ -32,7 +35,11 @@ fn observed_order(robot: &RobotDescription, method: Method, rates: [usize; 3]) -
 fn runge_kutta_converges_with_order_four() {
     for text in [PRESET, ARM] {
         let robot = robot(text);
-        let order = observed_order(&robot, Method::RungeKutta4 { substeps: 1 }, [2000, 4000, 8000]);
+        let order = observed_order(
+            &robot,
+            Method::RungeKutta4 { substeps: 1 },
+            [2000, 4000, 8000],
+        );
         assert!((order - 4.0).abs() < 0.3, "{}: {order}", robot.name);
     }
 }
@@ -71,7 +78,13 @@ fn tolerance_bounds_the_error_and_costs_effort() {
     let robot = robot(PRESET);
     let reference = sines(200, 3, robot.sample_time, 1.0);
     let at = |method: Method| {
-        trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method)
+        trace(
+            &plant::<f64>(&robot, &[]),
+            &robot,
+            Drive::Reference(&[&reference]),
+            &[],
+            method,
+        )
     };
     let exact = at(Method::RungeKutta4 { substeps: 64 });
     let mut effort = 0;
@@ -88,10 +101,18 @@ fn tolerance_bounds_the_error_and_costs_effort() {
 #[test]
 fn unstable_gain_diverges() {
     let mut robot = robot(PRESET);
-    robot.controller = Controller::PVelocity { kp: vec![4000.0, 4.0, 3.4] };
+    robot.controller = Controller::PVelocity {
+        kp: vec![4000.0, 4.0, 3.4],
+    };
     let reference = sines(4000, 3, robot.sample_time, 1.0);
     let method = Method::RungeKutta4 { substeps: 1 };
-    let run = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method);
+    let run = trace(
+        &plant::<f64>(&robot, &[]),
+        &robot,
+        Drive::Reference(&[&reference]),
+        &[],
+        method,
+    );
     match run.status {
         Status::Diverged(k) => assert_eq!(run.states.len(), k + 1),
         other => panic!("expected divergence, got {other:?}"),
@@ -102,11 +123,25 @@ fn unstable_gain_diverges() {
 fn absurd_stiffness_collapses_the_step() {
     for stiffness in [1e18, 1e24, 1e30] {
         let mut robot = robot(ARM);
-        robot.joints[0].compliance.as_mut().expect("spring").stiffness = stiffness;
+        robot.joints[0]
+            .compliance
+            .as_mut()
+            .expect("spring")
+            .stiffness = stiffness;
         let reference = sines(20, 1, robot.sample_time, 1.0);
         let method = Method::DormandPrince { tolerance: 1e-9 };
-        let run = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Reference(&[&reference]), &[], method);
-        assert!(matches!(run.status, Status::StepSizeCollapsed(_)), "{stiffness:e}: {:?}", run.status);
+        let run = trace(
+            &plant::<f64>(&robot, &[]),
+            &robot,
+            Drive::Reference(&[&reference]),
+            &[],
+            method,
+        );
+        assert!(
+            matches!(run.status, Status::StepSizeCollapsed(_)),
+            "{stiffness:e}: {:?}",
+            run.status
+        );
     }
 }
 
@@ -141,14 +176,47 @@ fn misuse_is_refused_by_name() {
     let robot = robot(PRESET);
     let good = [0.0; 6];
     let bad = [0.0, 0.0, 0.0, 0.0, f64::NAN, 0.0];
-    let none = RobotDescription { controller: Controller::None, ..robot.clone() };
+    let none = RobotDescription {
+        controller: Controller::None,
+        ..robot.clone()
+    };
     let cases: [(&RobotDescription, Drive<'_>, &[&[f64]], &str); 6] = [
-        (&robot, Drive::Reference(&[&good[..5]]), &[], "velocity_ref: expected samples of 3 axes, got 5 numbers"),
-        (&robot, Drive::Torque(&[&bad]), &[], "torque: expected finite numbers, got NaN at sample 1"),
-        (&robot, Drive::Torque(&[]), &[], "torque: expected 1 to 1 runs, got 0"),
-        (&robot, Drive::Torque(&[&good, &good]), &[], "torque: expected 1 to 1 runs, got 2"),
-        (&robot, Drive::Reference(&[&good]), &[&bad], "noise: expected finite numbers, got NaN at sample 1"),
-        (&none, Drive::Reference(&[&good]), &[], "controller: expected one for a run driven by velocity references, got kind `none`"),
+        (
+            &robot,
+            Drive::Reference(&[&good[..5]]),
+            &[],
+            "velocity_ref: expected samples of 3 axes, got 5 numbers",
+        ),
+        (
+            &robot,
+            Drive::Torque(&[&bad]),
+            &[],
+            "torque: expected finite numbers, got NaN at sample 1",
+        ),
+        (
+            &robot,
+            Drive::Torque(&[]),
+            &[],
+            "torque: expected 1 to 1 runs, got 0",
+        ),
+        (
+            &robot,
+            Drive::Torque(&[&good, &good]),
+            &[],
+            "torque: expected 1 to 1 runs, got 2",
+        ),
+        (
+            &robot,
+            Drive::Reference(&[&good]),
+            &[&bad],
+            "noise: expected finite numbers, got NaN at sample 1",
+        ),
+        (
+            &none,
+            Drive::Reference(&[&good]),
+            &[],
+            "controller: expected one for a run driven by velocity references, got kind `none`",
+        ),
     ];
     for (robot, drive, noise, message) in cases {
         let error = outcome(robot, &run_of(robot, drive, noise)).expect_err(message);
@@ -157,8 +225,13 @@ fn misuse_is_refused_by_name() {
     let lanes: [&[f64]; 1] = [&good];
     let mut run = run_of(&robot, Drive::Reference(&lanes), &[]);
     run.sample_time = 0.0;
-    let error = outcome(&robot, &run).expect_err("zero sample time").to_string();
-    assert_eq!(error, "sample_time: expected a positive time in seconds, got 0");
+    let error = outcome(&robot, &run)
+        .expect_err("zero sample time")
+        .to_string();
+    assert_eq!(
+        error,
+        "sample_time: expected a positive time in seconds, got 0"
+    );
     run.sample_time = 1e-3;
     run.start = &[0.0];
     let error = outcome(&robot, &run).expect_err("short start").to_string();
@@ -170,7 +243,8 @@ fn misuse_is_refused_by_name() {
 #[test]
 fn whole_sample_delay_shifts_the_torque() {
     let robot = robot(PRESET);
-    let rest = axisight_core::robot::equilibrium(&plant::<f64>(&robot, &[]), &[0.0; 3]).expect("rest");
+    let rest =
+        axisight_core::robot::equilibrium(&plant::<f64>(&robot, &[]), &[0.0; 3]).expect("rest");
     let mut torque = sines(60, 3, robot.sample_time, 2.0);
     for (i, u) in torque.iter_mut().enumerate() {
         *u += rest.motor_torque[i % 3] + 0.3;
@@ -179,11 +253,25 @@ fn whole_sample_delay_shifts_the_torque() {
         for substeps in [1, 3] {
             let method = Method::RungeKutta4 { substeps };
             let delay = samples as f64 * robot.sample_time;
-            let settings: Vec<_> = (0..3).map(|a| effect("input_delay", Some(a), &[delay])).collect();
-            let late = trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method);
+            let settings: Vec<_> = (0..3)
+                .map(|a| effect("input_delay", Some(a), &[delay]))
+                .collect();
+            let late = trace(
+                &plant::<f64>(&robot, &settings),
+                &robot,
+                Drive::Torque(&[&torque]),
+                &[],
+                method,
+            );
             let mut shifted = rest.motor_torque.repeat(samples);
             shifted.extend(&torque[..torque.len() - 3 * samples]);
-            let base = trace(&plant::<f64>(&robot, &[]), &robot, Drive::Torque(&[&shifted]), &[], method);
+            let base = trace(
+                &plant::<f64>(&robot, &[]),
+                &robot,
+                Drive::Torque(&[&shifted]),
+                &[],
+                method,
+            );
             let error = relative(&late.measured, &base.measured);
             assert!(error < 1e-12, "{samples} {substeps}: {error:.1e}");
         }
@@ -198,7 +286,11 @@ fn closed_form(torque: &[f64], t: f64, inertia: f64, delay: f64, lag: f64) -> Ve
     let switch = delay - whole * t;
     let held = |k: usize, back: f64| {
         let index = k as f64 - back;
-        if index < 0.0 { 0.0 } else { torque[index as usize] }
+        if index < 0.0 {
+            0.0
+        } else {
+            torque[index as usize]
+        }
     };
     let mut out = Vec::new();
     for k in 0..torque.len() {
@@ -226,7 +318,14 @@ fn delay_and_lag_are_exact_on_a_rigid_inertia() {
     let inertia = 0.25 + 3.0 * 0.5 * 0.5;
     let torque = axisight_tests::Random(9).vector(40, 2.0);
     let t = robot.sample_time;
-    for (delay, lag) in [(0.4e-3, 0.0), (2.37e-3, 0.0), (0.0, 0.7e-3), (0.0, 20e-3), (0.0, 0.02e-3), (1.6e-3, 0.9e-3)] {
+    for (delay, lag) in [
+        (0.4e-3, 0.0),
+        (2.37e-3, 0.0),
+        (0.0, 0.7e-3),
+        (0.0, 20e-3),
+        (0.0, 0.02e-3),
+        (1.6e-3, 0.9e-3),
+    ] {
         for substeps in [1, 2, 5] {
             let mut settings = Vec::new();
             if delay > 0.0 {
@@ -235,10 +334,23 @@ fn delay_and_lag_are_exact_on_a_rigid_inertia() {
             if lag > 0.0 {
                 settings.push(effect("actuator_bandwidth", Some(0), &[lag]));
             }
-            for method in [Method::RungeKutta4 { substeps }, Method::DormandPrince { tolerance: 1e-6 }] {
-                let run = trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method);
+            for method in [
+                Method::RungeKutta4 { substeps },
+                Method::DormandPrince { tolerance: 1e-6 },
+            ] {
+                let run = trace(
+                    &plant::<f64>(&robot, &settings),
+                    &robot,
+                    Drive::Torque(&[&torque]),
+                    &[],
+                    method,
+                );
                 // A lag of T_c is made T_c + 1e-12 s by the core: 1e-12 / 2e-5 = 5e-8 at worst.
-                let tolerance = if lag > 0.0 { 1e-13 + 2e-12 / lag } else { 1e-13 };
+                let tolerance = if lag > 0.0 {
+                    1e-13 + 2e-12 / lag
+                } else {
+                    1e-13
+                };
                 let error = relative(&run.measured, &closed_form(&torque, t, inertia, delay, lag));
                 assert!(error < tolerance, "{delay} {lag} {method:?}: {error:.1e}");
             }
@@ -252,9 +364,19 @@ fn delays_add() {
     let robot = robot(ROTOR);
     let torque = axisight_tests::Random(10).vector(30, 2.0);
     let run = |delays: &[f64]| {
-        let settings: Vec<_> = delays.iter().map(|d| effect("input_delay", Some(0), &[*d])).collect();
+        let settings: Vec<_> = delays
+            .iter()
+            .map(|d| effect("input_delay", Some(0), &[*d]))
+            .collect();
         let method = Method::RungeKutta4 { substeps: 1 };
-        trace(&plant::<f64>(&robot, &settings), &robot, Drive::Torque(&[&torque]), &[], method).measured
+        trace(
+            &plant::<f64>(&robot, &settings),
+            &robot,
+            Drive::Torque(&[&torque]),
+            &[],
+            method,
+        )
+        .measured
     };
     assert!(relative(&run(&[0.4e-3, 1.1e-3]), &run(&[1.5e-3])) < 1e-13);
 }

@@ -56,7 +56,10 @@ fn neutral_effects_vanish() {
             let run = closed_loop(&robot, &[effect(info.name, place, &neutral(info))]);
             // Amplitudes at zero add exact zeros or multiply by one; the delay and the
             // body sums may round once per sample, 1e-16 amplified by the gear stiffness.
-            for (got, want) in [(&run.command, &base.command), (&run.measured, &base.measured)] {
+            for (got, want) in [
+                (&run.command, &base.command),
+                (&run.measured, &base.measured),
+            ] {
                 let error = relative(got, want);
                 if error.is_nan() || error > 1e-12 {
                     failed.push(format!("{} {place:?}: {error:.1e}", info.name));
@@ -76,7 +79,8 @@ fn effects_at_work_show() {
     for info in EFFECTS {
         for place in places(info, robot.n_axes()) {
             let run = closed_loop(&robot, &[effect(info.name, place, &at_work(info))]);
-            let seen = relative(&run.command, &base.command).max(relative(&run.measured, &base.measured));
+            let seen =
+                relative(&run.command, &base.command).max(relative(&run.measured, &base.measured));
             assert!(seen > 1e-9, "{} {place:?}: {seen:.1e}", info.name);
         }
     }
@@ -93,16 +97,27 @@ fn derivatives_agree_with_finite_differences() {
     robot.operating_point = vec![0.1, 0.3, -0.2];
     for info in EFFECTS {
         // Axis 2 carries gravity, so that its gear does not leave its side of a gap.
-        let place = if info.scope == Scope::Arm { None } else { Some(1) };
+        let place = if info.scope == Scope::Arm {
+            None
+        } else {
+            Some(1)
+        };
         let start = at_work(info);
         for (i, p) in info.parameters.iter().enumerate() {
             // Orders multiply a motor angle of 70 rad.
-            let share = if p.name.starts_with("order") { 1e-4 } else { 1e-2 };
+            let share = if p.name.starts_with("order") {
+                1e-4
+            } else {
+                1e-2
+            };
             let h = share * p.typical.max(0.1 * start[i].abs());
             let mut setting = effect::<Dual<f64, 1>>(info.name, place, &start);
             setting.parameters[i] = setting.parameters[i].seeded(0);
-            let exact: Vec<f64> =
-                closed_loop(&robot, &[setting]).command.iter().map(|u| u.partials[0]).collect();
+            let exact: Vec<f64> = closed_loop(&robot, &[setting])
+                .command
+                .iter()
+                .map(|u| u.partials[0])
+                .collect();
             let at = |x: f64| {
                 let mut parameters = start.clone();
                 parameters[i] = x;
@@ -110,13 +125,24 @@ fn derivatives_agree_with_finite_differences() {
             };
             let central = |h: f64| -> Vec<f64> {
                 let (high, low) = (at(start[i] + h), at(start[i] - h));
-                high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * h)).collect()
+                high.iter()
+                    .zip(&low)
+                    .map(|(a, b)| (a - b) / (2.0 * h))
+                    .collect()
             };
             let (coarse, fine) = (central(h), central(0.5 * h));
             let size = axisight_tests::largest(&exact);
-            let truncation = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let truncation = coarse
+                .iter()
+                .zip(&fine)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             let tolerance = truncation + 6e-10 / h;
-            let error = exact.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let error = exact
+                .iter()
+                .zip(&fine)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             // A gap that never opens shifts the motor once and for all: no torque, nothing to see.
             let blind = size > 0.0 && tolerance > 1e-3 * size;
             if error.is_nan() || error > tolerance || blind {
@@ -136,11 +162,15 @@ fn timing_effects_have_a_derivative_at_zero() {
     for (name, tolerance) in [("input_delay", 1e-4), ("actuator_bandwidth", 1e-2)] {
         let mut setting = effect::<Dual<f64, 1>>(name, Some(0), &[0.0]);
         setting.parameters[0] = setting.parameters[0].seeded(0);
-        let exact: Vec<f64> =
-            closed_loop(&robot, &[setting]).command.iter().map(|u| u.partials[0]).collect();
+        let exact: Vec<f64> = closed_loop(&robot, &[setting])
+            .command
+            .iter()
+            .map(|u| u.partials[0])
+            .collect();
         let at = |x: f64| closed_loop::<f64>(&robot, &[effect(name, Some(0), &[x])]).command;
         let base = at(0.0);
-        let slope = |h: f64| -> Vec<f64> { at(h).iter().zip(&base).map(|(a, b)| (a - b) / h).collect() };
+        let slope =
+            |h: f64| -> Vec<f64> { at(h).iter().zip(&base).map(|(a, b)| (a - b) / h).collect() };
         // Lags far below the sample time; the delay's slope changes over a sample.
         let h = 1e-6;
         let (coarse, fine) = (slope(h), slope(0.5 * h));
@@ -161,10 +191,19 @@ fn refusal(robot: &RobotDescription, setting: &EffectSetting<f64>) -> String {
 fn bounds_are_refused_by_name() {
     let robot = robot(PRESET);
     for info in EFFECTS {
-        let place = if info.scope == Scope::Arm { None } else { Some(0) };
+        let place = if info.scope == Scope::Arm {
+            None
+        } else {
+            Some(0)
+        };
         for (i, p) in info.parameters.iter().enumerate() {
             let width = p.upper - p.lower;
-            for bad in [p.lower - 1e-3 * width, p.upper + 1e-3 * width, f64::NAN, f64::INFINITY] {
+            for bad in [
+                p.lower - 1e-3 * width,
+                p.upper + 1e-3 * width,
+                f64::NAN,
+                f64::INFINITY,
+            ] {
                 let mut values = neutral(info);
                 values[i] = bad;
                 let message = refusal(&robot, &effect(info.name, place, &values));
@@ -182,7 +221,10 @@ fn wrong_axis_count_and_name_are_refused() {
     let robot = robot(PRESET);
     for info in EFFECTS {
         let (bad, expected) = match info.scope {
-            Scope::Axis => (vec![None, Some(3), Some(usize::MAX)], "expected an axis from 1 to 3"),
+            Scope::Axis => (
+                vec![None, Some(3), Some(usize::MAX)],
+                "expected an axis from 1 to 3",
+            ),
             Scope::Arm => (vec![Some(0)], "expected no axis"),
         };
         for place in bad {
@@ -195,14 +237,25 @@ fn wrong_axis_count_and_name_are_refused() {
         let mut long = neutral(info);
         long.push(0.0);
         for parameters in [&long[..], &long[..info.parameters.len() - 1]] {
-            let place = if info.scope == Scope::Arm { None } else { Some(0) };
+            let place = if info.scope == Scope::Arm {
+                None
+            } else {
+                Some(0)
+            };
             let message = refusal(&robot, &effect(info.name, place, parameters));
-            let count = format!("expected {} parameters, got {}", info.parameters.len(), parameters.len());
+            let count = format!(
+                "expected {} parameters, got {}",
+                info.parameters.len(),
+                parameters.len()
+            );
             assert!(message.ends_with(&count), "{message}");
         }
     }
     let message = refusal(&robot, &effect("colour", Some(0), &[]));
-    assert!(message.starts_with("effect `colour`: expected one of viscous_friction, "), "{message}");
+    assert!(
+        message.starts_with("effect `colour`: expected one of viscous_friction, "),
+        "{message}"
+    );
     assert!(build::<f64>("", &[]).is_err());
 }
 
@@ -212,8 +265,14 @@ fn transmission_effects_need_a_compliant_gear() {
     robot.joints[0].compliance = None;
     for info in EFFECTS.iter().filter(|e| e.acts == Acts::Transmission) {
         let message = refusal(&robot, &effect(info.name, Some(0), &neutral(info)));
-        assert!(message.contains("expected an axis with a compliant transmission"), "{message}");
-        assert_eq!(refusal(&robot, &effect(info.name, Some(1), &neutral(info))), "accepted");
+        assert!(
+            message.contains("expected an axis with a compliant transmission"),
+            "{message}"
+        );
+        assert_eq!(
+            refusal(&robot, &effect(info.name, Some(1), &neutral(info))),
+            "accepted"
+        );
     }
 }
 
@@ -236,7 +295,13 @@ fn rest_is_rest_with_every_effect() {
                 .map(|(axis, u)| axis.kernels.iter().fold(*u, |t, k| k.drive(t)))
                 .collect();
             let mut dx = vec![0.0; x.len()];
-            plant.derivative(&x, &delivered, &rest.motor_torque, &mut plant.scratch(), &mut dx);
+            plant.derivative(
+                &x,
+                &delivered,
+                &rest.motor_torque,
+                &mut plant.scratch(),
+                &mut dx,
+            );
             // Gear forces of 1e4 Nm rounded at 1e-16 on motors of 1e-2 kg m^2 and links of
             // 1 kg m^2; the nonlinear spring is iterated to 1e-12 of the load.
             let moved = axisight_tests::largest(&dx);
@@ -256,6 +321,9 @@ fn strongly_nonlinear_spring_finds_its_rest() {
         let gear = plant.axes[1].gear.as_ref().expect("gear");
         let torque = gear.stiffness * deflection + cubic * deflection.powi(3);
         let load = rest.motor_torque[1] / plant.axes[1].ratio;
-        assert!((torque / load - 1.0).abs() < 1e-9, "{cubic:e}: {torque} {load}");
+        assert!(
+            (torque / load - 1.0).abs() < 1e-9,
+            "{cubic:e}: {torque} {load}"
+        );
     }
 }

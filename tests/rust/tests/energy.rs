@@ -57,7 +57,10 @@ fn fall(robot: &RobotDescription) -> Vec<Energy> {
     let torque = vec![0.0; SAMPLES * robot.n_axes()];
     let method = Method::RungeKutta4 { substeps: SUBSTEPS };
     let run = trace(&plant, robot, Drive::Torque(&[&torque]), &[], method);
-    run.states.iter().map(|x| energy(&body, &plant, x)).collect()
+    run.states
+        .iter()
+        .map(|x| energy(&body, &plant, x))
+        .collect()
 }
 
 /// Largest departure of the sum from its start, over the energy exchanged.
@@ -74,7 +77,10 @@ fn departure(energies: &[Energy], motor_share: f64) -> f64 {
 fn tolerance(robot: &RobotDescription) -> f64 {
     let linear = linearize(robot, &[], &robot.operating_point).expect("linear");
     let fastest = modes(&linear).expect("modes");
-    let fastest = fastest.iter().map(|m| m.eigenvalue.norm()).fold(0.0, f64::max);
+    let fastest = fastest
+        .iter()
+        .map(|m| m.eigenvalue.norm())
+        .fold(0.0, f64::max);
     let h = robot.sample_time / SUBSTEPS as f64;
     (SAMPLES * SUBSTEPS) as f64 * (fastest * h).powi(6) / 72.0
 }
@@ -112,7 +118,10 @@ fn damping_takes_energy_away() {
     for text in [PRESET, ARM] {
         let robot = robot(text);
         let energies = fall(&robot);
-        let total: Vec<f64> = energies.iter().map(|e| e.links + e.motors + e.stored).collect();
+        let total: Vec<f64> = energies
+            .iter()
+            .map(|e| e.links + e.motors + e.stored)
+            .collect();
         let exchanged: Vec<f64> = energies.iter().map(|e| e.links + e.motors).collect();
         // The integrator adds at most its own error (as for the undamped arm).
         let slack = tolerance(&without_losses(text)) * largest(&exchanged);

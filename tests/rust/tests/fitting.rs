@@ -1,8 +1,8 @@
 //! Fits find what was put in, and say how well they know it.
 
 use axisight_core::identification::{
-    Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem, ProblemError,
-    Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
+    Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
+    ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription, equilibrium};
 use axisight_core::signal::Weighting;
@@ -31,7 +31,10 @@ fn free(target: Target, initial: f64, scale: f64) -> FitParameter {
 }
 
 fn flat(weight: f64) -> Weighting {
-    Weighting { weight: vec![weight], ..Weighting::flat() }
+    Weighting {
+        weight: vec![weight],
+        ..Weighting::flat()
+    }
 }
 
 fn friction(level: f64) -> Vec<EffectSetting<f64>> {
@@ -55,7 +58,9 @@ fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Record> {
         let target = trace(&plant, robot, Drive::Torque(&[&input]), &[&noise], METHOD).measured;
         Record { input, target }
     };
-    [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)].map(log).into()
+    [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)]
+        .map(log)
+        .into()
 }
 
 fn arm_parameters() -> Vec<FitParameter> {
@@ -66,7 +71,9 @@ fn arm_parameters() -> Vec<FitParameter> {
         Target::Effect(0, 0),
     ];
     let start = [1.1, 0.85, 1.05, 0.5];
-    (0..4).map(|i| free(targets[i], start[i] * TRUTH[i], SCALE[i])).collect()
+    (0..4)
+        .map(|i| free(targets[i], start[i] * TRUTH[i], SCALE[i]))
+        .collect()
 }
 
 fn arm_problem(seed: u64, sigma: f64) -> SimulationErrorProblem {
@@ -98,12 +105,17 @@ fn solve_with(problem: &SimulationErrorProblem, options: FitOptions) -> Fit {
 fn distance(fit: &Fit, theta: &[f64], from: &[f64]) -> f64 {
     let n = fit.free.len();
     let off = DVector::from_iterator(n, fit.free.iter().map(|i| theta[*i] - from[*i]));
-    let information = DMatrix::from_column_slice(n, n, &fit.covariance).try_inverse().expect("regular");
+    let information = DMatrix::from_column_slice(n, n, &fit.covariance)
+        .try_inverse()
+        .expect("regular");
     off.dot(&(information * &off))
 }
 
 fn settled(fit: &Fit) -> bool {
-    matches!(fit.status, FitStatus::LossConverged | FitStatus::StepConverged)
+    matches!(
+        fit.status,
+        FitStatus::LossConverged | FitStatus::StepConverged
+    )
 }
 
 /// 4 sigma fails once in 16,000 for a normal error; the loss is chi-square with as many
@@ -117,10 +129,17 @@ fn parameters_come_back_within_their_uncertainty() {
         let sigma = fit.covariance[i * 4 + i].sqrt();
         let error = (fit.theta[i] - TRUTH[i]).abs();
         assert!(error < 4.0 * sigma, "{i}: {error:.2e} {sigma:.2e}");
-        assert!(sigma < 0.05 * TRUTH[i], "{i} is not determined: {sigma:.1e}");
+        assert!(
+            sigma < 0.05 * TRUTH[i],
+            "{i} is not determined: {sigma:.1e}"
+        );
     }
     let freedom = (fit.n_residuals - 4) as f64;
-    assert!((fit.loss - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(), "{} {freedom}", fit.loss);
+    assert!(
+        (fit.loss - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(),
+        "{} {freedom}",
+        fit.loss
+    );
     assert!(fit.initial_loss > 100.0 * fit.loss && fit.at_bound.is_empty());
 }
 
@@ -191,7 +210,10 @@ fn logs_of_different_length_do_not_disturb_each_other() {
     let together = problem.evaluate(&theta, &[0, 1, 2, 3]).expect("batch");
     let mut start = 0;
     for record in &problem.records {
-        let alone = SimulationErrorProblem { records: vec![record.clone()], ..problem.clone() };
+        let alone = SimulationErrorProblem {
+            records: vec![record.clone()],
+            ..problem.clone()
+        };
         let alone = alone.evaluate(&theta, &[0, 1, 2, 3]).expect("single");
         let range = start..start + alone.residual.len();
         assert_eq!(together.residual[range.clone()], alone.residual);
@@ -218,7 +240,11 @@ fn columns_are_derivatives_of_the_residuals() {
             problem.evaluate(&theta, &[]).expect("residual").residual
         };
         let (high, low) = (at(h), at(-h));
-        let slope: Vec<f64> = high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * h)).collect();
+        let slope: Vec<f64> = high
+            .iter()
+            .zip(&low)
+            .map(|(a, b)| (a - b) / (2.0 * h))
+            .collect();
         let error = axisight_tests::relative(column, &slope);
         assert!(error < 1e-5, "{i}: {error:.1e}");
     }
@@ -250,7 +276,10 @@ fn frozen_parameter_stays() {
     problem.parameters[0].initial = TRUTH[0];
     let fit = solve(&problem);
     assert_eq!(fit.theta[0].to_bits(), TRUTH[0].to_bits());
-    assert_eq!((fit.free.clone(), fit.covariance.len(), fit.columns.len()), (vec![1, 2, 3], 9, 3));
+    assert_eq!(
+        (fit.free.clone(), fit.covariance.len(), fit.columns.len()),
+        (vec![1, 2, 3], 9, 3)
+    );
     // Three free parameters: chi-square(3) exceeds 24 once in 40,000.
     assert!(distance(&fit, &fit.theta, &TRUTH) < 24.0);
 }
@@ -266,11 +295,18 @@ fn prior_pulls_as_hard_as_it_is_sharp() {
     problem.parameters[2].prior = Some((mean, 1e-3 * sigma));
     let sharp = solve(&problem);
     let pulled = (sharp.theta[2] - mean).abs();
-    assert!(pulled < 1e-5 * (mean - without.theta[2]).abs() + 1e-4 * sigma, "{}", sharp.theta[2]);
+    assert!(
+        pulled < 1e-5 * (mean - without.theta[2]).abs() + 1e-4 * sigma,
+        "{}",
+        sharp.theta[2]
+    );
     problem.parameters[2].prior = Some((mean, 1e3 * sigma));
     let broad = solve(&problem);
     let moved = (broad.theta[2] - without.theta[2]).abs();
-    assert!(moved < 1e-5 * (mean - without.theta[2]).abs() + 1e-3 * sigma, "{moved:.1e} {sigma:.1e}");
+    assert!(
+        moved < 1e-5 * (mean - without.theta[2]).abs() + 1e-3 * sigma,
+        "{moved:.1e} {sigma:.1e}"
+    );
 }
 
 /// One sample in 30 off by 1000 sigma either way: least squares is thrown off by about
@@ -279,18 +315,32 @@ fn prior_pulls_as_hard_as_it_is_sharp() {
 fn robust_loss_resists_outliers() {
     let mut problem = arm_problem(8, SIGMA);
     for record in &mut problem.records {
-        for (k, y) in record.target.iter_mut().enumerate().filter(|(k, _)| k % 30 == 7) {
+        for (k, y) in record
+            .target
+            .iter_mut()
+            .enumerate()
+            .filter(|(k, _)| k % 30 == 7)
+        {
             *y += if k % 4 == 1 { 1.0 } else { -1.0 };
         }
     }
     let plain = solve(&problem);
     for loss in [Loss::Huber(1.5), Loss::SoftL1(1.5)] {
-        let robust = solve_with(&problem, FitOptions { loss, ..FitOptions::default() });
+        let robust = solve_with(
+            &problem,
+            FitOptions {
+                loss,
+                ..FitOptions::default()
+            },
+        );
         assert!(settled(&robust), "{:?}", robust.status);
         let off = distance(&robust, &robust.theta, &TRUTH);
         // chi-square(4) exceeds 27 once in 50,000; times the efficiency squared.
         assert!(off < 27.0 * 1.7, "{loss:?}: {off}");
-        assert!(distance(&robust, &plain.theta, &TRUTH) > 100.0 * off.max(4.0), "{loss:?}: no outliers?");
+        assert!(
+            distance(&robust, &plain.theta, &TRUTH) > 100.0 * off.max(4.0),
+            "{loss:?}: no outliers?"
+        );
     }
 }
 
@@ -305,7 +355,12 @@ fn nuisance_parameters_reach_the_same_optimum() {
     let lazy = solve(&problem);
     assert!(settled(&lazy), "{:?}", lazy.status);
     let allowed = 1e-4 * full.loss;
-    assert!(lazy.loss - full.loss < allowed, "{} {}", lazy.loss, full.loss);
+    assert!(
+        lazy.loss - full.loss < allowed,
+        "{} {}",
+        lazy.loss,
+        full.loss
+    );
     let off = distance(&full, &lazy.theta, &full.theta);
     assert!(off < allowed, "{off}");
 }
@@ -320,7 +375,8 @@ fn warm_columns_are_used_and_checked() {
     let again = fit(&problem, &problem.parameters, FitOptions::default(), &warm).expect("fit");
     assert!(distance(&cold, &again.theta, &cold.theta) < 1e-4 * cold.loss);
     let short = [(3, vec![0.0; 5])];
-    let error = fit(&problem, &problem.parameters, FitOptions::default(), &short).expect_err("short");
+    let error =
+        fit(&problem, &problem.parameters, FitOptions::default(), &short).expect_err("short");
     assert!(matches!(error, ProblemError::Invalid { field, .. } if field == "warm"));
 }
 
@@ -331,8 +387,20 @@ fn misuse_names_the_field() {
         Err(ProblemError::Invalid { field, .. }) => field,
         other => panic!("{other:?}"),
     };
-    assert_eq!(field(&SimulationErrorProblem { records: vec![], ..good.clone() }), "records");
-    assert_eq!(field(&SimulationErrorProblem { weighting: vec![], ..good.clone() }), "weighting");
+    assert_eq!(
+        field(&SimulationErrorProblem {
+            records: vec![],
+            ..good.clone()
+        }),
+        "records"
+    );
+    assert_eq!(
+        field(&SimulationErrorProblem {
+            weighting: vec![],
+            ..good.clone()
+        }),
+        "weighting"
+    );
     let mut bad = good.clone();
     bad.records[1].target[7] = f64::NAN;
     assert_eq!(field(&bad), "records[1]");
@@ -347,7 +415,9 @@ fn misuse_names_the_field() {
 #[test]
 fn cancelled_fit_stops() {
     let mut problem = arm_problem(1, SIGMA);
-    problem.cancel = Some(std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true)));
+    problem.cancel = Some(std::sync::Arc::new(std::sync::atomic::AtomicBool::new(
+        true,
+    )));
     let outcome = fit(&problem, &problem.parameters, FitOptions::default(), &[]);
     assert!(matches!(outcome, Err(ProblemError::Cancelled)));
 }
@@ -357,7 +427,12 @@ fn motion(robot: &RobotDescription, seed: u64, sigma: f64) -> MotionRecord {
     let body = RigidBody::new(robot);
     let drive = robot.joints[0].drive.as_ref().expect("drive");
     let noise = measurement_noise(seed, 0, SAMPLES, 1, sigma);
-    let mut record = MotionRecord { position: vec![], velocity: vec![], acceleration: vec![], torque: vec![] };
+    let mut record = MotionRecord {
+        position: vec![],
+        velocity: vec![],
+        acceleration: vec![],
+        torque: vec![],
+    };
     for k in 0..SAMPLES {
         let t = k as f64 * robot.sample_time;
         let (w1, w2) = (7.0, 19.0);
@@ -367,12 +442,16 @@ fn motion(robot: &RobotDescription, seed: u64, sigma: f64) -> MotionRecord {
             -60.0 * w1 * w1 * (w1 * t).sin() - 10.0 * w2 * w2 * (w2 * t).cos(),
         );
         let r = drive.gear_ratio;
-        let joint = body.inverse_dynamics(&[r * x, 0.0], &[r * v, 0.0], &[r * a, 0.0]).expect("torque");
+        let joint = body
+            .inverse_dynamics(&[r * x, 0.0], &[r * v, 0.0], &[r * a, 0.0])
+            .expect("torque");
         let friction = drive.viscous_friction * v + TRUTH[3] * (v / 0.5).tanh();
         record.position.push(x);
         record.velocity.push(v);
         record.acceleration.push(a);
-        record.torque.push(r * joint[0] + drive.motor_inertia * a + friction + noise[k]);
+        record
+            .torque
+            .push(r * joint[0] + drive.motor_inertia * a + friction + noise[k]);
     }
     record
 }
@@ -390,7 +469,10 @@ fn inverse_dynamics_finds_mass_centre_and_friction() {
     ];
     for (noise, seed) in [(0.0, 1), (sigma, 2), (sigma, 3)] {
         let problem = InverseDynamics {
-            records: vec![motion(&robot, seed, noise), motion(&robot, seed + 10, noise)],
+            records: vec![
+                motion(&robot, seed, noise),
+                motion(&robot, seed + 10, noise),
+            ],
             robot: robot.clone(),
             effects: friction(0.0),
             parameters: parameters.clone(),
@@ -403,7 +485,11 @@ fn inverse_dynamics_finds_mass_centre_and_friction() {
             let deviation = fit.covariance[i * 5].sqrt();
             let error = (fit.theta[i] - truth[i]).abs();
             // Without noise the search stops within 1e-5 of the residual it could still remove.
-            let allowed = if noise > 0.0 { 4.0 * deviation } else { 1e-3 * deviation };
+            let allowed = if noise > 0.0 {
+                4.0 * deviation
+            } else {
+                1e-3 * deviation
+            };
             assert!(error < allowed, "{i}: {error:.1e} {deviation:.1e}");
             assert!(deviation < 0.1 * truth[i], "{i}: {deviation:.1e}");
         }

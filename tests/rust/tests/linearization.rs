@@ -14,7 +14,11 @@ fn settings() -> Vec<EffectSetting<f64>> {
     vec![
         effect("nonlinear_stiffness", Some(1), &[2e11]),
         effect("coulomb_friction", Some(0), &[0.5, 0.5]),
-        effect("torque_ripple", Some(2), &[3.0, 0.05, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        effect(
+            "torque_ripple",
+            Some(2),
+            &[3.0, 0.05, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ),
     ]
 }
 
@@ -48,15 +52,25 @@ fn jacobian_agrees_with_finite_differences() {
             let h = 1e-5;
             let mut central = |h: f64| -> Vec<f64> {
                 let (high, low) = (at_shift(column, h), at_shift(column, -h));
-                high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * h)).collect()
+                high.iter()
+                    .zip(&low)
+                    .map(|(a, b)| (a - b) / (2.0 * h))
+                    .collect()
             };
             let (coarse, fine) = (central(2.0 * h), central(h));
             for row in 0..nx {
-                let exact = if column < nx { linear.a[(row, column)] } else { linear.b[(row, column - nx)] };
+                let exact = if column < nx {
+                    linear.a[(row, column)]
+                } else {
+                    linear.b[(row, column - nx)]
+                };
                 let tolerance = (coarse[row] - fine[row]).abs() + 1e-16 * size / h;
                 assert!(tolerance < 1e-4 * size, "says nothing: {tolerance:.1e}");
                 let error = (fine[row] - exact).abs();
-                assert!(error <= tolerance, "({row}, {column}): {error:.1e} {tolerance:.1e}");
+                assert!(
+                    error <= tolerance,
+                    "({row}, {column}): {error:.1e} {tolerance:.1e}"
+                );
             }
         }
     }
@@ -72,7 +86,13 @@ fn equilibrium_is_at_rest() {
         let mut dx = vec![0.0; x.len()];
         // Ripple is an effect on the motor that rest does not take into account.
         let ripple = !settings.is_empty();
-        plant.derivative(&x, &rest.motor_torque, &rest.motor_torque, &mut plant.scratch(), &mut dx);
+        plant.derivative(
+            &x,
+            &rest.motor_torque,
+            &rest.motor_torque,
+            &mut plant.scratch(),
+            &mut dx,
+        );
         for (i, d) in dx.iter().enumerate() {
             // Spring forces of 1e4 Nm, rounded, on inertias of 1 kg m^2 and motors of 1e-2 kg m^2.
             let moved_by_ripple = ripple && i == 12;
@@ -94,13 +114,21 @@ fn modes_are_eigenpairs() {
         let v = DMatrix::from_column_slice(mode.shape.len(), 1, &mode.shape);
         let off = (&a * &v - &v * mode.eigenvalue).norm() / (size * v.norm());
         // Backward error of a QR algorithm: a few units times the order.
-        assert!(off < 20.0 * 20.0 * f64::EPSILON, "{}: {off:.1e}", mode.eigenvalue);
+        assert!(
+            off < 20.0 * 20.0 * f64::EPSILON,
+            "{}: {off:.1e}",
+            mode.eigenvalue
+        );
         let paired = mode.eigenvalue.im > 1e-6;
         count += 1 + usize::from(paired);
         sum += mode.eigenvalue.re * if paired { 2.0 } else { 1.0 };
     }
     assert_eq!(count, 20);
-    assert!((sum - linear.a.trace()).abs() < 1e-12 * size, "{sum} {}", linear.a.trace());
+    assert!(
+        (sum - linear.a.trace()).abs() < 1e-12 * size,
+        "{sum} {}",
+        linear.a.trace()
+    );
 }
 
 /// Motor and link with a spring between them and no gravity:
@@ -112,7 +140,11 @@ fn two_masses_have_the_textbook_frequency() {
     robot.joints.truncate(1);
     let compliance = robot.joints[0].compliance.as_mut().expect("spring");
     compliance.damping = 0.0;
-    robot.joints[0].drive.as_mut().expect("drive").viscous_friction = 0.0;
+    robot.joints[0]
+        .drive
+        .as_mut()
+        .expect("drive")
+        .viscous_friction = 0.0;
     let linear = linearize(&robot, &[], &[0.7]).expect("linear");
     let all = modes(&linear).expect("modes");
     let inertia = 5.0 + 60.0 * (0.4 * 0.4 + 0.1 * 0.1);
@@ -121,14 +153,24 @@ fn two_masses_have_the_textbook_frequency() {
     // Eigenvalues carry a rounding of 1e-16 of the largest entry, r k / J_m = 1e6 / s^2, times
     // the condition of the eigenvectors: motor angle over joint angle, w^2 J_m / r k, and
     // rate over angle, w, span 30 and 190; over w itself that is 3e-9 of w.
-    assert!((got.frequency_hz / want - 1.0).abs() < 3e-9, "{} {want}", got.frequency_hz);
+    assert!(
+        (got.frequency_hz / want - 1.0).abs() < 3e-9,
+        "{} {want}",
+        got.frequency_hz
+    );
     assert!(got.damping_ratio.abs() < 3e-9);
     // A double root at zero splits into the root of the rounding: sqrt(1e-16) w.
     assert!(all[0].frequency_hz < 1e-7 * want, "{}", all[0].frequency_hz);
 }
 
 /// Fourier coefficients at `frequency_hz` of the last `window` samples, `(axis)`.
-fn coefficients(series: &[f64], n_axes: usize, window: usize, frequency_hz: f64, dt: f64) -> Vec<C> {
+fn coefficients(
+    series: &[f64],
+    n_axes: usize,
+    window: usize,
+    frequency_hz: f64,
+    dt: f64,
+) -> Vec<C> {
     let n = series.len() / n_axes;
     let mut out = vec![C::new(0.0, 0.0); n_axes];
     for k in n - window..n {
@@ -181,7 +223,11 @@ fn zero_order_hold_response_is_what_a_sine_shows() {
     let frequency_hz = [6.0, 20.0, 46.0, 90.0];
     for text in [PRESET, ARM] {
         let mut robot = robot(text);
-        for compliance in robot.joints.iter_mut().filter_map(|j| j.compliance.as_mut()) {
+        for compliance in robot
+            .joints
+            .iter_mut()
+            .filter_map(|j| j.compliance.as_mut())
+        {
             compliance.damping *= 10.0;
         }
         let linear = linearize(&robot, &[], &robot.operating_point).expect("linear");

@@ -95,12 +95,24 @@ fn agrees_with_pinocchio() {
             let error = relative(got, &get(name));
             assert!(error < tolerance, "{name}: {error:.1e}");
         };
-        check("inertia_matrix", &body.inertia_matrix(&q).expect("M"), 2e-14);
+        check(
+            "inertia_matrix",
+            &body.inertia_matrix(&q).expect("M"),
+            2e-14,
+        );
         check("bias", &body.bias(&q, &v).expect("bias"), 2e-14);
         check("gravity", &body.gravity(&q).expect("gravity"), 2e-14);
-        check("inverse_dynamics", &body.inverse_dynamics(&q, &v, &a).expect("tau"), 2e-14);
+        check(
+            "inverse_dynamics",
+            &body.inverse_dynamics(&q, &v, &a).expect("tau"),
+            2e-14,
+        );
         let tau: Vec<f64> = a.iter().map(|x| 1e3 * x).collect();
-        check("forward_dynamics", &body.forward_dynamics(&q, &v, &tau).expect("acc"), 2e-10);
+        check(
+            "forward_dynamics",
+            &body.forward_dynamics(&q, &v, &tau).expect("acc"),
+            2e-10,
+        );
         let (rotation, origin) = body.pose(&q, 6).expect("pose");
         check("last_rotation", rotation.as_flattened(), 2e-14);
         check("last_origin", &origin, 2e-14);
@@ -178,8 +190,14 @@ fn jacobian_is_the_slope_of_the_pose() {
                 let spin: [f64; 3] = [skew(2, 1), skew(0, 2), skew(1, 0)];
                 for k in 0..3 {
                     let linear = (high.1[k] - low.1[k]) / (2.0 * h);
-                    assert!((jacobian[(k, i)] - linear).abs() < tolerance, "{joint} {i} {k}");
-                    assert!((jacobian[(3 + k, i)] - spin[k]).abs() < tolerance, "{joint} {i} {k}");
+                    assert!(
+                        (jacobian[(k, i)] - linear).abs() < tolerance,
+                        "{joint} {i} {k}"
+                    );
+                    assert!(
+                        (jacobian[(3 + k, i)] - spin[k]).abs() < tolerance,
+                        "{joint} {i} {k}"
+                    );
                 }
             }
         }
@@ -205,7 +223,11 @@ fn gravity_is_the_slope_of_the_potential() {
                     body.energy(&q, &vec![0.0; n]).expect("energy").1
                 };
                 let slope = (at(h) - at(-h)) / (2.0 * h);
-                assert!((gravity[i] - slope).abs() < 5e-5, "{i}: {} {slope}", gravity[i]);
+                assert!(
+                    (gravity[i] - slope).abs() < 5e-5,
+                    "{i}: {} {slope}",
+                    gravity[i]
+                );
             }
         }
     }
@@ -268,9 +290,18 @@ fn wrong_shapes_are_refused_by_name() {
     let body = RigidBody::new(&robot(PRESET));
     let good = [0.1; 7];
     for (result, expected) in [
-        (body.gravity(&good[..6]), "q: expected 7 joint values, got 6"),
-        (body.bias(&good, &good[..3]), "v: expected 7 joint values, got 3"),
-        (body.inverse_dynamics(&good, &good, &[]), "a: expected 7 joint values, got 0"),
+        (
+            body.gravity(&good[..6]),
+            "q: expected 7 joint values, got 6",
+        ),
+        (
+            body.bias(&good, &good[..3]),
+            "v: expected 7 joint values, got 3",
+        ),
+        (
+            body.inverse_dynamics(&good, &good, &[]),
+            "a: expected 7 joint values, got 0",
+        ),
         (
             body.forward_dynamics(&good, &good, &[0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0]),
             "tau: expected finite values, got NaN at joint 2",

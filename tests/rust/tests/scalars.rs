@@ -13,8 +13,18 @@ fn settings<S: Scalar>() -> Vec<EffectSetting<S>> {
         effect("stribeck_friction", Some(0), &[0.5, 0.3, 3.0, 0.1]),
         effect("nonlinear_stiffness", Some(1), &[2e11]),
         effect("backlash", Some(0), &[1e-4]),
-        effect("torque_ripple", Some(2), &[3.0, 0.05, 0.02, 36.0, 0.1, 0.0, 0.0, 0.0, 0.0, 18.0, 0.03, 0.01]),
-        effect("resolver_ripple", Some(1), &[2.0, 4e-4, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        effect(
+            "torque_ripple",
+            Some(2),
+            &[
+                3.0, 0.05, 0.02, 36.0, 0.1, 0.0, 0.0, 0.0, 0.0, 18.0, 0.03, 0.01,
+            ],
+        ),
+        effect(
+            "resolver_ripple",
+            Some(1),
+            &[2.0, 4e-4, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ),
         effect("input_delay", Some(2), &[0.7e-3]),
         effect("actuator_bandwidth", Some(1), &[1e-3]),
         effect("torque_constant", Some(1), &[0.05]),
@@ -37,13 +47,20 @@ fn inputs(n_axes: usize, sample_time: f64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
 fn run<S: Scalar>(settings: &[EffectSetting<S>], lanes: &[usize], substeps: usize) -> Trace<S> {
     let robot = robot(PRESET);
     let (references, noises) = inputs(robot.n_axes(), robot.sample_time);
-    let pick = |from: &[Vec<f64>]| -> Vec<Vec<f64>> { lanes.iter().map(|l| from[*l].clone()).collect() };
+    let pick =
+        |from: &[Vec<f64>]| -> Vec<Vec<f64>> { lanes.iter().map(|l| from[*l].clone()).collect() };
     let (references, noises) = (pick(&references), pick(&noises));
     let references: Vec<&[f64]> = references.iter().map(|r| &r[..]).collect();
     let noises: Vec<&[f64]> = noises.iter().map(|r| &r[..]).collect();
     let method = Method::RungeKutta4 { substeps };
     let plant = plant::<S>(&robot, settings);
-    let out = trace(&plant, &robot, Drive::Reference(&references), &noises, method);
+    let out = trace(
+        &plant,
+        &robot,
+        Drive::Reference(&references),
+        &noises,
+        method,
+    );
     assert_eq!(out.status, Status::Completed);
     out
 }
@@ -52,7 +69,11 @@ fn run<S: Scalar>(settings: &[EffectSetting<S>], lanes: &[usize], substeps: usiz
 fn lane_of<S: Scalar>(trace: &Trace<S>, lane: usize, n: usize) -> Vec<f64> {
     let states = trace.states.iter().take(n).flatten();
     let n_axes = trace.command.len() / trace.states.len();
-    let signals = trace.command.iter().take(n * n_axes).chain(trace.measured.iter().take(n * n_axes));
+    let signals = trace
+        .command
+        .iter()
+        .take(n * n_axes)
+        .chain(trace.measured.iter().take(n * n_axes));
     states.chain(signals).map(|x| x.lane(lane)).collect()
 }
 
@@ -65,7 +86,11 @@ fn every_lane_is_the_single_run_bit_for_bit() {
             let n = alone.states.len();
             assert_eq!(n, SAMPLES - 10 * lane);
             let (got, want) = (lane_of(&together, lane, n), lane_of(&alone, 0, n));
-            let differing = got.iter().zip(&want).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+            let differing = got
+                .iter()
+                .zip(&want)
+                .filter(|(a, b)| a.to_bits() != b.to_bits())
+                .count();
             assert_eq!(differing, 0, "lane {lane} of {} numbers", want.len());
         }
     }
@@ -108,8 +133,15 @@ fn derivative_of_a_lane_is_the_derivative_of_the_single_run() {
         let mut seen = 0.0_f64;
         for k in 0..alone.states.len() * n_axes {
             for seed in 0..2 {
-                let (a, b) = (together.command[k].partial(seed, lane), alone.command[k].partial(seed, 0));
-                assert_eq!(a.to_bits(), b.to_bits(), "lane {lane}, entry {k}, seed {seed}");
+                let (a, b) = (
+                    together.command[k].partial(seed, lane),
+                    alone.command[k].partial(seed, 0),
+                );
+                assert_eq!(
+                    a.to_bits(),
+                    b.to_bits(),
+                    "lane {lane}, entry {k}, seed {seed}"
+                );
                 seen = seen.max(a.abs());
             }
         }
@@ -137,7 +169,10 @@ fn elementary_functions_of_dual_numbers_have_their_slopes() {
             let exact = f(D::constant(x).seeded(0)).partials[0];
             let at = |x: f64| f(D::constant(x)).value;
             let slope = (at(x + h) - at(x - h)) / (2.0 * h);
-            assert!((exact - slope).abs() < 1e-9 * exact.abs().max(1.0), "{name}({x}): {exact} {slope}");
+            assert!(
+                (exact - slope).abs() < 1e-9 * exact.abs().max(1.0),
+                "{name}({x}): {exact} {slope}"
+            );
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::scalar::Scalar;
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "backlash",
     summary: "play in the gear: no torque until the gap is crossed",
-    equation: "tau_g = k D + d D',  D = delta - clip(delta, -b, b)",
+    equation: "tau_g = k D + d D',  D = delta - clip(delta, -b, b), its corners rounded over b/20",
     source: "Nordin, Gutman (2002), Automatica 38(10), dead-zone model",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -27,19 +27,32 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
     Box::new(Backlash(p[0]))
 }
 
+/// The edge of the gap is rounded over this share of the half-width on either side:
+/// the damping would otherwise jump at contact, which no integrator follows with a
+/// bounded error.
+const EDGE: f64 = 0.05;
+
 impl<S: Scalar> Kernel<S> for Backlash<S> {
     fn deflection(&self, delta: S) -> (S, S) {
-        let (above, below) = (delta - self.0, delta + self.0);
-        let zero = S::zero();
-        let loaded = above.if_positive(above, (-below).if_positive(below, zero));
-        let slope = above.if_positive(S::one(), (-below).if_positive(S::one(), zero));
-        (loaded, slope)
+        let (zero, one) = (S::zero(), S::one());
+        let edge = self.0 * EDGE;
+        let over = delta.abs() - self.0;
+        let into = over + edge;
+        let rounded = (edge - over).if_positive(into * into / (edge * 4.0), over);
+        let slope = (edge - over).if_positive(into / (edge * 2.0), one);
+        // Strictly inside the gap; a gap of no width has no inside.
+        let size = (-into).if_positive(zero, rounded);
+        let slope = (-into).if_positive(zero, slope);
+        (delta.if_positive(size, -size), slope)
     }
 
     fn deflection_inverse(&self, loaded: S) -> S {
         let zero = S::zero();
+        let edge = self.0 * EDGE;
+        let size = loaded.abs();
+        let on_edge = (size * edge).sqrt() * 2.0 - edge;
+        let over = (edge - size).if_positive(on_edge, size) + self.0;
         // An unloaded gear rests in the middle of its gap.
-        let side = loaded.if_positive(self.0, (-loaded).if_positive(-self.0, zero));
-        loaded + side
+        loaded.if_positive(over, (-loaded).if_positive(-over, zero))
     }
 }

@@ -10,17 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Hooke's law on the joint angle",
     scope: Scope::Axis,
     acts: Acts::Joint,
-    parameters: &[
-        ParameterInfo {
-            name: "stiffness_nm_rad",
-            unit: "Nm/rad (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -1e7,
-            upper: 1e7,
-            typical: 500.0,
-        },
-    ],
+    parameters: &[ParameterInfo {
+        name: "stiffness_nm_rad",
+        unit: "Nm/rad (joint side)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e7,
+        upper: 1e7,
+        typical: 500.0,
+    }],
 };
 
 struct Cable<S>(S);

@@ -10,17 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (9.4)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
-    parameters: &[
-        ParameterInfo {
-            name: "relative_change",
-            unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -1.0,
-            upper: 100.0,
-            typical: 1.0,
-        },
-    ],
+    parameters: &[ParameterInfo {
+        name: "relative_change",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1.0,
+        upper: 100.0,
+        typical: 1.0,
+    }],
 };
 
 struct Damping<S>(S);

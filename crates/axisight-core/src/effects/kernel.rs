@@ -163,7 +163,11 @@ pub struct PlantParameters<'a, S> {
 pub trait Kernel<S: Scalar>: Send + Sync {
     /// Change masses or stiffness before the run.
     fn prepare(&self, _plant: &mut PlantParameters<'_, S>) {}
-    /// Motor torque as a memoryless function of the torque the drive delivers [Nm].
+    /// What the drive makes of a command before any delay or lag, e.g. a limit [Nm].
+    fn command(&self, torque: S) -> S {
+        torque
+    }
+    /// Motor torque as an affine function of the torque the drive delivers [Nm].
     fn drive(&self, torque: S) -> S {
         torque
     }

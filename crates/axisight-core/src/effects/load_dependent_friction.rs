@@ -25,7 +25,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             unit: "rad/s",
             role: Role::Shape,
             neutral: 0.1,
-            lower: 0.01,
+            lower: 1e-5,
             upper: 2.0,
             typical: 0.1,
         },

@@ -10,17 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (9.4)",
     scope: Scope::Axis,
     acts: Acts::Motor,
-    parameters: &[
-        ParameterInfo {
-            name: "relative_change",
-            unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -0.9,
-            upper: 10.0,
-            typical: 0.2,
-        },
-    ],
+    parameters: &[ParameterInfo {
+        name: "relative_change",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.9,
+        upper: 10.0,
+        typical: 0.2,
+    }],
 };
 
 struct Inertia<S>(S);

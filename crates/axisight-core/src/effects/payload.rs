@@ -53,7 +53,12 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Payload<S> {
     fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
-        let last = plant.chain.joints.iter_mut().rev().find_map(|j| j.body.as_mut());
+        let last = plant
+            .chain
+            .joints
+            .iter_mut()
+            .rev()
+            .find_map(|j| j.body.as_mut());
         if let Some(body) = last {
             *body = combined(body, self.mass, &self.position);
         }

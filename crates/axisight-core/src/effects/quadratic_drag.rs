@@ -10,17 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Bona, Indri (2005), Friction compensation in robotics: an overview, IEEE CDC",
     scope: Scope::Axis,
     acts: Acts::Motor,
-    parameters: &[
-        ParameterInfo {
-            name: "drag_nm_s2_rad2",
-            unit: "Nm s^2/rad^2",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -1e3,
-            upper: 1e3,
-            typical: 1e-3,
-        },
-    ],
+    parameters: &[ParameterInfo {
+        name: "drag_nm_s2_rad2",
+        unit: "Nm s^2/rad^2",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e3,
+        upper: 1e3,
+        typical: 1e-3,
+    }],
 };
 
 struct Drag<S>(S);

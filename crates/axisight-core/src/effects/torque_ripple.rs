@@ -36,6 +36,8 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 impl<S: Scalar> Kernel<S> for Ripple<S> {
     fn motor_torque(&self, motor: &Motor<S>) -> S {
         let constant = self.constant.evaluate(motor.angle);
-        self.proportional.evaluate(motor.angle).fma(motor.command, constant)
+        self.proportional
+            .evaluate(motor.angle)
+            .fma(motor.command, constant)
     }
 }

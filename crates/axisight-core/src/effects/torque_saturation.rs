@@ -10,17 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 9.4",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
-    parameters: &[
-        ParameterInfo {
-            name: "limit_nm",
-            unit: "Nm",
-            role: Role::Amplitude,
-            neutral: 1e6,
-            lower: 1e-3,
-            upper: 1e6,
-            typical: 10.0,
-        },
-    ],
+    parameters: &[ParameterInfo {
+        name: "limit_nm",
+        unit: "Nm",
+        role: Role::Amplitude,
+        neutral: 1e6,
+        lower: 1e-3,
+        upper: 1e6,
+        typical: 10.0,
+    }],
 };
 
 struct Limit<S>(S);
@@ -30,7 +28,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Limit<S> {
-    fn drive(&self, torque: S) -> S {
+    fn command(&self, torque: S) -> S {
         let low = (torque + self.0).if_positive(torque, -self.0);
         (self.0 - low).if_positive(low, self.0)
     }

@@ -31,7 +31,13 @@ pub struct BlockGram {
 }
 
 /// Cut `len` entries of one axis of one log into blocks of about `block_len`.
-pub(super) fn cut(record: usize, axis: usize, start: usize, len: usize, block_len: usize) -> Vec<Block> {
+pub(super) fn cut(
+    record: usize,
+    axis: usize,
+    start: usize,
+    len: usize,
+    block_len: usize,
+) -> Vec<Block> {
     let count = (len / block_len.max(1)).max(1);
     (0..count)
         .map(|i| {

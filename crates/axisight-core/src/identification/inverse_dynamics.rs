@@ -64,7 +64,11 @@ impl InverseDynamics {
         }
         if self.weighting.len() != n_axes {
             let got = self.weighting.len().to_string();
-            return invalid("weighting".into(), format!("one for each of {n_axes} axes"), got);
+            return invalid(
+                "weighting".into(),
+                format!("one for each of {n_axes} axes"),
+                got,
+            );
         }
         for weighting in &self.weighting {
             if let Err(e) = weighting.validate() {
@@ -81,7 +85,11 @@ impl InverseDynamics {
             ] {
                 if x.len() != n || n == 0 || n % n_axes != 0 {
                     let expected = format!("{n} numbers, {n_axes} axes");
-                    return invalid(format!("records[{i}].{name}"), expected, x.len().to_string());
+                    return invalid(
+                        format!("records[{i}].{name}"),
+                        expected,
+                        x.len().to_string(),
+                    );
                 }
                 if let Some(k) = x.iter().position(|v| !v.is_finite()) {
                     let got = format!("{} at sample {}", x[k], k / n_axes);
@@ -135,7 +143,11 @@ impl InverseDynamics {
                 for kernel in &axis.kernels {
                     torque -= kernel.motor_torque(&motor);
                 }
-                let command = axis.kernels.iter().rev().fold(torque, |t, k| k.drive_inverse(t));
+                let command = axis
+                    .kernels
+                    .iter()
+                    .rev()
+                    .fold(torque, |t, k| k.drive_inverse(t));
                 out[0][i].push(command.lane(0));
                 for seed in 0..seeds.len() {
                     out[seed + 1][i].push(command.partial(seed, 0));

@@ -86,6 +86,10 @@ pub struct Fit {
     pub columns: Vec<Vec<f64>>,
 }
 
+/// Mean square of a whitened residual that no natural change of a parameter causes: a
+/// thousand standard deviations of noise.
+const LARGEST_SQUARE: f64 = 1e6;
+
 /// A point with everything the next step needs.
 struct Point {
     theta: Vec<f64>,
@@ -117,7 +121,9 @@ pub fn fit<P: Problem>(
     warm: &[(usize, Vec<f64>)],
 ) -> Result<Fit, ProblemError> {
     check(parameters)?;
-    let free: Vec<usize> = (0..parameters.len()).filter(|i| !parameters[*i].frozen).collect();
+    let free: Vec<usize> = (0..parameters.len())
+        .filter(|i| !parameters[*i].frozen)
+        .collect();
     let mut search = Search {
         problem,
         parameters,
@@ -168,8 +174,11 @@ pub fn fit<P: Problem>(
 
 fn check(parameters: &[FitParameter]) -> Result<(), ProblemError> {
     for (i, p) in parameters.iter().enumerate() {
-        let good = p.lower <= p.initial && p.initial <= p.upper && p.scale > 0.0 && p.scale.is_finite();
-        let prior = p.prior.is_none_or(|(mean, std)| mean.is_finite() && std > 0.0);
+        let good =
+            p.lower <= p.initial && p.initial <= p.upper && p.scale > 0.0 && p.scale.is_finite();
+        let prior = p
+            .prior
+            .is_none_or(|(mean, std)| mean.is_finite() && std > 0.0);
         if !good || !prior {
             return Err(ProblemError::Invalid {
                 field: format!("parameters[{i}]"),
@@ -193,8 +202,11 @@ impl<P: Problem> Search<'_, P> {
         for (slot, column) in slots.iter().zip(evaluation.columns) {
             self.columns[*slot] = column;
         }
-        let (losses, weight): (Vec<f64>, Vec<f64>) =
-            evaluation.residual.iter().map(|r| self.options.loss.evaluate(*r)).unzip();
+        let (losses, weight): (Vec<f64>, Vec<f64>) = evaluation
+            .residual
+            .iter()
+            .map(|r| self.options.loss.evaluate(*r))
+            .unzip();
         Ok(Point {
             loss: losses.iter().sum(),
             prior: self.prior_loss(&theta),
@@ -216,7 +228,9 @@ impl<P: Problem> Search<'_, P> {
     /// Columns renewed at every step.
     fn fresh(&self) -> Vec<usize> {
         let slots = 0..self.free.len();
-        slots.filter(|s| !self.parameters[self.free[*s]].nuisance).collect()
+        slots
+            .filter(|s| !self.parameters[self.free[*s]].nuisance)
+            .collect()
     }
 
     /// Normal matrix and gradient in scaled parameters, prior included.
@@ -258,9 +272,27 @@ impl<P: Problem> Search<'_, P> {
             .map(|block| {
                 let range = block.start..block.start + block.len;
                 let loss = point.losses[range].iter().sum();
-                BlockGram::new(block, &point.residual, loss, &point.weight, &columns)
+                let mut gram =
+                    BlockGram::new(block, &point.residual, loss, &point.weight, &columns);
+                if self.unpredictable(&gram) {
+                    gram.matrix.fill(0.0);
+                    gram.gradient.fill(0.0);
+                }
+                gram
             })
             .collect()
+    }
+
+    /// Whether a parameter's natural change moves this block beyond all reason: the
+    /// simulation is chaotic there (lost motion, stiction). Such a block counts in the
+    /// loss, but its derivative says nothing about a finite change.
+    fn unpredictable(&self, gram: &BlockGram) -> bool {
+        let n = self.free.len();
+        self.free.iter().enumerate().any(|(slot, i)| {
+            let scale = self.parameters[*i].scale;
+            let square = gram.matrix[slot * n + slot] * scale * scale / gram.block.len as f64;
+            square > LARGEST_SQUARE || square.is_nan()
+        })
     }
 
     /// Steps until one of the stopping rules holds.
@@ -299,22 +331,13 @@ impl<P: Problem> Search<'_, P> {
                         rejected += 1;
                         damping *= 8.0;
                         if rejected > 10 {
-                            return Ok(self.stall(&matrix, &gradient, total));
+                            return Ok(stall(&matrix, &gradient, total));
                         }
                     }
                 }
             }
         }
         Ok(FitStatus::MaxIterations)
-    }
-
-    /// No step helps: settled if even the undamped step promises nothing.
-    fn stall(&self, matrix: &DMatrix<f64>, gradient: &DVector<f64>, total: f64) -> FitStatus {
-        let promised = matrix
-            .clone()
-            .cholesky()
-            .map_or(f64::INFINITY, |c| gradient.dot(&c.solve(gradient)));
-        if promised < 1e-4 * total { FitStatus::LossConverged } else { FitStatus::Stalled }
     }
 
     /// Damped Gauss-Newton step projected on the bounds.
@@ -336,7 +359,9 @@ impl<P: Problem> Search<'_, P> {
                 let p = &self.parameters[*i];
                 let wanted = point.theta[*i] + step[slot] * p.scale;
                 theta[*i] = wanted.clamp(p.lower, p.upper);
-                let outward = theta[*i] == point.theta[*i] && wanted != point.theta[*i];
+                let below = wanted < p.lower && point.theta[*i] <= p.lower;
+                let above = wanted > p.upper && point.theta[*i] >= p.upper;
+                let outward = below || above;
                 if outward && !active[slot] {
                     active[slot] = true;
                     hit = true;
@@ -358,8 +383,15 @@ impl<P: Problem> Search<'_, P> {
         let n = self.free.len();
         let (scaled, _) = self.normal(&point);
         let blocks = self.grams(&point);
-        let scale: Vec<f64> = self.free.iter().map(|i| self.parameters[*i].scale).collect();
-        let inverse = scaled.clone().try_inverse().unwrap_or_else(|| DMatrix::from_element(n, n, f64::NAN));
+        let scale: Vec<f64> = self
+            .free
+            .iter()
+            .map(|i| self.parameters[*i].scale)
+            .collect();
+        let inverse = scaled
+            .clone()
+            .try_inverse()
+            .unwrap_or_else(|| DMatrix::from_element(n, n, f64::NAN));
         let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
         let mut scatter = DMatrix::zeros(n, n);
         for gram in &blocks {
@@ -397,6 +429,19 @@ impl<P: Problem> Search<'_, P> {
     }
 }
 
+/// No step helps: settled if even the undamped step promises nothing.
+fn stall(matrix: &DMatrix<f64>, gradient: &DVector<f64>, total: f64) -> FitStatus {
+    let promised = matrix
+        .clone()
+        .cholesky()
+        .map_or(f64::INFINITY, |c| gradient.dot(&c.solve(gradient)));
+    if promised < 1e-4 * total {
+        FitStatus::LossConverged
+    } else {
+        FitStatus::Stalled
+    }
+}
+
 /// `-(A + damping diag A)^-1 g` without the active parameters; zero where unsolvable.
 fn damped_step(
     matrix: &DMatrix<f64>,
@@ -417,7 +462,8 @@ fn damped_step(
             g[i] = 0.0;
         }
     }
-    a.cholesky().map_or_else(|| DVector::zeros(n), |c| -c.solve(&g))
+    a.cholesky()
+        .map_or_else(|| DVector::zeros(n), |c| -c.solve(&g))
 }
 
 fn condition(matrix: &DMatrix<f64>) -> f64 {

@@ -42,7 +42,10 @@ mod tests {
             for r in [-3.0, -1.0, -0.2, 0.4, 2.5] {
                 let h = 1e-6;
                 let slope = (loss.evaluate(r + h).0 - loss.evaluate(r - h).0) / (2.0 * h);
-                assert!((slope / (2.0 * r) - loss.evaluate(r).1).abs() < 1e-8, "{loss:?} {r}");
+                assert!(
+                    (slope / (2.0 * r) - loss.evaluate(r).1).abs() < 1e-8,
+                    "{loss:?} {r}"
+                );
             }
         }
     }

@@ -23,7 +23,8 @@ const SEEDS: usize = 4;
 /// One log to be reproduced; arrays are row-major `(n_samples, n_axes)`.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Velocity reference [rad/s] or commanded torque [Nm], as the problem's input asks.
+    /// Velocity reference [rad/s], commanded torque [Nm] or, when tracking, measured
+    /// position [rad], as the problem's input asks.
     pub input: Vec<f64>,
     /// Commanded torque [Nm] or measured position [rad], as the problem's output asks.
     pub target: Vec<f64>,
@@ -36,6 +37,9 @@ pub enum SimulationInput {
     Reference,
     /// Commanded torques, in open loop.
     Torque,
+    /// The logged torques (the targets), with feedback to the logged positions (the inputs):
+    /// the residual is the torque the feedback has to add.
+    Tracking,
 }
 
 /// What is compared.
@@ -94,7 +98,11 @@ impl SimulationErrorProblem {
         }
         if self.weighting.len() != n_axes {
             let got = self.weighting.len().to_string();
-            return invalid("weighting".into(), format!("one for each of {n_axes} axes"), got);
+            return invalid(
+                "weighting".into(),
+                format!("one for each of {n_axes} axes"),
+                got,
+            );
         }
         for weighting in &self.weighting {
             if let Err(e) = weighting.validate() {
@@ -105,7 +113,11 @@ impl SimulationErrorProblem {
             let (n, m) = (record.input.len(), record.target.len());
             if n != m || n == 0 || n % n_axes != 0 {
                 let expected = format!("input and target of equal size, {n_axes} axes");
-                return invalid(format!("records[{i}]"), expected, format!("{n} and {m} numbers"));
+                return invalid(
+                    format!("records[{i}]"),
+                    expected,
+                    format!("{n} and {m} numbers"),
+                );
             }
             if let Some(k) = record.target.iter().position(|v| !v.is_finite()) {
                 let got = format!("{} at sample {}", record.target[k], k / n_axes);
@@ -130,8 +142,19 @@ impl SimulationErrorProblem {
         let failed = |e: &dyn std::fmt::Display| ProblemError::Failed(e.to_string());
         let plant = Plant::new(&self.robot, &overrides, &settings).map_err(|e| failed(&e))?;
         let n_axes = plant.axes.len();
-        let inputs: Vec<&[f64]> = records.iter().map(|r| &self.records[*r].input[..]).collect();
-        let n_samples = records.iter().map(|r| self.n_samples(*r)).max().unwrap_or(0);
+        let inputs: Vec<&[f64]> = records
+            .iter()
+            .map(|r| &self.records[*r].input[..])
+            .collect();
+        let targets: Vec<&[f64]> = records
+            .iter()
+            .map(|r| &self.records[*r].target[..])
+            .collect();
+        let n_samples = records
+            .iter()
+            .map(|r| self.n_samples(*r))
+            .max()
+            .unwrap_or(0);
         let series = || vec![Vec::with_capacity(n_samples); records.len() * n_axes];
         let mut traces: Traces = (0..=seeds.len()).map(|_| series()).collect();
         let run = Run {
@@ -141,6 +164,10 @@ impl SimulationErrorProblem {
             drive: match self.input {
                 SimulationInput::Reference => Drive::Reference(&inputs),
                 SimulationInput::Torque => Drive::Torque(&inputs),
+                SimulationInput::Tracking => Drive::Tracking {
+                    torque: &targets,
+                    position: &inputs,
+                },
             },
             noise: &[],
             method: self.method,
@@ -166,11 +193,18 @@ impl SimulationErrorProblem {
             Status::Completed => Ok(traces),
             Status::Cancelled(_) => Err(ProblemError::Cancelled),
             Status::Diverged(k) => Err(failed(&format!("diverged at sample {k}"))),
-            Status::StepSizeCollapsed(k) => Err(failed(&format!("step size collapsed at sample {k}"))),
+            Status::StepSizeCollapsed(k) => {
+                Err(failed(&format!("step size collapsed at sample {k}")))
+            }
         }
     }
 
-    fn pass(&self, records: &[usize], theta: &[f64], seeds: &[usize]) -> Result<Traces, ProblemError> {
+    fn pass(
+        &self,
+        records: &[usize],
+        theta: &[f64],
+        seeds: &[usize],
+    ) -> Result<Traces, ProblemError> {
         match seeds.len() {
             0 => self.traces::<Lanes<LANES>>(records, theta, seeds),
             1 => self.traces::<Dual<Lanes<LANES>, 1>>(records, theta, seeds),
@@ -200,7 +234,11 @@ impl SimulationErrorProblem {
                     let second = (pair + 1).min(traces.len() - 1);
                     let (a, b) = plan.apply_pair(&traces[pair][slot], &traces[second][slot]);
                     out[pair][slot] = a;
-                    out[second][slot] = if second == pair { out[pair][slot].clone() } else { b };
+                    out[second][slot] = if second == pair {
+                        out[pair][slot].clone()
+                    } else {
+                        b
+                    };
                 }
             }
         }

@@ -46,7 +46,11 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
     fn from(joint: &Joint) -> Self {
         Self {
             motion: joint.motion,
-            origin: joint.origin.iter().any(|x| *x != 0.0).then_some(joint.origin),
+            origin: joint
+                .origin
+                .iter()
+                .any(|x| *x != 0.0)
+                .then_some(joint.origin),
             axis: joint.axis,
             body: joint.link.as_ref().map(Body::from),
         }
@@ -176,9 +180,8 @@ impl<S: Scalar> Chain<S> {
             if let Some(d) = &offset {
                 position = position + *d;
                 let w = &motion.angular;
-                motion.linear_acc = motion.linear_acc
-                    + motion.angular_acc.cross(d)
-                    + w.cross(&w.cross(d));
+                motion.linear_acc =
+                    motion.linear_acc + motion.angular_acc.cross(d) + w.cross(&w.cross(d));
             }
             let rate = axis.scale(v[i]);
             match joint.motion {
@@ -208,7 +211,10 @@ impl<S: Scalar> Chain<S> {
                 Motion::Revolute => {
                     state.bias[i] = axis.dot(&state.moment[i]);
                     let c = &state.composite[i];
-                    (axis.cross(&c.first), Mat3::symmetric(&c.second).apply(&axis))
+                    (
+                        axis.cross(&c.first),
+                        Mat3::symmetric(&c.second).apply(&axis),
+                    )
                 }
                 Motion::Prismatic => {
                     state.bias[i] = axis.dot(&state.force[i]);

@@ -26,6 +26,12 @@ pub enum EquilibriumError {
         /// Angles given.
         got: usize,
     },
+    /// A gear cannot carry its static load, or a parameter is not finite.
+    #[error("axis {axis}: expected a gear that carries its static load, got no finite deflection")]
+    NoDeflection {
+        /// Driven axis, from 1.
+        axis: usize,
+    },
     /// The elastic joints do not settle.
     #[error(
         "elastic joints do not settle under gravity (last change {change:.1e} rad): \
@@ -72,7 +78,7 @@ pub fn equilibrium<S: Scalar>(
         // One more iteration once the value is settled, for the derivatives.
         settled_for = if change < 1e-16 { settled_for + 1 } else { 0 };
         if settled_for == 3 {
-            return Ok(hold(plant, q, &state.bias));
+            return hold(plant, q, &state.bias);
         }
     }
     Err(EquilibriumError::NotSettled { change })
@@ -85,20 +91,31 @@ fn settle_step<S: Scalar>(plant: &Plant<S>, gravity: &[S], q: &mut [S]) -> f64 {
         for lane in 0..S::LANES {
             let change = (next.lane(lane) - q[*joint].lane(lane)).abs();
             // A NaN must not pass for settled.
-            largest = if change.is_nan() { f64::INFINITY } else { largest.max(change) };
+            largest = if change.is_nan() {
+                f64::INFINITY
+            } else {
+                largest.max(change)
+            };
         }
         q[*joint] = next;
     }
     largest
 }
 
-fn hold<S: Scalar>(plant: &Plant<S>, q: Vec<S>, gravity: &[S]) -> Equilibrium<S> {
+fn hold<S: Scalar>(
+    plant: &Plant<S>,
+    q: Vec<S>,
+    gravity: &[S],
+) -> Result<Equilibrium<S>, EquilibriumError> {
     let mut motor_angle = Vec::with_capacity(plant.axes.len());
     let mut motor_torque = Vec::with_capacity(plant.axes.len());
-    for axis in &plant.axes {
+    for (number, axis) in plant.axes.iter().enumerate() {
         let joint_angle = q[axis.joint];
         let load = gravity[axis.joint] - axis.joint_torque(joint_angle);
         let angle = axis.motor_angle_at_rest(joint_angle, load);
+        if (0..S::LANES).any(|lane| !angle.lane(lane).is_finite()) {
+            return Err(EquilibriumError::NoDeflection { axis: number + 1 });
+        }
         motor_angle.push(angle);
         let mut command = axis.motor_torque_at_rest(angle, load);
         for kernel in axis.kernels.iter().rev() {
@@ -106,9 +123,9 @@ fn hold<S: Scalar>(plant: &Plant<S>, q: Vec<S>, gravity: &[S]) -> Equilibrium<S>
         }
         motor_torque.push(command);
     }
-    Equilibrium {
+    Ok(Equilibrium {
         joint_angle: q,
         motor_angle,
         motor_torque,
-    }
+    })
 }

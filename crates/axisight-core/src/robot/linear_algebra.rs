@@ -37,7 +37,9 @@ mod tests {
     fn solves_a_known_system() {
         // A = G G^T with a fixed G, x chosen, b = A x.
         let n = 4;
-        let g = [1.0, 0.3, -0.2, 0.7, 0.0, 2.0, 0.4, -1.1, 0.5, 0.0, 1.5, 0.3, -0.6, 0.2, 0.0, 1.2];
+        let g = [
+            1.0, 0.3, -0.2, 0.7, 0.0, 2.0, 0.4, -1.1, 0.5, 0.0, 1.5, 0.3, -0.6, 0.2, 0.0, 1.2,
+        ];
         let mut a = vec![0.0_f64; n * n];
         for i in 0..n {
             for j in 0..n {
@@ -45,7 +47,9 @@ mod tests {
             }
         }
         let x = [1.0, -2.0, 0.5, 3.0];
-        let mut b: Vec<f64> = (0..n).map(|i| (0..n).map(|j| a[i * n + j] * x[j]).sum()).collect();
+        let mut b: Vec<f64> = (0..n)
+            .map(|i| (0..n).map(|j| a[i * n + j] * x[j]).sum())
+            .collect();
         solve_symmetric(&mut a, &mut b, n);
         for (got, want) in b.iter().zip(x) {
             assert!((got - want).abs() < 1e-12, "{got} {want}");

@@ -11,6 +11,9 @@ const WIDTH: usize = 8;
 type D = Dual<f64, WIDTH>;
 
 /// `x' = A x + B u`, `phi = C x` around an equilibrium; states `[phi, q, phi', q']`.
+///
+/// `u` is the torque the drives deliver: effects of the torque path (gain, delay,
+/// lag) come before it and are not in `B`.
 #[derive(Debug, Clone)]
 pub struct Linearization {
     /// State matrix, `(n_states, n_states)`.
@@ -64,11 +67,19 @@ pub fn linearize(
                 let column = offset + i;
                 let inside = (first..first + WIDTH).contains(&column);
                 let constant = D::constant(*v);
-                if inside { constant.seeded(column - first) } else { constant }
+                if inside {
+                    constant.seeded(column - first)
+                } else {
+                    constant
+                }
             });
             lifted.collect()
         };
-        let (x, tau, command) = (seed(&x0, 0), seed(&applied, nx), seed(&rest.motor_torque, nx));
+        let (x, tau, command) = (
+            seed(&x0, 0),
+            seed(&applied, nx),
+            seed(&rest.motor_torque, nx),
+        );
         plant.derivative(&x, &tau, &command, &mut scratch, &mut dx);
         for column in first..(first + WIDTH).min(nx + nu) {
             for (row, d) in dx.iter().enumerate() {

@@ -44,18 +44,25 @@ pub fn modes(linear: &Linearization) -> Result<Vec<Mode>, ModesError> {
 }
 
 fn mode(eigenvalue: Complex<f64>, column: &[faer::c64]) -> Mode {
-    let largest = column
-        .iter()
-        .map(|c| Complex::new(c.re, c.im))
-        .fold(Complex::new(0.0, 0.0), |a: Complex<f64>, c| {
+    let largest = column.iter().map(|c| Complex::new(c.re, c.im)).fold(
+        Complex::new(0.0, 0.0),
+        |a: Complex<f64>, c| {
             if c.norm() > a.norm() { c } else { a }
-        });
+        },
+    );
     let magnitude = eigenvalue.norm();
     Mode {
         eigenvalue,
         frequency_hz: magnitude / std::f64::consts::TAU,
-        damping_ratio: if magnitude > 0.0 { -eigenvalue.re / magnitude } else { 0.0 },
-        shape: column.iter().map(|c| Complex::new(c.re, c.im) / largest).collect(),
+        damping_ratio: if magnitude > 0.0 {
+            -eigenvalue.re / magnitude
+        } else {
+            0.0
+        },
+        shape: column
+            .iter()
+            .map(|c| Complex::new(c.re, c.im) / largest)
+            .collect(),
     }
 }
 
@@ -71,8 +78,12 @@ pub fn zoh_frequency_response(
 ) -> Vec<Option<DMatrix<Complex<f64>>>> {
     let (nx, nu) = (linear.a.nrows(), linear.b.ncols());
     let mut joint = DMatrix::zeros(nx + nu, nx + nu);
-    joint.view_mut((0, 0), (nx, nx)).copy_from(&(&linear.a * sample_time));
-    joint.view_mut((0, nx), (nx, nu)).copy_from(&(&linear.b * sample_time));
+    joint
+        .view_mut((0, 0), (nx, nx))
+        .copy_from(&(&linear.a * sample_time));
+    joint
+        .view_mut((0, nx), (nx, nu))
+        .copy_from(&(&linear.b * sample_time));
     let held = joint.exp();
     let lift = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
     let a_d = lift(held.view((0, 0), (nx, nx)).into_owned());

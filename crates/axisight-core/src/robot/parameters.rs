@@ -63,7 +63,11 @@ impl Parameter {
             .find(|p| p.name(robot) == name)
             .ok_or_else(|| ParameterError {
                 name: name.to_owned(),
-                expected: all.iter().map(|p| p.name(robot)).collect::<Vec<_>>().join(", "),
+                expected: all
+                    .iter()
+                    .map(|p| p.name(robot))
+                    .collect::<Vec<_>>()
+                    .join(", "),
             })
     }
 
@@ -81,7 +85,10 @@ impl Parameter {
 
     /// Name, e.g. `axis2.stiffness`.
     pub fn name(self, robot: &RobotDescription) -> String {
-        let joint = robot.joints.get(self.joint()).map_or("?", |j| j.name.as_str());
+        let joint = robot
+            .joints
+            .get(self.joint())
+            .map_or("?", |j| j.name.as_str());
         let quantity = match self {
             Self::Mass(_) => "mass",
             Self::InertiaScale(_) => "inertia_scale",
@@ -139,7 +146,11 @@ impl Parameter {
 
     /// Set a mass property of the chain; other parameters are left to the plant.
     pub(super) fn apply_to_chain<S: Scalar>(self, value: S, chain: &mut Chain<S>) {
-        let Some(body) = chain.joints.get_mut(self.joint()).and_then(|j| j.body.as_mut()) else {
+        let Some(body) = chain
+            .joints
+            .get_mut(self.joint())
+            .and_then(|j| j.body.as_mut())
+        else {
             return;
         };
         match self {

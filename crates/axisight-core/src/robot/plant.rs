@@ -27,6 +27,14 @@ pub struct EffectSetting<S> {
 /// Why a plant cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
+    /// Effects or fitted parameters leave a link without mass.
+    #[error("mass of the link of joint {joint}: expected more than 0 kg, got {got}")]
+    Mass {
+        /// Joint, from 1.
+        joint: usize,
+        /// Mass [kg].
+        got: f64,
+    },
     /// An effect is misused.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -105,12 +113,33 @@ impl<S: Scalar> Plant<S> {
             chain,
             axes: axes(robot, &value_of),
             elastic: elastic_joints(robot, &value_of),
-            n_motors: robot.driven().filter(|(_, j, _)| j.compliance.is_some()).count(),
+            n_motors: robot
+                .driven()
+                .filter(|(_, j, _)| j.compliance.is_some())
+                .count(),
         };
         for setting in settings {
             plant.add_effect(setting)?;
         }
+        plant.check_masses()?;
         Ok(plant)
+    }
+
+    /// Effects may take mass away, but not all of it.
+    fn check_masses(&self) -> Result<(), PlantError> {
+        for (i, joint) in self.chain.joints.iter().enumerate() {
+            let Some(body) = &joint.body else { continue };
+            let lightest = (0..S::LANES)
+                .map(|lane| body.mass.lane(lane))
+                .fold(f64::INFINITY, f64::min);
+            if lightest <= 0.0 {
+                return Err(PlantError::Mass {
+                    joint: i + 1,
+                    got: lightest,
+                });
+            }
+        }
+        Ok(())
     }
 
     fn add_effect(&mut self, setting: &EffectSetting<S>) -> Result<(), PlantError> {
@@ -312,12 +341,7 @@ struct AxisTorque<S> {
 }
 
 #[inline]
-fn gear_torque<S: Scalar>(
-    gear: &Gear<S>,
-    kernels: &[Arc<dyn Kernel<S>>],
-    delta: S,
-    rate: S,
-) -> S {
+fn gear_torque<S: Scalar>(gear: &Gear<S>, kernels: &[Arc<dyn Kernel<S>>], delta: S, rate: S) -> S {
     let (mut loaded, mut slope) = (delta, S::one());
     for kernel in kernels {
         let (next, factor) = kernel.deflection(loaded);
@@ -365,7 +389,13 @@ fn elastic_joints<S: Scalar>(
     let is_elastic = |i: &usize| robot.joints[*i].drive.is_none();
     (0..robot.joints.len())
         .filter(is_elastic)
-        .map(|i| (i, value_of(Parameter::Stiffness(i)), value_of(Parameter::Damping(i))))
+        .map(|i| {
+            (
+                i,
+                value_of(Parameter::Stiffness(i)),
+                value_of(Parameter::Damping(i)),
+            )
+        })
         .collect()
 }
 
@@ -402,7 +432,10 @@ impl<S: Scalar> Axis<S> {
         let wanted = joint_angle + self.static_deflection(load);
         let mut angle = wanted * (1.0 / self.ratio);
         for _ in 0..60 {
-            let errors = self.on_gear.iter().filter_map(|k| k.transmission_error(angle));
+            let errors = self
+                .on_gear
+                .iter()
+                .filter_map(|k| k.transmission_error(angle));
             let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
                 break;
             };
@@ -413,25 +446,29 @@ impl<S: Scalar> Axis<S> {
 
     /// Motor torque that carries a static load [Nm, joint side] at a motor angle.
     pub(super) fn motor_torque_at_rest(&self, angle: S, load: S) -> S {
-        let slopes = self.on_gear.iter().filter_map(|k| k.transmission_error(angle));
+        let slopes = self
+            .on_gear
+            .iter()
+            .filter_map(|k| k.transmission_error(angle));
         load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
     }
 
     /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
     ///
-    /// Simplified Newton iteration with the linear stiffness as slope; it contracts
-    /// by the share of the nonlinear part, so it is run until that is negligible.
+    /// Fixed-point iteration on the secant stiffness, halfway at a time: for a hardening
+    /// spring the error at least halves each time, however hard it gets.
     fn static_deflection(&self, load: S) -> S {
         let Some(gear) = &self.gear else {
             return S::zero();
         };
         let mut loaded = load / gear.stiffness;
         for _ in 0..60 {
-            let mut torque = gear.stiffness * loaded;
+            let mut extra = S::zero();
             for kernel in &self.on_gear {
-                torque += kernel.gear_torque(loaded);
+                extra += kernel.gear_torque(loaded);
             }
-            loaded += (load - torque) / gear.stiffness;
+            let secant = loaded.abs().if_positive(extra / loaded, S::zero());
+            loaded = (loaded + load / (gear.stiffness + secant)) * 0.5;
         }
         self.on_gear
             .iter()

@@ -95,7 +95,12 @@ impl RigidBody {
     ///
     /// # Errors
     /// [`ShapeError`].
-    pub fn inverse_dynamics(&self, q: &[f64], v: &[f64], a: &[f64]) -> Result<Vec<f64>, ShapeError> {
+    pub fn inverse_dynamics(
+        &self,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+    ) -> Result<Vec<f64>, ShapeError> {
         self.check("a", a)?;
         let state = self.evaluate(q, v)?;
         let n = a.len();

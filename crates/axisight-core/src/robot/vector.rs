@@ -73,11 +73,7 @@ impl<S: Scalar> Mat3<S> {
     /// The symmetric matrix with entries xx yy zz xy xz yz.
     #[inline(always)]
     pub fn symmetric(m: &[S; 6]) -> Self {
-        Self([
-            [m[0], m[3], m[4]],
-            [m[3], m[1], m[5]],
-            [m[4], m[5], m[2]],
-        ])
+        Self([[m[0], m[3], m[4]], [m[3], m[1], m[5]], [m[4], m[5], m[2]]])
     }
     /// Matrix times vector.
     #[inline(always)]

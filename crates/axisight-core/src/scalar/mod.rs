@@ -63,7 +63,7 @@ pub trait Scalar:
     /// Exponential; relative error below 3e-16, zero below -708.
     #[must_use]
     fn exp(self) -> Self;
-    /// Hyperbolic tangent; absolute error below 3e-16.
+    /// Hyperbolic tangent; absolute error below 5e-16.
     #[must_use]
     fn tanh(self) -> Self;
     /// `a` in the lanes where `self > 0`, `b` elsewhere (also where `self` is NaN).

@@ -65,13 +65,25 @@ impl Weighting {
         };
         if self.frequency_hz.is_empty() || self.frequency_hz.len() != self.weight.len() {
             let got = format!("{} and {}", self.frequency_hz.len(), self.weight.len());
-            return fail("weight", "as many weights as frequencies, at least one", got);
+            return fail(
+                "weight",
+                "as many weights as frequencies, at least one",
+                got,
+            );
         }
         if !self.frequency_hz.windows(2).all(|w| w[0] < w[1]) {
-            return fail("frequency_hz", "increasing frequencies", format!("{:?}", self.frequency_hz));
+            return fail(
+                "frequency_hz",
+                "increasing frequencies",
+                format!("{:?}", self.frequency_hz),
+            );
         }
         if !self.weight.iter().all(|w| w.is_finite() && *w >= 0.0) {
-            return fail("weight", "finite weights not below zero", format!("{:?}", self.weight));
+            return fail(
+                "weight",
+                "finite weights not below zero",
+                format!("{:?}", self.weight),
+            );
         }
         if self.decimation == 0 {
             return fail("decimation", "at least 1", "0".to_owned());
@@ -82,7 +94,11 @@ impl Weighting {
     fn at(&self, frequency_hz: f64) -> f64 {
         let next = self.frequency_hz.partition_point(|f| *f <= frequency_hz);
         let (Some(after), Some(before)) = (self.weight.get(next), next.checked_sub(1)) else {
-            let edge = if next == 0 { self.weight.first() } else { self.weight.last() };
+            let edge = if next == 0 {
+                self.weight.first()
+            } else {
+                self.weight.last()
+            };
             return edge.copied().unwrap_or(0.0);
         };
         let (f0, f1) = (self.frequency_hz[before], self.frequency_hz[next]);
@@ -106,7 +122,11 @@ impl Weighting {
         let gain = (0..=kept)
             .map(|k| {
                 let dropped = k == kept && self.decimation > 1;
-                if dropped { 0.0 } else { self.at(k as f64 * resolution) * scale }
+                if dropped {
+                    0.0
+                } else {
+                    self.at(k as f64 * resolution) * scale
+                }
             })
             .collect();
         Weighter {
@@ -148,7 +168,9 @@ mod tests {
 
     #[test]
     fn flat_weight_returns_the_series() {
-        let x: Vec<f64> = (0..50).map(|i| (f64::from(i) * 0.37).sin() + 0.1 * f64::from(i)).collect();
+        let x: Vec<f64> = (0..50)
+            .map(|i| (f64::from(i) * 0.37).sin() + 0.1 * f64::from(i))
+            .collect();
         let y: Vec<f64> = x.iter().map(|v| 1.0 - v * v).collect();
         let (a, b) = Weighting::flat().plan(50, 0.01).apply_pair(&x, &y);
         for i in 0..50 {

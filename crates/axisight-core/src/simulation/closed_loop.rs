@@ -14,6 +14,16 @@ pub enum Drive<'a> {
     Reference(&'a [&'a [f64]]),
     /// Commanded torques, no controller [Nm].
     Torque(&'a [&'a [f64]]),
+    /// A logged run: its commanded torques [Nm], plus what the controller's feedback adds
+    /// to keep the simulation on the logged positions [rad]. In a linear loop the added
+    /// torque is what a run driven by references would be off by; in a nonlinear one the
+    /// simulation also stays in phase with the log (lost motion, stiction).
+    Tracking {
+        /// Logged torque commands.
+        torque: &'a [&'a [f64]],
+        /// Logged motor positions.
+        position: &'a [&'a [f64]],
+    },
 }
 
 /// A run to simulate.
@@ -124,24 +134,28 @@ pub fn simulate<S: Scalar>(
         signals.command(run, k, &mut controller);
         signals.disturb(plant, &x);
         observe(&signals.sample(k, &x));
-        for (path, u) in paths.iter_mut().zip(&signals.command) {
-            path.push(*u);
-        }
+        let taken: Vec<S> = paths
+            .iter_mut()
+            .zip(&signals.command)
+            .map(|(path, u)| path.push(*u))
+            .collect();
         let interval = Interval {
             plant,
             command: &signals.command,
             sample_time: run.sample_time,
         };
         let met = interval.advance(run.method, &mut x, &mut substeps, stepper, |n| {
-            sample_lines(&paths, &signals.command, n, &mut scratch_lines)
+            sample_lines(&paths, &taken, n, &mut scratch_lines)
         });
-        if x.iter().any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite())) {
+        if x.iter()
+            .any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite()))
+        {
             return Ok(Status::Diverged(k));
         }
         if !met {
             return Ok(Status::StepSizeCollapsed(k));
         }
-        for (path, u) in paths.iter_mut().zip(&signals.command) {
+        for (path, u) in paths.iter_mut().zip(&taken) {
             path.advance(*u);
         }
     }
@@ -206,6 +220,13 @@ impl<S: Scalar> Signals<S> {
                     self.command[i] = lane_value(torque, k, i, n);
                 }
             }
+            Drive::Tracking { torque, position } => {
+                for i in 0..n {
+                    self.reference[i] = lane_value(position, k, i, n);
+                    self.command[i] = lane_value(torque, k, i, n);
+                }
+                controller.follow(&self.measured, &self.reference, &mut self.command);
+            }
             Drive::Reference(reference) => {
                 for i in 0..n {
                     self.reference[i] = lane_value(reference, k, i, n);
@@ -238,7 +259,10 @@ impl<S: Scalar> Signals<S> {
 fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
     S::from_lanes(|lane| {
         let array = arrays.get(lane).or_else(|| arrays.last());
-        array.and_then(|a| a.get(k * n_axes + axis)).copied().unwrap_or(0.0)
+        array
+            .and_then(|a| a.get(k * n_axes + axis))
+            .copied()
+            .unwrap_or(0.0)
     })
 }
 
@@ -249,20 +273,40 @@ fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simulation
         got,
     };
     let (field, arrays) = match run.drive {
-        Drive::Reference(_) if *run.controller == Controller::None => {
+        Drive::Reference(_) | Drive::Tracking { .. } if *run.controller == Controller::None => {
             return Err(SimulationError::NoController);
+        }
+        Drive::Tracking { torque, position } => {
+            let same = torque.iter().map(|t| t.len()).eq(position.iter().map(|p| p.len()));
+            if !same {
+                let got = format!("{} runs", position.len());
+                return Err(shape("position", "the shape of torque".to_owned(), got));
+            }
+            ("torque", torque)
         }
         Drive::Reference(r) => ("velocity_ref", r),
         Drive::Torque(t) => ("torque", t),
     };
     if !(run.sample_time.is_finite() && run.sample_time > 0.0) {
         let got = run.sample_time.to_string();
-        return Err(shape("sample_time", "a positive time in seconds".to_owned(), got));
+        return Err(shape(
+            "sample_time",
+            "a positive time in seconds".to_owned(),
+            got,
+        ));
     }
     if arrays.is_empty() || arrays.len() > lanes {
-        return Err(shape(field, format!("1 to {lanes} runs"), arrays.len().to_string()));
+        return Err(shape(
+            field,
+            format!("1 to {lanes} runs"),
+            arrays.len().to_string(),
+        ));
     }
-    for (name, set) in [(field, arrays), ("noise", run.noise)] {
+    let positions = match run.drive {
+        Drive::Tracking { position, .. } => position,
+        _ => &[],
+    };
+    for (name, set) in [(field, arrays), ("noise", run.noise), ("position", positions)] {
         for array in set {
             if array.len() % n_axes != 0 || array.is_empty() {
                 let expected = format!("samples of {n_axes} axes");

@@ -11,6 +11,7 @@ pub(super) struct ControlLoop<S> {
     reference_angle: Vec<S>,
     previous: Option<Vec<S>>,
     integral: Vec<S>,
+    first_lag: Option<Vec<S>>,
 }
 
 impl<S: Scalar> ControlLoop<S> {
@@ -28,6 +29,7 @@ impl<S: Scalar> ControlLoop<S> {
             reference_angle: angle.to_vec(),
             previous: None,
             integral: vec![S::zero(); angle.len()],
+            first_lag: None,
         }
     }
 
@@ -48,6 +50,21 @@ impl<S: Scalar> ControlLoop<S> {
             Some(previous) => previous.copy_from_slice(measured),
             None => self.previous = Some(measured.to_vec()),
         }
+    }
+
+    /// Add to `command` the feedback that keeps `measured` on the logged positions
+    /// `logged`, both counted from their first sample.
+    pub(super) fn follow(&mut self, measured: &[S], logged: &[S], command: &mut [S]) {
+        let rate = 1.0 / self.sample_time;
+        // The lag behind the log takes the place of the measured angle of an ordinary loop.
+        let lag: Vec<S> = measured.iter().zip(logged).map(|(m, l)| *m - *l).collect();
+        let first = self.first_lag.get_or_insert_with(|| lag.clone()).clone();
+        for i in 0..lag.len() {
+            let behind = lag[i] - first[i];
+            let speed = self.previous.as_ref().map_or_else(S::zero, |p| (lag[i] - p[i]) * rate);
+            command[i] += self.feedback(i, -speed, -behind);
+        }
+        self.previous = Some(lag);
     }
 
     fn feedback(&mut self, i: usize, speed_error: S, angle_error: S) -> S {

@@ -86,7 +86,11 @@ pub(super) fn step<S: Scalar>(
         for lane in 0..S::LANES {
             let size = x[i].lane(lane).abs().max(SMALLEST_STATE);
             let relative = error.lane(lane).abs() / size;
-            worst = if relative.is_nan() { f64::NAN } else { worst.max(relative) };
+            worst = if relative.is_nan() {
+                f64::NAN
+            } else {
+                worst.max(relative)
+            };
             if worst.is_nan() {
                 return worst;
             }

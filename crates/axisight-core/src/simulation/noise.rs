@@ -7,7 +7,13 @@ use rand_distr::{Distribution, StandardNormal};
 /// White Gaussian position noise of standard deviation `std` [rad], row-major
 /// `(n_samples, n_axes)`. Each axis has its own stream, so the noise of one
 /// axis does not depend on how many others there are.
-pub fn measurement_noise(seed: u64, run: u64, n_samples: usize, n_axes: usize, std: f64) -> Vec<f64> {
+pub fn measurement_noise(
+    seed: u64,
+    run: u64,
+    n_samples: usize,
+    n_axes: usize,
+    std: f64,
+) -> Vec<f64> {
     let mut out = vec![0.0; n_samples * n_axes];
     for axis in 0..n_axes {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

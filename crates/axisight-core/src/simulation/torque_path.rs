@@ -1,6 +1,6 @@
 //! From commanded torque to the torque the drive delivers inside a sample.
 //!
-//! Command -> transport delay -> current-loop lag -> torque constant and offset.
+//! Command -> limit -> transport delay -> current-loop lag -> torque constant and offset.
 //! Delay and lag make the torque vary inside a sample. It is handed to the
 //! integrator as the straight line with the same mean and first moment over
 //! each sub-step: velocity and position at the end of the step, which depend
@@ -28,7 +28,7 @@ impl<S: Scalar> Line<S> {
 }
 
 /// Keeps a lag of zero from dividing by zero; far below any time that matters.
-const SHORTEST_LAG_S: f64 = 1e-12;
+const SHORTEST_LAG_S: f64 = 1e-18;
 
 /// Torque path of one axis.
 pub(super) struct TorquePath<S> {
@@ -74,14 +74,16 @@ impl<S: Scalar> TorquePath<S> {
         }
     }
 
-    /// Take the command of a new sample.
-    pub(super) fn push(&mut self, command: S) {
+    /// Take the command of a new sample; returns what the drive makes of it.
+    pub(super) fn push(&mut self, command: S) -> S {
+        let command = self.kernels.iter().fold(command, |u, k| k.command(u));
         if let Some(delay) = &mut self.delay {
             delay.history.rotate_left(1);
             if let Some(newest) = delay.history.last_mut() {
                 *newest = command;
             }
         }
+        command
     }
 
     /// Torque lines over `n` equal sub-steps of the sample, for the command `command`.
@@ -131,7 +133,10 @@ impl<S: Scalar> TorquePath<S> {
         // First moment about the middle of the sub-step, for unit width.
         let tilt = first * (1.0 / (width * width)) - mean * 0.5;
         // Drive kernels are affine (gain and offset), so they commute with the moments.
-        let (low, high) = (self.delivered(mean - tilt * 6.0), self.delivered(mean + tilt * 6.0));
+        let (low, high) = (
+            self.delivered(mean - tilt * 6.0),
+            self.delivered(mean + tilt * 6.0),
+        );
         Line {
             mean: (low + high) * 0.5,
             slope: high - low,

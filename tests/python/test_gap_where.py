@@ -1,0 +1,119 @@
+"""Where the gap lies: bands and regimes found where an error was put."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from axisight.gap.howfar import gap_figures, gap_reduction, stage
+from axisight.gap.orders import strongest_orders
+from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.logs import Log
+
+T = 1e-3
+N = 20_000
+
+
+def a_log(torque: np.ndarray, position: np.ndarray) -> Log:
+    return Log(
+        name="log",
+        source=Path("log.parquet"),
+        sample_time_s=T,
+        time_s=np.arange(len(torque)) * T,
+        velocity_ref_rad_s=None,
+        torque_nm=torque,
+        position_rad=position,
+    )
+
+
+@pytest.fixture
+def base() -> tuple[Log, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(3)
+    time = np.arange(N) * T
+    position = np.stack([20 * np.sin(2 * np.pi * 0.3 * time), 10 * np.cos(2 * np.pi * 0.2 * time)], 1)
+    torque = rng.normal(size=(N, 2)) + np.sin(2 * np.pi * 0.3 * time)[:, None]
+    noise = 0.01 * rng.normal(size=(N, 2))
+    error = 0.01 * rng.normal(size=(N, 2))
+    return a_log(torque, position), error, noise
+
+
+def test_a_tone_is_found_on_its_axis_and_in_its_band(base):
+    log, error, noise = base
+    error[:, 1] += 0.2 * np.sin(2 * np.pi * 9.0 * log.time_s)
+    bands = band_map([ErrorLog(log, error, noise)], 1.0)
+    assert float(bands.share.sel(axis=2, band="6-15 Hz")) > 0.95
+    assert float(bands.significance.sel(axis=2, band="6-15 Hz")) > 10
+    places = findings(bands, regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0), 3.0)
+    assert [p.axis for p in places] == [2]
+    assert places[0].band_hz == (6.0, 15.0)
+
+
+def test_noise_alone_is_no_finding(base):
+    log, error, noise = base
+    bands = band_map([ErrorLog(log, error, noise)], 1.0)
+    # 14 cells: three standard errors happen once in 700, so four is asked for here.
+    assert float(bands.significance.max()) < 4.0
+    # The lowest band holds two lines of each of ten blocks: a chi-square of 20 degrees over
+    # another, which stays within a factor 3 in all but one case of a hundred.
+    assert float(bands.excess.max()) < 3.0
+    assert float(bands.excess.min()) > 1 / 3
+
+
+def test_an_error_around_reversals_is_found_there(base):
+    log, error, noise = base
+    speed = np.gradient(log.position_rad[:, 0], T)
+    error[np.abs(speed) < 0.5, 0] += 0.5
+    maps = regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0)
+    assert float(maps["direction"].share.sel(axis=1, bin="around reversals")) > 0.8
+
+
+def test_a_drift_is_found_in_time(base):
+    log, error, noise = base
+    error[:, 0] += 0.3 * (log.time_s > 14.0)
+    maps = regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0)
+    assert float(maps["time"].share.sel(axis=1, bin="last third")) > 0.9
+
+
+def test_shares_of_an_axis_sum_to_one(base):
+    log, error, noise = base
+    error += 0.1
+    for data in regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0).values():
+        np.testing.assert_allclose(data.share.sum("bin"), 1.0)
+
+
+def test_gap_is_the_root_mean_square_over_axes_and_logs(base):
+    log, _, _ = base
+    variance = log.torque_nm.var(axis=0)
+    errors = [np.sqrt(variance) * np.array([0.3, 0.4]) * np.ones((N, 2))]
+    given = stage([log], errors, 1.0)
+    zero = stage([log], [np.zeros((N, 2))], 1.0)
+    gap = gap_figures(given, given, zero, zero)
+    assert gap.before == pytest.approx(np.sqrt((0.09 + 0.16) / 2))
+    np.testing.assert_allclose(gap.before_per_axis, [0.3, 0.4])
+    assert gap.after == 0.0
+
+
+def test_gap_reduction_is_the_share_of_the_explainable_gap(base):
+    log, _, _ = base
+    rng = np.random.default_rng(5)
+    wave = rng.normal(size=(N, 2))
+    given, half, floor = (stage([log], [k * wave], 1.0) for k in (1.0, 0.5, 0.2))
+    found = gap_reduction(given, half, given, floor, draws=300, seed=1)
+    # (1 - 0.25) / (1 - 0.04); all blocks alike, so the interval is narrow.
+    assert found.value == pytest.approx(0.75 / 0.96, rel=1e-9)
+    assert found.low <= found.value <= found.high
+    assert found.high - found.low < 0.01
+    again = gap_reduction(given, half, given, floor, draws=300, seed=1)
+    assert again == found
+
+
+def test_orders_are_found_in_a_noisy_ripple():
+    rng = np.random.default_rng(7)
+    time = np.arange(N) * T
+    angle = 3 * time + 0.5 * np.sin(time)
+    speed = np.gradient(angle, T)
+    ripple = 0.2 * np.cos(7 * angle + 1) + 0.1 * np.sin(18 * angle)
+    found = strongest_orders(
+        [ripple + 0.2 * rng.normal(size=N)], [angle], [speed], count=2, bandwidth_hz=20.0
+    )
+    assert found == [7, 18]
