@@ -60,12 +60,17 @@ def story(
 
     at = motion(estimation, cutoff_hz)
     missing = at[3][:, 0] - predicted_torque(robot, AS_GIVEN, at)[:, 0]
-    explained = predicted_torque(robot, after, at)[:, 0] - predicted_torque(robot, AS_GIVEN, at)[:, 0]
+    explained = (
+        predicted_torque(robot, after, at)[:, 0] - predicted_torque(robot, AS_GIVEN, at)[:, 0]
+    )
     order = np.argsort(at[1][:, 0])
     left.plot(at[1][::10, 0], missing[::10], ".", ms=2, color="0.7", label="measured - simulator")
     left.plot(at[1][order, 0], explained[order], color="#d55e00", lw=2, label="named effects")
     left.set(
-        xlabel="velocity [m/s]", ylabel="missing force [N]", title="What the simulator lacks", ylim=(-90, 90)
+        xlabel="velocity [m/s]",
+        ylabel="missing force [N]",
+        title="What the simulator lacks",
+        ylim=(-90, 90),
     )
     left.legend(loc="upper left", fontsize=8)
 
@@ -76,15 +81,24 @@ def story(
     after_force = predicted_torque(robot, after, at)[:, 0]
     right.plot(time[window], at[3][window, 0], color="0.2", lw=1, label="measured")
     right.plot(
-        time[window], before_force[window], color="#0072b2", lw=1,
+        time[window],
+        before_force[window],
+        color="#0072b2",
+        lw=1,
         label=f"simulator as given: {100 * found.gap.before:.0f} % unexplained",
     )
     right.plot(
-        time[window], after_force[window], color="#d55e00", lw=1, ls="--",
+        time[window],
+        after_force[window],
+        color="#d55e00",
+        lw=1,
+        ls="--",
         label=f"with the named effects: {100 * found.gap.after:.1f} %",
     )
     right.set(
-        xlabel="time [s]", ylabel="force [N]", title="A run it has not seen (with 5 V pulses)",
+        xlabel="time [s]",
+        ylabel="force [N]",
+        title="A run it has not seen (with 5 V pulses)",
         ylim=(-230, 290),
     )
     right.legend(loc="upper center", fontsize=8, ncols=3, handlelength=1.5, columnspacing=1.2)
@@ -104,9 +118,7 @@ def main() -> int:
     columns = HERE / "columns.toml"
     estimation = axisight.read_log(arguments.data / "DATA_EMPS.mat", columns)
     held = axisight.read_log(arguments.data / "DATA_EMPS_PULSES.mat", columns)
-    found = axisight.diagnose(
-        robot=robot, estimation=[estimation], validation=[held], name="EMPS"
-    )
+    found = axisight.diagnose(robot=robot, estimation=[estimation], validation=[held], name="EMPS")
     print(found.headline)
     ours = found_parameters(robot, found)
     for name, published in PUBLISHED.items():

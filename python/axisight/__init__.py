@@ -21,6 +21,7 @@ from axisight.fitting import (
 )
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.logs import Case, Log, check_log, read_case, read_log
+from axisight.plots import plot_gap_map, plot_log, plot_overlay, plot_ranking, plot_simulation
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
 
@@ -49,6 +50,11 @@ __all__ = [
     "effect_table",
     "fit",
     "load_robot",
+    "plot_gap_map",
+    "plot_log",
+    "plot_overlay",
+    "plot_ranking",
+    "plot_simulation",
     "read_case",
     "read_log",
     "robot_parameter",

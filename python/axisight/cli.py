@@ -82,7 +82,9 @@ def _tolerances(given: list[str]) -> Settings:
         except ValueError:
             raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
         if name not in settings.tolerances:
-            raise InputError(f"--tolerance: expected one of {', '.join(settings.tolerances)}, got {name!r}")
+            raise InputError(
+                f"--tolerance: expected one of {', '.join(settings.tolerances)}, got {name!r}"
+            )
         if not 0 < changed[name] < 1:
             raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
     return replace(settings, tolerances=changed)
@@ -198,7 +200,9 @@ def effects() -> None:
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the case, the verdict and the report.")] = Path("demo"),
+    out: Annotated[
+        Path, typer.Option(help="Folder for the case, the verdict and the report.")
+    ] = Path("demo"),
 ) -> None:
     """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
     with _errors():

@@ -60,7 +60,13 @@ def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = WITHHELD) -
 
 def _scattered(robot: Robot, seed: int) -> Robot:
     """Return a machine of the robot's type: the same but for production scatter."""
-    scatter = {"mass": 0.01, "stiffness": 0.01, "motor_inertia": 0.01, "viscous_friction": 0.02, "damping": 0.05}
+    scatter = {
+        "mass": 0.01,
+        "stiffness": 0.01,
+        "motor_inertia": 0.01,
+        "viscous_friction": 0.02,
+        "damping": 0.05,
+    }
     rng = np.random.default_rng([seed, 1])
     changed = []
     for name, value in robot.core.parameters():

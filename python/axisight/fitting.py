@@ -180,7 +180,9 @@ def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parame
     """Return a parameter of ``effects[index]`` at its present value, within the table's bounds."""
     info = {p.name: p for p in effect_info(effects[index].name).parameters}
     if name not in info:
-        raise InputError(f"effect {effects[index].name!r}: parameter {name!r}: expected {', '.join(info)}")
+        raise InputError(
+            f"effect {effects[index].name!r}: parameter {name!r}: expected {', '.join(info)}"
+        )
     p = info[name]
     initial = (effects[index].parameters or {}).get(name, p.neutral)
     return Parameter(name, initial, p.lower, p.upper, p.typical, effect=index)
@@ -252,14 +254,18 @@ def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array]]:
     for log in logs:
         reference = log.velocity_ref_rad_s
         if closed and reference is None:
-            raise InputError(f"log {log.name!r}: expected velocity references for a closed-loop fit")
+            raise InputError(
+                f"log {log.name!r}: expected velocity references for a closed-loop fit"
+            )
         pair = (reference, log.torque_nm) if closed else (log.torque_nm, log.position_rad)
         first, second = (np.ascontiguousarray(x, dtype=np.float64) for x in pair)
         out.append((first, second))
     return out
 
 
-def fitted(result: _core.FitResult, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> Fitted:
+def fitted(
+    result: _core.FitResult, parameters: Sequence[Parameter], effects: Sequence[Effect]
+) -> Fitted:
     """Wrap a core result with names and warnings."""
     names = tuple(_full_name(p, effects) for p in parameters)
     free = result.free
@@ -301,7 +307,9 @@ def _warnings(result: _core.FitResult, at_bound: Sequence[str]) -> list[str]:
     if result.status == "max_iterations":
         out.append("stopped at the iteration limit: start closer or allow more iterations")
     if result.status == "stalled":
-        out.append("no step lowers the loss although the gradient is not zero: tighten the integrator")
+        out.append(
+            "no step lowers the loss although the gradient is not zero: tighten the integrator"
+        )
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}")
     if result.condition > _POOR_CONDITION:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -165,7 +166,7 @@ def thin(time_s: Floats, values: Floats, points: int) -> tuple[Floats, Floats]:
         return time_s, values
     edges = np.linspace(0, n, points // 2 + 1).astype(int)
     keep: list[int] = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         part = values[start:stop]
         finite = np.isfinite(part)
         if not finite.any():

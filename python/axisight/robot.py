@@ -65,7 +65,9 @@ class Robot:
         for name, value in arrays.items():
             x = np.asarray(value, dtype=np.float64)
             if x.ndim not in (1, 2) or x.shape[-1] != self.n_joints:
-                raise InputError(f"{name}: expected shape ({self.n_joints},) or (n, {self.n_joints}), got {x.shape}")
+                raise InputError(
+                    f"{name}: expected shape ({self.n_joints},) or (n, {self.n_joints}), got {x.shape}"
+                )
             single = single and x.ndim == 1
             out.append(np.ascontiguousarray(np.atleast_2d(x)))
         return out, single
@@ -122,7 +124,9 @@ class Robot:
     def _joint(self, joint: int | str) -> int:
         if isinstance(joint, str):
             if joint not in self.joint_names:
-                raise InputError(f"joint: expected one of {', '.join(self.joint_names)}, got {joint!r}")
+                raise InputError(
+                    f"joint: expected one of {', '.join(self.joint_names)}, got {joint!r}"
+                )
             return self.joint_names.index(joint)
         index = joint + self.n_joints if joint < 0 else joint
         if not 0 <= index < self.n_joints:
@@ -227,7 +231,9 @@ def load_robot(source: Path | str) -> Robot:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         known = ", ".join(PRESETS)
-        raise RobotError(f"{path}: expected a robot description or a preset ({known}): {error}") from error
+        raise RobotError(
+            f"{path}: expected a robot description or a preset ({known}): {error}"
+        ) from error
     try:
         return Robot(_core.Robot.from_toml(text))
     except RobotError as error:

@@ -215,7 +215,9 @@ def _gap_map(title: str, dim: str, data: xr.Dataset) -> GapMap | None:
 
 def share_limit(maps: Sequence[GapMap]) -> float:
     """The share at the dark end of the colour scale, one for all maps: a multiple of 10 %."""
-    largest = max((float(m.share[m.significant].max()) for m in maps if m.significant.any()), default=0)
+    largest = max(
+        (float(m.share[m.significant].max()) for m in maps if m.significant.any()), default=0
+    )
     return min(1.0, max(0.1, math.ceil(largest * 10 - 1e-9) / 10))
 
 

@@ -167,7 +167,9 @@ def one_prismatic() -> Diagnosis:
     )  # fmt: skip
 
 
-HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)> $\\frac{1$ & \"q\" %{y} {{ 7*7 }}"
+HOSTILE = (
+    '</script><script>alert(1)</script><img src=x onerror=alert(2)> $\\frac{1$ & "q" %{y} {{ 7*7 }}'
+)
 
 
 def hostile() -> Diagnosis:

@@ -109,7 +109,9 @@ def test_a_withheld_effect_is_named(effect):
     amplitude = next(iter(effect.parameters))
     if not amplitude.startswith("order"):
         # The simulator's own parameters are free within one per cent or so, and trade with it.
-        assert cause.parameters[amplitude].value == pytest.approx(effect.parameters[amplitude], rel=0.1)
+        assert cause.parameters[amplitude].value == pytest.approx(
+            effect.parameters[amplitude], rel=0.1
+        )
 
 
 def test_two_effects_are_both_named():

@@ -58,7 +58,9 @@ def test_held_out_loss_is_that_of_refitting_without_the_log(regression):
         theta = np.linalg.lstsq(x[~inside], y[~inside], rcond=None)[0]
         brute = ((x[inside] @ theta - y[inside]) ** 2).sum()
         # The ridge against singular matrices is 1e-9 of the diagonal.
-        np.testing.assert_allclose(held[np.repeat(np.arange(3), 10) == group].sum(), brute, rtol=1e-6)
+        np.testing.assert_allclose(
+            held[np.repeat(np.arange(3), 10) == group].sum(), brute, rtol=1e-6
+        )
 
 
 def test_linear_gain_is_what_least_squares_gains(regression):

@@ -30,7 +30,9 @@ def a_log(torque: np.ndarray, position: np.ndarray) -> Log:
 def base() -> tuple[Log, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     time = np.arange(N) * T
-    position = np.stack([20 * np.sin(2 * np.pi * 0.3 * time), 10 * np.cos(2 * np.pi * 0.2 * time)], 1)
+    position = np.stack(
+        [20 * np.sin(2 * np.pi * 0.3 * time), 10 * np.cos(2 * np.pi * 0.2 * time)], 1
+    )
     torque = rng.normal(size=(N, 2)) + np.sin(2 * np.pi * 0.3 * time)[:, None]
     noise = 0.01 * rng.normal(size=(N, 2))
     error = 0.01 * rng.normal(size=(N, 2))

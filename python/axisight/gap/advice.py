@@ -12,13 +12,29 @@ _FRICTION = {
     "quadratic_drag",
     "load_dependent_friction",
 }
-_SPRING = {"backlash", "nonlinear_stiffness", "joint_stiffness", "joint_damping", "transmission_error"}
+_SPRING = {
+    "backlash",
+    "nonlinear_stiffness",
+    "joint_stiffness",
+    "joint_damping",
+    "transmission_error",
+}
 _TIMING = {"input_delay", "actuator_bandwidth"}
-_LOAD = {"payload", "torque_constant", "gravity_compensation", "torque_offset", "motor_inertia", "cable_stiffness"}
+_LOAD = {
+    "payload",
+    "torque_constant",
+    "gravity_compensation",
+    "torque_offset",
+    "motor_inertia",
+    "cable_stiffness",
+}
 _PERIODIC = {"torque_ripple", "resolver_ripple", "transmission_error"}
 
 _ADVICE = (
-    (_SPRING, "Repeat the multisine at three amplitudes and with a changed preload (another pose)."),
+    (
+        _SPRING,
+        "Repeat the multisine at three amplitudes and with a changed preload (another pose).",
+    ),
     (_TIMING, "Excite a wider band, to several times the present bandwidth of the controller."),
     (_FRICTION, "Move at several constant speeds in both directions, with and without a load."),
     (_PERIODIC, "Move slowly at two constant speeds; add a joint-side sensor if there is one."),

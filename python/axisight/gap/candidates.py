@@ -39,7 +39,9 @@ class Situation:
     bandwidth_hz: float
 
 
-def situation(robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, bandwidth_hz: float) -> Situation:
+def situation(
+    robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, bandwidth_hz: float
+) -> Situation:
     """Return residual, angle and speed by log and axis at the decimated rate."""
     residual: list[list[Array]] = []
     angle: list[list[Array]] = []

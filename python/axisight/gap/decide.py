@@ -40,7 +40,9 @@ class Trial:
     @property
     def cost(self) -> float:
         """Number of fitted values; the order of a harmonic counts too."""
-        harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in self.candidate.free)
+        harmonics = sum(
+            name.startswith("cosine_") and name[7].isdigit() for name in self.candidate.free
+        )
         return float(len(self.candidate.free) + harmonics)
 
 
@@ -90,7 +92,9 @@ def _quarters(logs: NDArray[np.int64]) -> NDArray[np.int64]:
     return out
 
 
-def rank(trials: Sequence[Trial], current: Array, floor: Array, logs: NDArray[np.int64]) -> list[Ranked]:
+def rank(
+    trials: Sequence[Trial], current: Array, floor: Array, logs: NDArray[np.int64]
+) -> list[Ranked]:
     """Rank candidates, best first.
 
     ``current`` and ``floor`` (n_blocks,): held-out loss without the candidates
@@ -122,7 +126,7 @@ def rank(trials: Sequence[Trial], current: Array, floor: Array, logs: NDArray[np
 
 def clearly_worse(loss: float, than: float) -> bool:
     """Whether a held-out loss is worse by more than a likelihood ratio of e^2."""
-    return 0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0
+    return bool(0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0)
 
 
 # A rival this likely beside the winner leaves the cause open.

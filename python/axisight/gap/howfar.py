@@ -47,9 +47,7 @@ def gap_figures(given: Stage, refitted: Stage, after: Stage, floor: Stage) -> Ga
     (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
         combine(s.per_log()) for s in (given, refitted, after, floor)
     )
-    return Gap(
-        before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes
-    )
+    return Gap(before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes)
 
 
 def gap_reduction(
@@ -83,7 +81,9 @@ def gap_reduction(
 _OVERLAY_POINTS = 2000
 
 
-def overlays(logs: Sequence[Log], before: Sequence[Array], after: Sequence[Array]) -> tuple[Overlay, ...]:
+def overlays(
+    logs: Sequence[Log], before: Sequence[Array], after: Sequence[Array]
+) -> tuple[Overlay, ...]:
     """Return measured and simulated torque of every log and axis, thinned for plotting."""
     out = []
     for log, b, a in zip(logs, before, after, strict=True):

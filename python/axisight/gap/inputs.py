@@ -38,7 +38,9 @@ def read_inputs(
         extra = tuple(read_log(p, columns, n_axes=robot.n_axes) for p in validation)
         return Inputs(case.name, robot, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
-        raise InputError("--model: expected a robot.toml or a preset when logs are given, got nothing")
+        raise InputError(
+            "--model: expected a robot.toml or a preset when logs are given, got nothing"
+        )
     robot = load_robot(model)
     logs = [read_log(p, columns, n_axes=robot.n_axes) for p in paths]
     held = [read_log(p, columns, n_axes=robot.n_axes) for p in validation]

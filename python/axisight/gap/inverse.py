@@ -97,17 +97,25 @@ def inverse_floor(robot: Robot, logs: Sequence[Log], cutoff_hz: float, settings:
     noise_variance = np.var(noise, axis=0)
     total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
     decimation = max(1, int(rate / (2 * cutoff_hz)))
-    weighting = Weighting(np.zeros(1), 1 / np.sqrt(total)[:, None] / np.sqrt(decimation), decimation)
+    weighting = Weighting(
+        np.zeros(1), 1 / np.sqrt(total)[:, None] / np.sqrt(decimation), decimation
+    )
     flat = np.ones((len(variance), 1))
-    return Floor(std, np.zeros(1), noise_variance[:, None] * flat, weighting, noise_variance / total)
+    return Floor(
+        std, np.zeros(1), noise_variance[:, None] * flat, weighting, noise_variance / total
+    )
 
 
-def inverse_noise(robot: Robot, log: Log, std_rad: Array, cutoff_hz: float, seed: int, run: int = 0) -> Array:
+def inverse_noise(
+    robot: Robot, log: Log, std_rad: Array, cutoff_hz: float, seed: int, run: int = 0
+) -> Array:
     """Return the error (n, n_axes) [Nm] that sensor noise alone causes in a predicted torque."""
     noise = white_noise(seed, run, log.n_samples, robot.n_axes) * std_rad
     _, acceleration = differentiate(noise, log.sample_time_s, cutoff_hz)
     torque = white_noise(seed, run + 1, log.n_samples, robot.n_axes) * _torque_noise_std(log)
-    return np.asarray(acceleration * _inertia(robot) - lowpass(torque, log.sample_time_s, cutoff_hz))
+    return np.asarray(
+        acceleration * _inertia(robot) - lowpass(torque, log.sample_time_s, cutoff_hz)
+    )
 
 
 def _inertia(robot: Robot) -> Array:

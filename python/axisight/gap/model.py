@@ -148,7 +148,9 @@ class ModelFitter:
             for p in self.own
         ]
         added = [
-            _trial_parameter(effects, first + i, f, name) for i, f in enumerate(free) for name in f.free
+            _trial_parameter(effects, first + i, f, name)
+            for i, f in enumerate(free)
+            for name in f.free
         ]
         parameters = own + added
         warm = []

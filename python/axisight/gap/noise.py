@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from scipy.signal import welch
 
 from axisight.errors import InputError
 from axisight.fitting import Weighting
+from axisight.gap.settings import Settings
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate, white_noise
@@ -18,17 +18,6 @@ from axisight.simulation import simulate, white_noise
 Array = NDArray[np.float64]
 
 _SEGMENT = 2048
-
-
-class HasNoiseSettings(Protocol):
-    """The settings this file reads."""
-
-    @property
-    def model_error(self) -> float: ...
-    @property
-    def bandwidth_hz(self) -> float: ...
-    @property
-    def seed(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +47,9 @@ def position_noise_std(logs: list[Log]) -> Array:
     for log in logs:
         rate = 1.0 / log.sample_time_s
         # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
-        f, density = welch(np.diff(log.position_rad, n=2, axis=0), rate, nperseg=_segment(log), axis=0)
+        f, density = welch(
+            np.diff(log.position_rad, n=2, axis=0), rate, nperseg=_segment(log), axis=0
+        )
         top = (f > 0.4 * rate) & (f < 0.49 * rate)
         gain = (2 * np.sin(np.pi * f[top] / rate)) ** 4
         estimates.append(np.sqrt(np.mean(density[top] / gain[:, None], axis=0) * rate / 2))
@@ -74,7 +65,7 @@ def _density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
     return f, np.asarray(density.T * rate / 2)
 
 
-def closed_loop_floor(robot: Robot, logs: list[Log], settings: HasNoiseSettings) -> Floor:
+def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floor:
     """Return the floor of closed-loop logs, by simulating the loop with and without noise."""
     nominal = robot.core.position_noise_std
     std = np.maximum(position_noise_std(logs), nominal)

@@ -32,7 +32,9 @@ def strongest_orders(
     found: list[int] = []
     for _ in range(count):
         gains = [
-            0.0 if n in found else _gain(left, angles_rad, speeds_rad_s, n, bandwidth_hz, speed_power)
+            0.0
+            if n in found
+            else _gain(left, angles_rad, speeds_rad_s, n, bandwidth_hz, speed_power)
             for n in range(1, HIGHEST_ORDER + 1)
         ]
         if max(gains) <= 0:

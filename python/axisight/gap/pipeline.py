@@ -83,7 +83,11 @@ def diagnose(
     closed = machine.core.controller_kind != "none" and all(
         log.velocity_ref_rad_s is not None for log in [*fit_logs, *held_logs]
     )
-    view = ClosedLoopView(machine, fit_logs, chosen) if closed else InverseView(machine, fit_logs, chosen)
+    view = (
+        ClosedLoopView(machine, fit_logs, chosen)
+        if closed
+        else InverseView(machine, fit_logs, chosen)
+    )
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     conclusion = conclude(found, chosen)
@@ -107,7 +111,9 @@ def _inputs(
         name, source = "logs", robot
         fit_logs, held_logs = list(estimation), list(validation)
     else:
-        raise InputError("diagnose: expected a case, or a robot with estimation and validation logs")
+        raise InputError(
+            "diagnose: expected a case, or a robot with estimation and validation logs"
+        )
     machine = source if isinstance(source, Robot) else load_robot(source)
     if not fit_logs or not held_logs:
         raise CaseError(
@@ -122,7 +128,9 @@ def _inputs(
 
 def _check_log(robot: Robot, log: Log) -> None:
     if log.n_axes != robot.n_axes:
-        raise CaseError(f"{log.source}: expected {robot.n_axes} axes as in the robot, got {log.n_axes}")
+        raise CaseError(
+            f"{log.source}: expected {robot.n_axes} axes as in the robot, got {log.n_axes}"
+        )
     if abs(log.sample_time_s / robot.sample_time_s - 1) > 1e-4:
         raise CaseError(
             f"{log.source}: expected the robot's sample time {robot.sample_time_s:g} s, "
@@ -168,7 +176,9 @@ class ClosedLoopView(View):
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         floor = closed_loop_floor(robot, logs, settings)
         data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
-        fitter = ClosedLoopFitter(robot, data, floor.weighting, settings.tolerances, settings.block_s)
+        fitter = ClosedLoopFitter(
+            robot, data, floor.weighting, settings.tolerances, settings.block_s
+        )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
     def measured(self, log: Log) -> Array:
@@ -308,6 +318,7 @@ def _assemble(
             "axisight_version": version("axisight"),
             "seed": settings.seed,
             "robot": robot.name,
+            "axis_kinds": ["prismatic" if p else "revolute" for p in robot.core.axis_is_prismatic],
             "estimation_logs": [log.name for log in view.logs],
             "validation_logs": [log.name for log in held_logs],
             "position_noise_std_rad": view.floor.position_std_rad.tolist(),
@@ -321,5 +332,3 @@ def _relative(model: Evidence, name: str, nominal: float) -> Interval:
     change = (model.robot_values[name] - nominal) / size
     spread = 1.96 * model.std.get((None, name), 0.0) / size
     return Interval(change, change - spread, change + spread)
-
-

@@ -126,7 +126,9 @@ def _round(
     """Screen all candidates by one linear step, fit the promising ones in full."""
     model = state.model
 
-    def attempt(option: FreeEffect, iterations: int, start: _Start | None = None) -> Evidence | None:
+    def attempt(
+        option: FreeEffect, iterations: int, start: _Start | None = None
+    ) -> Evidence | None:
         effects = [*model.free, option if start is None else start.option]
         values = None if start is None else start.robot_values
         try:
@@ -158,7 +160,9 @@ def _round(
 
     with ThreadPoolExecutor(settings.threads) as pool:
         try:
-            starts = _each(pool, screened, options, progress, f"screening candidates, round {number}")
+            starts = _each(
+                pool, screened, options, progress, f"screening candidates, round {number}"
+            )
             keep = _promising(np.array([s.gain for s in starts]))
             chosen = [starts[i] for i in keep]
             trials = _each(pool, fitted, chosen, progress, f"fitting candidates, round {number}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -38,7 +39,7 @@ def band_map(logs: Sequence[ErrorLog], block_s: float) -> xr.Dataset:
     """
     rate = 1.0 / logs[0].log.sample_time_s
     edges = [e for e in BAND_EDGES_HZ if e < rate / 2] + [rate / 2]
-    labels = [f"{a:g}-{b:g} Hz" for a, b in zip(edges, edges[1:], strict=False)]
+    labels = [f"{a:g}-{b:g} Hz" for a, b in pairwise(edges)]
     # Two seconds at least, so that the lowest band has lines of its own.
     length = int(max(block_s, 2.0) * rate)
     cells = [_spectra(item, length, edges, rate) for item in logs]
@@ -49,7 +50,9 @@ def band_map(logs: Sequence[ErrorLog], block_s: float) -> xr.Dataset:
     return out.assign_coords(low_hz=("band", bounds[0]), high_hz=("band", bounds[1]))
 
 
-def _spectra(item: ErrorLog, length: int, edges: Sequence[float], rate: float) -> tuple[Array, Array]:
+def _spectra(
+    item: ErrorLog, length: int, edges: Sequence[float], rate: float
+) -> tuple[Array, Array]:
     """Return band powers (n_blocks, n_axes, n_bands), relative to the torque variance."""
     variance = np.maximum(np.var(item.log.torque_nm, axis=0), 1e-300)
     out = []
@@ -65,7 +68,9 @@ def _spectra(item: ErrorLog, length: int, edges: Sequence[float], rate: float) -
     return out[0], out[1]
 
 
-def regime_maps(logs: Sequence[ErrorLog], bandwidth_hz: float, block_s: float) -> dict[str, xr.Dataset]:
+def regime_maps(
+    logs: Sequence[ErrorLog], bandwidth_hz: float, block_s: float
+) -> dict[str, xr.Dataset]:
     """Return one map per regime variable, by axis and bin."""
     prepared = [_prepared(item, bandwidth_hz) for item in logs]
     maps = {}
@@ -179,9 +184,9 @@ def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Data
     """Return share, excess and significance from cells (n_blocks, n_axes, n_bins)."""
     excess = error - noise.mean(axis=0)
     mean = excess.mean(axis=0)
-    standard_error = np.hypot(
-        excess.std(axis=0, ddof=1), noise.std(axis=0, ddof=1)
-    ) / np.sqrt(len(excess))
+    standard_error = np.hypot(excess.std(axis=0, ddof=1), noise.std(axis=0, ddof=1)) / np.sqrt(
+        len(excess)
+    )
     positive = np.maximum(mean, 0.0)
     total = positive.sum(axis=1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -200,7 +205,9 @@ def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Data
     )
 
 
-def findings(bands: xr.Dataset, regimes: dict[str, xr.Dataset], significance: float) -> tuple[Where, ...]:
+def findings(
+    bands: xr.Dataset, regimes: dict[str, xr.Dataset], significance: float
+) -> tuple[Where, ...]:
     """Return the places that hold the gap, largest share first.
 
     An axis counts when its excess is significant; its band is the smallest run
@@ -240,7 +247,9 @@ def _main_band(held: Array) -> tuple[int, int]:
     return 0, n - 1
 
 
-def _main_regime(regimes: dict[str, xr.Dataset], axis: int, significance: float) -> tuple[str | None, str]:
+def _main_regime(
+    regimes: dict[str, xr.Dataset], axis: int, significance: float
+) -> tuple[str | None, str]:
     best: tuple[float, str, str] | None = None
     for name, data in regimes.items():
         share = data["share"].values[axis]

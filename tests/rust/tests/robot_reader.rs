@@ -240,10 +240,7 @@ fn rigid_drive_with_rotor_may_end_the_chain() {
 
 #[test]
 fn slightly_rounded_axis_reads() {
-    let robot = read(&small_with(
-        "[0.0, 1.0, 0.0]",
-        "[0.0, 0.6, 0.8000004]",
-    ));
+    let robot = read(&small_with("[0.0, 1.0, 0.0]", "[0.0, 0.6, 0.8000004]"));
     assert_eq!(robot.joints[1].axis, [0.0, 0.6, 0.8000004]);
 }
 

@@ -154,7 +154,8 @@ fn elementary_functions_of_dual_numbers_have_their_slopes() {
     // Central differences with step 1e-6: truncation below 1e-11, rounding 1e-16 / 1e-6 = 1e-10.
     let h = 1e-6;
     type D = Dual<f64, 1>;
-    let functions: [(&str, fn(D) -> D); 8] = [
+    type Function = fn(D) -> D;
+    let functions: [(&str, Function); 8] = [
         ("sin", |x| x.sin_cos().0),
         ("cos", |x| x.sin_cos().1),
         ("exp", Scalar::exp),

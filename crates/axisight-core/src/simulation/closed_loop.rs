@@ -277,7 +277,10 @@ fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simulation
             return Err(SimulationError::NoController);
         }
         Drive::Tracking { torque, position } => {
-            let same = torque.iter().map(|t| t.len()).eq(position.iter().map(|p| p.len()));
+            let same = torque
+                .iter()
+                .map(|t| t.len())
+                .eq(position.iter().map(|p| p.len()));
             if !same {
                 let got = format!("{} runs", position.len());
                 return Err(shape("position", "the shape of torque".to_owned(), got));
@@ -306,7 +309,11 @@ fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simulation
         Drive::Tracking { position, .. } => position,
         _ => &[],
     };
-    for (name, set) in [(field, arrays), ("noise", run.noise), ("position", positions)] {
+    for (name, set) in [
+        (field, arrays),
+        ("noise", run.noise),
+        ("position", positions),
+    ] {
         for array in set {
             if array.len() % n_axes != 0 || array.is_empty() {
                 let expected = format!("samples of {n_axes} axes");

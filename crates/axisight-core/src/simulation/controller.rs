@@ -61,7 +61,10 @@ impl<S: Scalar> ControlLoop<S> {
         let first = self.first_lag.get_or_insert_with(|| lag.clone()).clone();
         for i in 0..lag.len() {
             let behind = lag[i] - first[i];
-            let speed = self.previous.as_ref().map_or_else(S::zero, |p| (lag[i] - p[i]) * rate);
+            let speed = self
+                .previous
+                .as_ref()
+                .map_or_else(S::zero, |p| (lag[i] - p[i]) * rate);
             command[i] += self.feedback(i, -speed, -behind);
         }
         self.previous = Some(lag);
