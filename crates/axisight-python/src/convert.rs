@@ -1,4 +1,4 @@
-//! Between NumPy arrays and plain vectors.
+//! Between `NumPy` arrays and plain vectors.
 
 use crate::entry::InputError;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};

@@ -55,7 +55,10 @@ pub fn detached<T: Send>(
             });
             let mut interrupt = None;
             while finished.recv_timeout(POLL) == Err(mpsc::RecvTimeoutError::Timeout) {
-                if let Err(e) = Python::attach(|py| py.check_signals()) {
+                // The method itself is not general enough over the lifetime.
+                #[allow(clippy::redundant_closure_for_method_calls)]
+                let signals = Python::attach(|py| py.check_signals());
+                if let Err(e) = signals {
                     cancel.store(true, Ordering::Relaxed);
                     interrupt.get_or_insert(e);
                 }

@@ -1,5 +1,8 @@
 //! Python bindings of the Axisight core; no numerics live here.
 
+// PyO3 hands over owned values and names the lifetime of the interpreter.
+#![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
+
 mod convert;
 mod effects;
 mod entry;

@@ -7,7 +7,7 @@ use axisight_core::robot::{
     Controller, Linearization, Parameter, Plant, RigidBody, RobotDescription, equilibrium,
     linearize, modes, read_robot, zoh_frequency_response,
 };
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -22,6 +22,13 @@ pub struct Robot {
 
 type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
 type Matrix3<'py> = Bound<'py, PyArray3<f64>>;
+/// Eigenvalues, frequencies, damping ratios and shapes.
+type ModeArrays<'py> = (
+    Matrix2<'py>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Matrix3<'py>,
+);
 
 impl Robot {
     fn linear(&self, effects: Vec<EffectTuple>, at: Option<Vec<f64>>) -> PyResult<Linearization> {
@@ -223,7 +230,6 @@ impl Robot {
         let flat = self.each_row(py, &[("q", &q)], |b, x| {
             b.inertia_matrix(x[0]).map_err(input_error)
         })?;
-        use numpy::PyArrayMethods;
         flat.reshape([q.as_array().nrows(), n, n])
     }
     fn bias<'py>(
@@ -340,12 +346,7 @@ impl Robot {
         py: Python<'py>,
         effects: Vec<EffectTuple>,
         joint_angle: Option<Vec<f64>>,
-    ) -> PyResult<(
-        Matrix2<'py>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<f64>>,
-        Matrix3<'py>,
-    )> {
+    ) -> PyResult<ModeArrays<'py>> {
         let l = self.linear(effects, joint_angle)?;
         let all = modes(&l).map_err(|e| AxisightError::new_err(e.to_string()))?;
         let values = all

@@ -110,7 +110,7 @@ def _axis_candidate(
             ("cosine_rad", "sine_rad"),
         )
     if name == "backlash":
-        return _backlash(robot, logs, axis)
+        return _backlash(robot, logs, at, axis)
     parameters = effect_info(name).parameters
     start = {p.name: p.neutral for p in parameters}
     bounds = {}
@@ -123,7 +123,7 @@ def _axis_candidate(
     return FreeEffect(Effect(name, axis, start), tuple(p.name for p in parameters), bounds=bounds)
 
 
-def _backlash(robot: Robot, logs: Sequence[Log], axis: int) -> FreeEffect:
+def _backlash(robot: Robot, logs: Sequence[Log], at: Situation, axis: int) -> FreeEffect:
     """Start at several widths, as shares of the deflection the largest torque gives."""
     joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
     stiffness = dict(robot.core.parameters())[f"{joint}.stiffness"]
@@ -131,11 +131,21 @@ def _backlash(robot: Robot, logs: Sequence[Log], axis: int) -> FreeEffect:
     spread = max(float(np.std(log.torque_nm[:, axis - 1])) for log in logs)
     deflection = spread / ratio / stiffness
     # The valley around the true width is narrow: impacts must stay in phase.
-    shares = np.geomspace(0.04, 0.8, 18)
+    shares = np.geomspace(0.04, 0.8, 18) if _axis_share(at, axis) > _SMALL_SHARE else ()
     starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
     return FreeEffect(
         Effect("backlash", axis, {"half_width_rad": 0.0}), ("half_width_rad",), starts=starts
     )
+
+
+# An axis with less of the error than this is not worth many starts.
+_SMALL_SHARE = 0.1
+
+
+def _axis_share(at: Situation, axis: int) -> float:
+    """Return the share of the residual error on an axis [1]."""
+    squares = [sum(float(row @ row) for row in rows) for rows in zip(*at.residual, strict=True)]
+    return squares[axis - 1] / max(sum(squares), 1e-300)
 
 
 def _own(robot: Robot, effect: str, axis: int) -> float:
