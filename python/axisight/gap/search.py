@@ -213,8 +213,10 @@ def _acceptable(
     return best if real and worth else None
 
 
-# Fitted with sensitivities of their own: the leaders of the ranking.
+# Fitted with sensitivities of their own: the leaders of the ranking, unless the
+# first already explains nearly everything.
 _POLISHED = 2
+_GOOD_ENOUGH = 0.95
 
 
 def _polished(
@@ -231,6 +233,9 @@ def _polished(
     A large effect bends the re-fitted simulator, and the sensitivities taken from
     it; the leaders deserve better before one of them is believed.
     """
+    ranked = rank(trials, current, floor, model.log)
+    if not ranked or ranked[0].score > _GOOD_ENOUGH:
+        return ranked
     done: set[str] = set()
     label = f"refining the leaders, round {number}"
     for k in range(_POLISHED):

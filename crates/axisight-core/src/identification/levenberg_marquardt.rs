@@ -2,7 +2,7 @@
 //!
 //! Moré (1978), *The Levenberg-Marquardt algorithm: implementation and theory*,
 //! with the projection of Kanzow, Yamashita, Fukushima (2004) on the bounds.
-//! Every accepted point is evaluated once: residual and Jacobian together.
+//! A trial point costs a plain simulation; only an accepted one gets its derivatives.
 
 use super::gram::BlockGram;
 use super::loss::Loss;
@@ -85,6 +85,9 @@ pub struct Fit {
     /// Jacobian columns of the free parameters.
     pub columns: Vec<Vec<f64>>,
 }
+
+/// Trial steps, each damped eight times more, before the search gives up.
+const MAX_REJECTIONS: usize = 8;
 
 /// Mean square of a whitened residual that no natural change of a parameter causes: a
 /// thousand standard deviations of noise.
@@ -306,7 +309,6 @@ impl<P: Problem> Search<'_, P> {
         while *iterations < self.options.max_iterations {
             let (matrix, gradient) = self.normal(point);
             let total = point.loss + point.prior;
-            let kept = self.columns.clone();
             let mut rejected = 0;
             loop {
                 let step = self.step(point, &matrix, &gradient, damping);
@@ -314,12 +316,12 @@ impl<P: Problem> Search<'_, P> {
                 if moved < self.options.step_tolerance {
                     return Ok(FitStatus::StepConverged);
                 }
-                match self.evaluate(step, &fresh) {
+                match self.evaluate(step, &[]) {
                     Ok(next) if next.loss + next.prior < total => {
                         let gain = total - (next.loss + next.prior);
-                        *point = next;
                         *iterations += 1;
                         damping = (damping * 0.2).max(1e-12);
+                        *point = self.evaluate(next.theta, &fresh)?;
                         if gain < self.options.loss_tolerance * total && rejected == 0 {
                             return Ok(FitStatus::LossConverged);
                         }
@@ -327,10 +329,9 @@ impl<P: Problem> Search<'_, P> {
                     }
                     Err(ProblemError::Cancelled) => return Err(ProblemError::Cancelled),
                     _ => {
-                        self.columns.clone_from(&kept);
                         rejected += 1;
                         damping *= 8.0;
-                        if rejected > 10 {
+                        if rejected > MAX_REJECTIONS {
                             return Ok(stall(&matrix, &gradient, total));
                         }
                     }
