@@ -93,6 +93,7 @@ class ModelFitter:
         self.weighting = weighting
         self.block_s = block_s
         self.cancel = _core.CancelToken()
+        self.tolerances = tolerances
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerances[quantity])
             for name, value in robot_parameters(robot).items()
@@ -101,6 +102,18 @@ class ModelFitter:
             and value != 0
             and self.takes_part(name)
         ]
+
+    def within_tolerance(self, effect: Effect) -> bool:
+        """Whether an effect is no more than ordinary scatter of a parameter (three deviations)."""
+        name = _same_quantity(self.robot, effect)
+        if name is None:
+            return False
+        tolerance = self.tolerances.get(name.rsplit(".", 1)[1], 0.0)
+        values = effect.parameters or {}
+        if "relative_change" in values:
+            return abs(values["relative_change"]) < 3 * tolerance
+        nominal = robot_parameters(self.robot)[name]
+        return abs(values["viscous_nm_s_rad"]) < 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
         """Whether a robot parameter matters to this error."""

@@ -86,6 +86,8 @@ def search(
         current = held_out_loss(out.model)
         ranked = _polished(fitter, trials, current, floor, out.model, progress, number)
         accepted = _acceptable(ranked, out, current, settings)
+        if accepted is not None and not _earns_its_gain(fitter, accepted, out.model):
+            accepted = None
         if accepted is not None and _parts_do(accepted, ranked, fitter):
             ranked = _without_composite(ranked)
             accepted = ranked[0]
@@ -293,6 +295,23 @@ def _without_composite(ranked: Sequence[Ranked]) -> list[Ranked]:
         return list(ranked)
     merged = replace(part, probability=part.probability + winner.probability)
     return [merged, *(r for r in ranked[1:] if r is not part)]
+
+
+def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> bool:
+    """Whether the gain goes away when the effect is switched off again.
+
+    A fit with one more effect also moves everything else; where the model was not
+    at its optimum, that may be all it did.
+    """
+    fitted = winner.trial.evidence
+    others = [replace(f, free=()) for f in fitted.free[:-1]]
+    without = fitter.fit(
+        others, model, robot_values=fitted.robot_values, lazy=True, max_iterations=0
+    )
+    gain = model.total - fitted.total
+    return without.total - fitted.total > 0.5 * gain and not fitter.within_tolerance(
+        fitted.effects[-1]
+    )
 
 
 def _settled(state: Search, settings: Settings) -> bool:
