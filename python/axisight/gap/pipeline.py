@@ -27,7 +27,7 @@ from axisight.gap.noise import Floor, closed_loop_floor, noise_torque
 from axisight.gap.result import Cause, Diagnosis, Gap, Interval, Mode, Overlay
 from axisight.gap.search import Progress, Search, search
 from axisight.gap.settings import Settings
-from axisight.gap.torques import AS_GIVEN, Variant, simulated_torque
+from axisight.gap.torques import AS_GIVEN, Variant, relative_squares, simulated_torque
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Case, Log, check_same_rate, read_case
@@ -90,8 +90,11 @@ def diagnose(
     )
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
-    conclusion = conclude(found, chosen)
-    out = _assemble(name or found_name, machine, view, held_logs, found, conclusion, chosen)
+    error_logs = _error_logs(view, found)
+    conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs))
+    out = _assemble(
+        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen
+    )
     progress("measuring the gap", 1, 1)
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
@@ -232,6 +235,27 @@ def _errors(view: View, variant: Variant, logs: Sequence[Log]) -> list[Array]:
     return [view.torque(variant, log) - view.measured(log) for log in logs]
 
 
+def _error_logs(view: View, found: Search) -> list[ErrorLog]:
+    """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
+    refit = Variant(found.baseline.robot_values)
+    return [
+        ErrorLog(log, view.torque(refit, log) - view.measured(log), view.noise(log, 0))
+        for log in view.logs
+    ]
+
+
+# An error in torque this much above the floor is seen by eye; noise of an unexpected
+# colour also lies above the floor in some band, but not in all of the torque.
+_SEEN = 0.02
+
+
+def _stands_out(logs: Sequence[ErrorLog]) -> bool:
+    """Whether the plain torque error lies above the noise on some axis."""
+    error = np.mean([relative_squares(x.log, x.error).mean(axis=0) for x in logs], axis=0)
+    noise = np.mean([relative_squares(x.log, x.noise).mean(axis=0) for x in logs], axis=0)
+    return bool(np.any(error > 1.05 * noise + _SEEN**2))
+
+
 @dataclass(frozen=True)
 class Reach:
     """The gap on the validation logs at each stage of the search."""
@@ -280,14 +304,10 @@ def _assemble(
     view: View,
     held_logs: Sequence[Log],
     found: Search,
+    error_logs: Sequence[ErrorLog],
     conclusion: Conclusion,
     settings: Settings,
 ) -> Diagnosis:
-    refit = Variant(found.baseline.robot_values)
-    error_logs = [
-        ErrorLog(log, view.torque(refit, log) - view.measured(log), view.noise(log, 0))
-        for log in view.logs
-    ]
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
     reach = _reach(view, held_logs, found, len(conclusion.causes), settings)

@@ -48,7 +48,7 @@ class Settings:
     smallest_gain: float = 0.05
     largest_scatter: float = 0.3
     smallest_score: float = 0.3
-    smallest_share: float = 0.01
+    smallest_share: float = 0.005
     explained_share: float = 0.6
     significance: float = 3.0
     bootstrap: int = 1000

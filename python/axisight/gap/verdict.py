@@ -62,15 +62,19 @@ class Conclusion:
         return f"The simulator lacks {named}: {shrinks}"
 
 
-def conclude(found: Search, settings: Settings) -> Conclusion:
-    """Draw the verdict from a finished search."""
+def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusion:
+    """Draw the verdict from a finished search.
+
+    ``stands_out``: whether the plain torque error of the re-fitted simulator lies
+    above the noise; without, what no effect explains is taken for noise.
+    """
     accepted = found.accepted
     explained = found.explained()
     first = found.rounds[0].ranked
     ranking = tuple(_candidate(r, found.rounds[0].accepted is not None) for r in first)
     checks = _checks(found, settings, explained)
     if not accepted:
-        verdict: VerdictKind = "unknown" if _significant(found, settings) else "none"
+        verdict: VerdictKind = "unknown" if stands_out and _significant(found, settings) else "none"
         advice = _advice_unknown() if verdict == "unknown" else None
         return Conclusion(verdict, (), ranking[:5], (), advice, ranking, checks)
     if explained < settings.explained_share:

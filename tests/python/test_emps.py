@@ -1,0 +1,40 @@
+"""A real machine: the EMPS benchmark, its simulator a bare mass."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import axisight
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "emps"
+
+
+@pytest.fixture(scope="module")
+def example():
+    sys.path.insert(0, str(EXAMPLE))
+    try:
+        import run
+
+        return run
+    finally:
+        sys.path.remove(str(EXAMPLE))
+
+
+def test_the_missing_friction_terms_are_named_and_sized(shared_data, example):
+    columns = EXAMPLE / "columns.toml"
+    robot = axisight.load_robot(EXAMPLE / "robot.toml")
+    first = axisight.read_log(shared_data / "emps" / "DATA_EMPS.mat", columns)
+    second = axisight.read_log(shared_data / "emps" / "DATA_EMPS_PULSES.mat", columns)
+    found = axisight.diagnose(robot=robot, estimation=[first], validation=[second])
+    assert found.mode == "inverse_dynamics"
+    assert found.verdict == "explained"
+    assert {c.effect for c in found.causes} == {
+        "coulomb_friction",
+        "viscous_friction",
+        "torque_offset",
+    }
+    assert found.gap.after < 0.15 * found.gap.before
+    ours = example.found_parameters(robot, found)
+    for name, published in example.PUBLISHED.items():
+        assert ours[name] == pytest.approx(published, rel=0.02), name
