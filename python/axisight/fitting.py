@@ -152,7 +152,7 @@ def robot_parameter(
     """Return a robot parameter at its nominal value, free or within a tolerance.
 
     A ``relative_tolerance`` becomes the standard deviation of a prior, with
-    bounds at four of them. Raises InputError for an unknown name.
+    bounds at four of them; ``nuisance`` as in `Parameter`. Raises InputError for an unknown name.
     """
     known = robot_parameters(robot)
     if name not in known:
