@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -83,7 +84,7 @@ class Evidence:
         return float(self.loss.sum())
 
 
-class ModelFitter:
+class ModelFitter(ABC):
     """Fits models to one set of logs; subclasses say by which error."""
 
     def __init__(
@@ -119,6 +120,7 @@ class ModelFitter:
         """Whether a robot parameter matters to this error."""
         return bool(name)
 
+    @abstractmethod
     def solve(
         self,
         effects: Sequence[Effect],
@@ -127,7 +129,6 @@ class ModelFitter:
         warm: list[tuple[int, Array]],
     ) -> _core.FitResult:
         """Run the fit in the core."""
-        raise NotImplementedError
 
     def fit(
         self,

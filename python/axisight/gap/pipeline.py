@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -142,7 +143,7 @@ def _check_log(robot: Robot, log: Log) -> None:
 
 
 @dataclass
-class View:
+class View(ABC):
     """One way of comparing simulator and logs: what to fit, what error it leaves, what floor."""
 
     mode: Mode
@@ -160,17 +161,17 @@ class View:
         inverse = self.mode == "inverse_dynamics"
         return all_candidates(self.robot, self.logs, at, inverse_dynamics=inverse)
 
+    @abstractmethod
     def measured(self, log: Log) -> Array:
         """Return the torque errors are taken from (n, n_axes) [Nm]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def torque(self, variant: Variant, log: Log) -> Array:
         """Return the torque of a simulator on a log (n, n_axes) [Nm]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def noise(self, log: Log, run: int) -> Array:
         """Return the torque error of noise alone (n, n_axes) [Nm]."""
-        raise NotImplementedError
 
 
 class ClosedLoopView(View):
