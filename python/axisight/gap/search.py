@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
@@ -85,7 +86,7 @@ def search(
         trials = _round(fitter, out, options, settings, progress, number)
         current = held_out_loss(out.model)
         ranked = _polished(fitter, trials, current, floor, out.model, progress, number)
-        accepted = _acceptable(ranked, out, current, settings)
+        accepted = _acceptable(ranked, out, current, settings, len(options))
         if accepted is not None and not _earns_its_gain(fitter, accepted, out.model):
             accepted = None
         if accepted is not None and _parts_do(accepted, ranked, fitter):
@@ -201,16 +202,22 @@ def _promising(gains: Array) -> list[int]:
 
 
 def _acceptable(
-    ranked: Sequence[Ranked], state: Search, current: Array, settings: Settings
+    ranked: Sequence[Ranked], state: Search, current: Array, settings: Settings, tried: int
 ) -> Ranked | None:
-    """Return the winner if what it explains is real and worth naming."""
+    """Return the winner if what it explains is real and worth naming.
+
+    The winner is the best of ``tried`` candidates: its significance is held
+    against the level that keeps the false alarms of all of them together at
+    ``settings.false_alarms`` (Bonferroni).
+    """
     if not ranked:
         return None
     best = ranked[0]
     gain = float((current - best.trial.held_out).sum())
     size = float(state.model.size.sum())
     first = max(float((held_out_loss(state.baseline) - state.floor).sum()), 1e-12)
-    real = best.significance > settings.significance and gain / size > settings.smallest_gain
+    needed = max(settings.significance, float(norm.isf(settings.false_alarms / max(tried, 1))))
+    real = best.significance > needed and gain / size > settings.smallest_gain
     worth = best.score > settings.smallest_score and gain / first > settings.smallest_share
     return best if real and worth else None
 

@@ -35,8 +35,9 @@ class Settings:
     A cause must remove at least ``smallest_gain`` from the mean square of the
     weighted residual (in units of noise plus model error), ``smallest_score`` of
     what is left to explain, ``smallest_share`` of what there was, and by
-    ``significance`` standard errors. A mean square up to ``largest_scatter`` above
-    the floor counts as scatter of the simulator. ``explained_share``: below it, the causes
+    ``significance`` standard errors, or more where
+    the false alarms of all candidates together would exceed ``false_alarms``. A mean
+    square up to ``largest_scatter`` above the floor counts as scatter of the simulator. ``explained_share``: below it, the causes
     found do not explain the gap. ``seed`` rules every random choice.
     """
 
@@ -51,6 +52,7 @@ class Settings:
     smallest_share: float = 0.005
     explained_share: float = 0.6
     significance: float = 3.0
+    false_alarms: float = 0.05
     bootstrap: int = 1000
     seed: int = 0
     threads: int = 2
