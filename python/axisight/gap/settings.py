@@ -34,11 +34,12 @@ class Settings:
     bootstrap. ``max_causes``: forward selection stops there.
     A cause must remove at least ``smallest_gain`` from the mean square of the
     weighted residual (in units of noise plus model error), ``smallest_score`` of
-    what is left to explain, ``smallest_share`` of what there was, and by
-    ``significance`` standard errors, or more where
-    the false alarms of all candidates together would exceed ``false_alarms``. A mean
-    square up to ``largest_scatter`` above the floor counts as scatter of the simulator. ``explained_share``: below it, the causes
-    found do not explain the gap. ``seed`` rules every random choice.
+    what is left to explain and ``smallest_share`` of what there was, by
+    ``significance`` standard errors, or more where the false alarms of all
+    candidates together would exceed ``false_alarms``. A mean square up to
+    ``largest_scatter`` above the floor counts as scatter of the simulator.
+    ``explained_share``: below it, the causes found do not explain the gap.
+    ``seed`` rules every random choice.
     """
 
     tolerances: Mapping[str, float] = field(default_factory=lambda: DEFAULT_TOLERANCES)
