@@ -7,7 +7,7 @@
 use super::gram::{Block, cut};
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
 use crate::effects::Motor;
-use crate::robot::{ChainState, EffectSetting, Plant, RobotDescription};
+use crate::robot::{EffectSetting, Plant, RobotDescription};
 use crate::scalar::{Dual, Scalar};
 use crate::signal::Weighting;
 use rayon::prelude::*;
@@ -113,7 +113,6 @@ impl InverseDynamics {
         let (n, n_axes) = (plant.chain.len(), plant.axes.len());
         let n_samples = record.position.len() / n_axes;
         let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; seeds.len() + 1];
-        let mut state = ChainState::new(n);
         let mut motion = vec![vec![S::zero(); n]; 3];
         for k in 0..n_samples {
             let row = k * n_axes..(k + 1) * n_axes;
@@ -123,7 +122,7 @@ impl InverseDynamics {
                     target[axis.joint] = S::constant(x * axis.ratio);
                 }
             }
-            plant.chain.evaluate(&motion[0], &motion[1], &mut state);
+            let state = plant.dynamics.evaluate(&motion[0], &motion[1]);
             for (i, axis) in plant.axes.iter().enumerate() {
                 let at = |x: &[f64]| S::constant(x[k * n_axes + i]);
                 let passive = state.bias[axis.joint] - axis.joint_torque(motion[0][axis.joint]);

@@ -1,6 +1,5 @@
 //! Static equilibrium: elastic joints settled under gravity, motors holding.
 
-use super::chain::ChainState;
 use super::plant::Plant;
 use crate::scalar::Scalar;
 
@@ -64,7 +63,6 @@ pub fn equilibrium<S: Scalar>(
         });
     }
     let n = plant.chain.len();
-    let mut state = ChainState::new(n);
     let rest = vec![S::zero(); n];
     let mut q = rest.clone();
     for (axis, angle) in plant.axes.iter().zip(driven) {
@@ -73,7 +71,7 @@ pub fn equilibrium<S: Scalar>(
     let mut settled_for = 0;
     let mut change = 0.0;
     for _ in 0..MAX_ITERATIONS {
-        plant.chain.evaluate(&q, &rest, &mut state);
+        let state = plant.dynamics.evaluate(&q, &rest);
         change = settle_step(plant, &state.bias, &mut q);
         // One more iteration once the value is settled, for the derivatives.
         settled_for = if change < 1e-16 { settled_for + 1 } else { 0 };

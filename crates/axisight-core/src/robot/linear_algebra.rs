@@ -2,30 +2,32 @@
 
 use crate::scalar::Scalar;
 
-/// Solve `a x = b` in place for a symmetric positive definite `a` (row-major,
-/// `n * n`, destroyed) by `L D L^T`; about `n^3 / 6` multiplications.
-#[inline]
-pub(super) fn solve_symmetric<S: Scalar>(a: &mut [S], b: &mut [S], n: usize) {
-    for j in 0..n {
-        let inverse = a[j * n + j].recip();
-        for i in j + 1..n {
-            // Row i of L is the scaled column below the pivot.
-            let l = a[i * n + j] * inverse;
-            for k in j + 1..=i {
-                let update = a[k * n + j];
-                a[i * n + k] = (-l).fma(update, a[i * n + k]);
+/// Solve `a x = b` in place for a symmetric positive definite `a` (upper triangle
+/// read, destroyed) by `L D L^T`; about `n^3 / 6` multiplications.
+#[inline(always)]
+pub(super) fn solve_symmetric<S: Scalar, const N: usize>(a: &mut [[S; N]; N], b: &mut [S; N]) {
+    for j in 0..N {
+        let (done, below) = a.split_at_mut(j + 1);
+        let Some(pivot_row) = done.last_mut() else {
+            return;
+        };
+        let inverse = pivot_row[j].recip();
+        for (i, row) in (j + 1..N).zip(below) {
+            let l = -(pivot_row[i] * inverse);
+            for k in i..N {
+                row[k] = l.fma(pivot_row[k], row[k]);
             }
-            b[i] = (-l).fma(b[j], b[i]);
+            b[i] = l.fma(b[j], b[i]);
         }
-        a[j * n + j] = inverse;
+        pivot_row[j] = inverse;
     }
-    // Column entries below the diagonal still hold l * d.
-    for j in (0..n).rev() {
+    // Entries right of the pivot still hold d * l.
+    for j in (0..N).rev() {
         let mut sum = b[j];
-        for i in j + 1..n {
-            sum = (-a[i * n + j]).fma(b[i], sum);
+        for i in j + 1..N {
+            sum = (-a[j][i]).fma(b[i], sum);
         }
-        b[j] = sum * a[j * n + j];
+        b[j] = sum * a[j][j];
     }
 }
 
@@ -36,21 +38,19 @@ mod tests {
     #[test]
     fn solves_a_known_system() {
         // A = G G^T with a fixed G, x chosen, b = A x.
-        let n = 4;
         let g = [
             1.0, 0.3, -0.2, 0.7, 0.0, 2.0, 0.4, -1.1, 0.5, 0.0, 1.5, 0.3, -0.6, 0.2, 0.0, 1.2,
         ];
-        let mut a = vec![0.0_f64; n * n];
-        for i in 0..n {
-            for j in 0..n {
-                a[i * n + j] = (0..n).map(|k| g[i * n + k] * g[j * n + k]).sum();
+        let mut a = [[0.0_f64; 4]; 4];
+        for i in 0..4 {
+            for j in 0..4 {
+                a[i][j] = (0..4).map(|k| g[i * 4 + k] * g[j * 4 + k]).sum();
             }
         }
         let x = [1.0, -2.0, 0.5, 3.0];
-        let mut b: Vec<f64> = (0..n)
-            .map(|i| (0..n).map(|j| a[i * n + j] * x[j]).sum())
-            .collect();
-        solve_symmetric(&mut a, &mut b, n);
+        let mut b: [f64; 4] =
+            std::array::from_fn(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
+        solve_symmetric(&mut a, &mut b);
         for (got, want) in b.iter().zip(x) {
             assert!((got - want).abs() < 1e-12, "{got} {want}");
         }

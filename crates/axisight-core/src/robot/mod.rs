@@ -2,6 +2,7 @@
 
 mod chain;
 mod description;
+mod dynamics;
 mod equilibrium;
 mod linear_algebra;
 mod linearization;
@@ -12,13 +13,14 @@ mod reader;
 mod rigid_body;
 mod vector;
 
-pub use chain::{Body, Chain, ChainState};
+pub use chain::{Body, Chain, Pose};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
+pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
 pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
 pub use linearization::{Linearization, linearize};
 pub use modes::{Mode, modes, zoh_frequency_response};
 pub use parameters::{Parameter, ParameterError};
-pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError, PlantScratch};
+pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError};
 pub use reader::{RobotError, read_robot};
 pub use rigid_body::RigidBody;
 pub use vector::{Mat3, Vec3};

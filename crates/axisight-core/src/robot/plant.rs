@@ -5,8 +5,9 @@
 //! `J_m phi'' = tau - F_v phi' - r tau_g`, `M(q) q'' + c + g = B tau_g - K_e q_e - D_e q_e'`.
 //! A rigid gear has `phi = q / r` and no state of its own.
 
-use super::chain::{Chain, ChainState};
+use super::chain::Chain;
 use super::description::RobotDescription;
+use super::dynamics::{Dynamics, DynamicsScratch, MOST_JOINTS, sized};
 use super::linear_algebra::solve_symmetric;
 use super::parameters::Parameter;
 use crate::effects::{self, EffectError, EffectInfo, Kernel, Motor, PlantParameters, Scope};
@@ -35,6 +36,9 @@ pub enum PlantError {
         /// Mass [kg].
         got: f64,
     },
+    /// The chain is longer than the compiled sizes.
+    #[error("joints: expected at most {MOST_JOINTS}, got {0}")]
+    TooManyJoints(usize),
     /// An effect is misused.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -62,6 +66,7 @@ pub struct Axis<S> {
     pub motor_inertia: S,
     /// Viscous friction of the motor [Nm s/rad].
     pub viscous_friction: S,
+    inverse_motor_inertia: S,
     /// Compliant transmission; `None` is rigid.
     pub gear: Option<Gear<S>>,
     /// Everything that acts on this axis.
@@ -76,19 +81,13 @@ pub struct Axis<S> {
 pub struct Plant<S> {
     /// Rigid-body chain.
     pub chain: Chain<S>,
+    /// Equations of motion of the chain.
+    pub dynamics: Dynamics<S>,
     /// Driven axes in chain order.
     pub axes: Vec<Axis<S>>,
     /// Elastic joints: index, stiffness, damping.
     pub elastic: Vec<(usize, S, S)>,
     n_motors: usize,
-}
-
-/// Scratch of [`Plant::derivative`].
-#[derive(Debug, Clone)]
-pub struct PlantScratch<S> {
-    chain: ChainState<S>,
-    matrix: Vec<S>,
-    force: Vec<S>,
 }
 
 impl<S: Scalar> Plant<S> {
@@ -101,6 +100,9 @@ impl<S: Scalar> Plant<S> {
         overrides: &[(Parameter, S)],
         settings: &[EffectSetting<S>],
     ) -> Result<Self, PlantError> {
+        if robot.joints.len() > MOST_JOINTS {
+            return Err(PlantError::TooManyJoints(robot.joints.len()));
+        }
         let mut chain = Chain::new(robot);
         for (parameter, value) in overrides {
             parameter.apply_to_chain(*value, &mut chain);
@@ -110,6 +112,7 @@ impl<S: Scalar> Plant<S> {
             found.map_or_else(|| S::constant(p.nominal(robot)), |(_, v)| *v)
         };
         let mut plant = Self {
+            dynamics: Dynamics::new(&chain),
             chain,
             axes: axes(robot, &value_of),
             elastic: elastic_joints(robot, &value_of),
@@ -122,6 +125,11 @@ impl<S: Scalar> Plant<S> {
             plant.add_effect(setting)?;
         }
         plant.check_masses()?;
+        // Effects may have changed masses and inertias.
+        plant.dynamics = Dynamics::new(&plant.chain);
+        for axis in &mut plant.axes {
+            axis.inverse_motor_inertia = axis.motor_inertia.recip();
+        }
         Ok(plant)
     }
 
@@ -205,16 +213,6 @@ impl<S: Scalar> Plant<S> {
         self.n_motors
     }
 
-    /// Scratch for [`Plant::derivative`].
-    pub fn scratch(&self) -> PlantScratch<S> {
-        let n = self.chain.len();
-        PlantScratch {
-            chain: ChainState::new(n),
-            matrix: vec![S::zero(); n * n],
-            force: vec![S::zero(); n],
-        }
-    }
-
     /// Motor angle of an axis in state `x` [rad].
     pub fn motor_angle(&self, axis: &Axis<S>, x: &[S]) -> S {
         match &axis.gear {
@@ -251,43 +249,67 @@ impl<S: Scalar> Plant<S> {
 
     /// `dx = f(x, tau)`: `applied` is the torque the drives deliver, `command`
     /// the commanded torque of the sample (torque ripple scales with it) [Nm].
+    #[inline]
     pub fn derivative(
         &self,
         x: &[S],
         applied: &[S],
         command: &[S],
-        scratch: &mut PlantScratch<S>,
+        scratch: &mut DynamicsScratch<S>,
+        dx: &mut [S],
+    ) {
+        sized!(
+            self.dynamics.len(),
+            self.derivative_sized(x, applied, command, scratch, dx)
+        );
+    }
+
+    /// Scratch for [`Plant::derivative`].
+    pub fn scratch(&self) -> DynamicsScratch<S> {
+        self.dynamics.scratch()
+    }
+
+    fn derivative_sized<const N: usize>(
+        &self,
+        x: &[S],
+        applied: &[S],
+        command: &[S],
+        scratch: &mut DynamicsScratch<S>,
         dx: &mut [S],
     ) {
         let (m, n) = (self.n_motors, self.chain.len());
         let (angles, rates) = x.split_at(m + n);
         let (q, v) = (&angles[m..], &rates[m..]);
-        self.chain.evaluate(q, v, &mut scratch.chain);
-        scratch.matrix.copy_from_slice(&scratch.chain.inertia);
-        for (f, b) in scratch.force.iter_mut().zip(&scratch.chain.bias) {
-            *f = -*b;
+        self.dynamics.update::<N>(q, v, scratch);
+        let Some(terms) = scratch.sized::<N>() else {
+            return;
+        };
+        // Matrix and force are used up by the solve below.
+        let force = terms.bias;
+        for f in force.iter_mut() {
+            *f = -*f;
         }
         dx[..m + n].copy_from_slice(rates);
-        for (i, axis) in self.axes.iter().enumerate() {
-            let torque = self.axis_torque(axis, x, applied[i], command[i]);
+        for (axis, (applied, command)) in self.axes.iter().zip(applied.iter().zip(command)) {
+            let torque = self.axis_torque(axis, x, *applied, *command);
             let joint = axis.joint;
             for kernel in &axis.on_joint {
-                scratch.force[joint] += kernel.joint_torque(q[joint]);
+                force[joint] += kernel.joint_torque(q[joint]);
             }
             if let Some(gear) = &axis.gear {
-                scratch.force[joint] += torque.gear;
-                dx[m + n + gear.slot] = (torque.motor - torque.load) / axis.motor_inertia;
+                force[joint] += torque.gear;
+                dx[m + n + gear.slot] = (torque.motor - torque.load) * axis.inverse_motor_inertia;
             } else {
                 let up = 1.0 / axis.ratio;
-                scratch.matrix[joint * n + joint] += axis.motor_inertia * (up * up);
-                scratch.force[joint] += torque.motor * up;
+                terms.inertia[joint][joint] += axis.motor_inertia * (up * up);
+                force[joint] += torque.motor * up;
             }
         }
         for (joint, stiffness, damping) in &self.elastic {
-            scratch.force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
+            force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
         }
-        solve_symmetric(&mut scratch.matrix, &mut scratch.force, n);
-        dx[m + n + m..].copy_from_slice(&scratch.force);
+        solve_symmetric(terms.inertia, force);
+        dx[m + n + m..].copy_from_slice(&force[..n]);
     }
 
     /// Torque that effects add on a motor in state `x` [Nm].
@@ -371,6 +393,7 @@ fn axes<S: Scalar>(robot: &RobotDescription, value_of: &impl Fn(Parameter) -> S)
                 joint,
                 ratio: drive.gear_ratio,
                 motor_inertia: value_of(Parameter::MotorInertia(joint)),
+                inverse_motor_inertia: value_of(Parameter::MotorInertia(joint)).recip(),
                 viscous_friction: value_of(Parameter::ViscousFriction(joint)),
                 gear,
                 kernels: Vec::new(),

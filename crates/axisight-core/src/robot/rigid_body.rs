@@ -1,14 +1,15 @@
 //! Rigid-body quantities of a robot at given joint angles, in plain numbers.
 
-use super::chain::{Chain, ChainState};
+use super::chain::{Chain, Pose};
 use super::description::{Motion, RobotDescription};
-use super::linear_algebra::solve_symmetric;
+use super::dynamics::{Dynamics, DynamicsState};
 use nalgebra::DMatrix;
 
 /// Kinematics and dynamics of the chain of all joints (driven and elastic).
 #[derive(Debug, Clone)]
 pub struct RigidBody {
     chain: Chain<f64>,
+    dynamics: Dynamics<f64>,
     motion: Vec<Motion>,
     gravity: [f64; 3],
 }
@@ -28,8 +29,10 @@ pub struct ShapeError {
 impl RigidBody {
     /// The chain of a robot, motors and springs left out.
     pub fn new(robot: &RobotDescription) -> Self {
+        let chain = Chain::new(robot);
         Self {
-            chain: Chain::new(robot),
+            dynamics: Dynamics::new(&chain),
+            chain,
             motion: robot.joints.iter().map(|j| j.motion).collect(),
             gravity: robot.gravity,
         }
@@ -59,12 +62,15 @@ impl RigidBody {
         }
     }
 
-    fn evaluate(&self, q: &[f64], v: &[f64]) -> Result<ChainState<f64>, ShapeError> {
+    fn evaluate(&self, q: &[f64], v: &[f64]) -> Result<DynamicsState<f64>, ShapeError> {
         self.check("q", q)?;
         self.check("v", v)?;
-        let mut state = ChainState::new(self.n_joints());
-        self.chain.evaluate(q, v, &mut state);
-        Ok(state)
+        Ok(self.dynamics.evaluate(q, v))
+    }
+
+    fn poses(&self, q: &[f64]) -> Result<Vec<Pose<f64>>, ShapeError> {
+        self.check("q", q)?;
+        Ok(self.chain.poses(q))
     }
 
     /// Inertia matrix M(q), row-major.
@@ -119,10 +125,9 @@ impl RigidBody {
         tau: &[f64],
     ) -> Result<Vec<f64>, ShapeError> {
         self.check("tau", tau)?;
-        let mut state = self.evaluate(q, v)?;
-        let mut force: Vec<f64> = tau.iter().zip(&state.bias).map(|(t, b)| t - b).collect();
-        solve_symmetric(&mut state.inertia, &mut force, tau.len());
-        Ok(force)
+        self.check("q", q)?;
+        self.check("v", v)?;
+        Ok(self.dynamics.accelerate(q, v, tau))
     }
 
     /// Pose of the link frame of joint `joint`: rotation (rows) and origin [m], base frame.
@@ -130,9 +135,9 @@ impl RigidBody {
     /// # Errors
     /// [`ShapeError`], also for a joint the chain does not have.
     pub fn pose(&self, q: &[f64], joint: usize) -> Result<([[f64; 3]; 3], [f64; 3]), ShapeError> {
-        let state = self.evaluate(q, &vec![0.0; q.len()])?;
+        let poses = self.poses(q)?;
         self.check_joint(joint)?;
-        Ok((state.rotation[joint].0, state.position[joint].0))
+        Ok((poses[joint].rotation.0, poses[joint].position.0))
     }
 
     fn check_joint(&self, joint: usize) -> Result<(), ShapeError> {
@@ -158,15 +163,15 @@ impl RigidBody {
         joint: usize,
         point: [f64; 3],
     ) -> Result<DMatrix<f64>, ShapeError> {
-        let state = self.evaluate(q, &vec![0.0; q.len()])?;
+        let poses = self.poses(q)?;
         self.check_joint(joint)?;
-        let tip = state.position[joint] + state.rotation[joint].apply_constant(&point);
+        let tip = poses[joint].position + poses[joint].rotation.apply_constant(&point);
         let mut out = DMatrix::zeros(6, self.n_joints());
         for i in 0..=joint {
-            let axis = state.axis[i];
+            let axis = poses[i].axis;
             match self.motion[i] {
                 Motion::Revolute => {
-                    let linear = axis.cross(&(tip - state.position[i]));
+                    let linear = axis.cross(&(tip - poses[i].position));
                     for k in 0..3 {
                         out[(k, i)] = linear.0[k];
                         out[(3 + k, i)] = axis.0[k];
@@ -196,10 +201,10 @@ impl RigidBody {
             .chain
             .joints
             .iter()
-            .enumerate()
-            .filter_map(|(i, joint)| {
+            .zip(&self.chain.poses(q))
+            .filter_map(|(joint, pose)| {
                 let body = joint.body.as_ref()?;
-                let com = state.position[i] + state.rotation[i].apply_constant(&body.com);
+                let com = pose.position + pose.rotation.apply_constant(&body.com);
                 let height: f64 = (0..3).map(|k| self.gravity[k] * com.0[k]).sum();
                 Some(-body.mass * height)
             })

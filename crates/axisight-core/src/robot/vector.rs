@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 use std::array::from_fn;
-use std::ops::{Add, Sub};
+use std::ops::{Add, AddAssign, Sub};
 
 /// A vector in the base frame.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +25,12 @@ impl<S: Scalar> Vec3<S> {
         let (a, b) = (&self.0, &other.0);
         a[0].fma(b[0], a[1].fma(b[1], a[2] * b[2]))
     }
+    /// Inner product plus a number.
+    #[inline(always)]
+    pub fn dot_add(&self, other: &Self, sum: S) -> S {
+        let (a, b) = (&self.0, &other.0);
+        a[0].fma(b[0], a[1].fma(b[1], a[2].fma(b[2], sum)))
+    }
     /// Cross product.
     #[inline(always)]
     #[must_use]
@@ -36,11 +42,40 @@ impl<S: Scalar> Vec3<S> {
             a[0].fma(b[1], -(a[1] * b[0])),
         ])
     }
+    /// Cross product plus a vector.
+    #[inline(always)]
+    #[must_use]
+    pub fn cross_add(&self, other: &Self, sum: &Self) -> Self {
+        let (a, b, c) = (&self.0, &other.0, &sum.0);
+        Self([
+            a[1].fma(b[2], (-a[2]).fma(b[1], c[0])),
+            a[2].fma(b[0], (-a[0]).fma(b[2], c[1])),
+            a[0].fma(b[1], (-a[1]).fma(b[0], c[2])),
+        ])
+    }
     /// Product with a scalar.
     #[inline(always)]
     #[must_use]
     pub fn scale(&self, s: S) -> Self {
-        Self(self.0.map(|x| x * s))
+        Self(from_fn(|i| self.0[i] * s))
+    }
+    /// `s * self + sum`.
+    #[inline(always)]
+    #[must_use]
+    pub fn scale_add(&self, s: S, sum: &Self) -> Self {
+        Self(from_fn(|i| self.0[i].fma(s, sum.0[i])))
+    }
+    /// `sum - s * self`.
+    #[inline(always)]
+    #[must_use]
+    pub fn scale_sub(&self, s: S, sum: &Self) -> Self {
+        Self(from_fn(|i| (-self.0[i]).fma(s, sum.0[i])))
+    }
+    /// The opposite vector.
+    #[inline(always)]
+    #[must_use]
+    pub fn negate(&self) -> Self {
+        Self(from_fn(|i| -self.0[i]))
     }
 }
 
@@ -49,6 +84,12 @@ impl<S: Scalar> Add for Vec3<S> {
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         Self(from_fn(|i| self.0[i] + other.0[i]))
+    }
+}
+impl<S: Scalar> AddAssign for Vec3<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
     }
 }
 impl<S: Scalar> Sub for Vec3<S> {
@@ -80,6 +121,12 @@ impl<S: Scalar> Mat3<S> {
     pub fn apply(&self, v: &Vec3<S>) -> Vec3<S> {
         Vec3(from_fn(|i| Vec3(self.0[i]).dot(v)))
     }
+    /// Product of two matrices.
+    #[must_use]
+    pub fn times(&self, other: &[[S; 3]; 3]) -> Self {
+        let column = |j: usize| Vec3(from_fn(|k| other[k][j]));
+        Self(from_fn(|i| from_fn(|j| Vec3(self.0[i]).dot(&column(j)))))
+    }
     /// Matrix times a constant vector; zero entries cost nothing.
     #[inline(always)]
     pub fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
@@ -96,39 +143,16 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
-/// `r * Rot(axis, angle)` for a constant unit axis (Rodrigues).
+/// The rotation about a constant unit axis by the angle with sine `s` and cosine `c` (Rodrigues).
 #[inline(always)]
-pub fn rotate_about<S: Scalar>(r: &Mat3<S>, axis: &[f64; 3], angle: S) -> Mat3<S> {
-    let (s, c) = angle.sin_cos();
-    for k in 0..3 {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        if axis[i] == 0.0 && axis[j] == 0.0 {
-            // About a coordinate axis only two columns mix.
-            let s = s * axis[k];
-            let mut out = *r;
-            for row in 0..3 {
-                let (a, b) = (r.0[row][i], r.0[row][j]);
-                out.0[row][i] = a.fma(c, b * s);
-                out.0[row][j] = b.fma(c, -(a * s));
-            }
-            return out;
-        }
-    }
+pub fn rotation<S: Scalar>(axis: &[f64; 3], s: S, c: S) -> [[S; 3]; 3] {
     let t = S::one() - c;
     let [x, y, z] = *axis;
-    let rot = [
+    [
         [c + t * (x * x), t * (x * y) - s * z, t * (x * z) + s * y],
         [t * (x * y) + s * z, c + t * (y * y), t * (y * z) - s * x],
         [t * (x * z) - s * y, t * (y * z) + s * x, c + t * (z * z)],
-    ];
-    Mat3(from_fn(|row| {
-        from_fn(|col| {
-            r.0[row][0].fma(
-                rot[0][col],
-                r.0[row][1].fma(rot[1][col], r.0[row][2] * rot[2][col]),
-            )
-        })
-    }))
+    ]
 }
 
 /// `R I R^T` for a symmetric inertia stored as xx yy zz xy xz yz.
@@ -152,14 +176,14 @@ pub fn rotate_inertia<S: Scalar>(r: &Mat3<S>, inertia: &[S; 6]) -> [S; 6] {
 /// by `d`); `first` and `mass` are the moments about the old point.
 #[inline(always)]
 pub fn shift_inertia<S: Scalar>(second: &mut [S; 6], d: &Vec3<S>, first: &Vec3<S>, mass: S) {
-    let h = Vec3(from_fn(|i| first.0[i].fma(S::constant(2.0), d.0[i] * mass)));
-    let spread = d.dot(&h);
-    // The symmetric part of d h^T without the doubled diagonal.
-    let half = |i: usize, j: usize| (d.0[i].fma(h.0[j], d.0[j] * h.0[i])) * 0.5;
-    second[0] += spread - half(0, 0);
-    second[1] += spread - half(1, 1);
-    second[2] += spread - half(2, 2);
-    second[3] -= half(0, 1);
-    second[4] -= half(0, 2);
-    second[5] -= half(1, 2);
+    // With h = first + m d / 2 the second moment grows by 2 (d.h) 1 - (d h^T + h d^T).
+    let h = Vec3(from_fn(|i| d.0[i].fma(mass * 0.5, first.0[i])));
+    let [xx, yy, zz] = from_fn(|i| d.0[i] * h.0[i] * 2.0);
+    second[0] += yy + zz;
+    second[1] += xx + zz;
+    second[2] += xx + yy;
+    let mixed = |i: usize, j: usize| (-d.0[i]).fma(h.0[j], -(d.0[j] * h.0[i]));
+    second[3] += mixed(0, 1);
+    second[4] += mixed(0, 2);
+    second[5] += mixed(1, 2);
 }

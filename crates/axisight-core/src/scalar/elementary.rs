@@ -5,99 +5,142 @@
 //! Elementary Functions*; the polynomials are the Taylor ones on the reduced
 //! interval, carried to where their remainder is below one rounding.
 
+use super::Scalar;
+
 // pi/2 in three parts; the first two have trailing zeros so that products with
 // the quadrant number are exact for |x| < 1e6.
 const HALF_PI_1: f64 = 1.570_796_326_734_125_6;
 const HALF_PI_2: f64 = 6.077_100_506_303_966e-11;
 const HALF_PI_3: f64 = 2.022_266_248_795_950_6e-21;
 
+/// What the functions need beyond [`Scalar`]; numbers without derivatives have it.
+pub(super) trait Real: Scalar {
+    /// The nearest whole number, ties to even.
+    fn round(self) -> Self;
+    /// The largest whole number not above.
+    fn floor(self) -> Self;
+    /// `2^self` for a whole number from -1022 to 1023.
+    fn two_to_the(self) -> Self;
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn round(self) -> Self {
+        self.round_ties_even()
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        f64::floor(self)
+    }
+    #[inline(always)]
+    fn two_to_the(self) -> Self {
+        // Adding 2^52 + 2^51 leaves the integer in the low bits of the sum.
+        let magic = 6_755_399_441_055_744.0_f64;
+        f64::from_bits(((self + magic).to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
+    }
+}
+
+/// Value of a polynomial with the given coefficients, highest power first.
+#[inline(always)]
+fn horner<R: Real>(z: R, coefficients: &[f64]) -> R {
+    let mut sum = R::zero();
+    for (i, c) in coefficients.iter().enumerate() {
+        sum = if i == 0 {
+            R::constant(*c)
+        } else {
+            sum.fma(z, R::constant(*c))
+        };
+    }
+    sum
+}
+
 /// Sine and cosine of `x` [rad].
 #[inline(always)]
-#[allow(clippy::float_cmp)] // quadrant numbers are whole
-pub(super) fn sin_cos(x: f64) -> (f64, f64) {
-    let quadrant = (x * std::f64::consts::FRAC_2_PI).round_ties_even();
-    let r = quadrant.mul_add(
-        -HALF_PI_3,
-        quadrant.mul_add(-HALF_PI_2, quadrant.mul_add(-HALF_PI_1, x)),
-    );
+pub(super) fn sin_cos<R: Real>(x: R) -> (R, R) {
+    let quadrant = (x * std::f64::consts::FRAC_2_PI).round();
+    let r = quadrant.fma(R::constant(-HALF_PI_1), x);
+    let r = quadrant.fma(R::constant(-HALF_PI_2), r);
+    let r = quadrant.fma(R::constant(-HALF_PI_3), r);
     let z = r * r;
-    let s = sine_polynomial(r, z);
-    let c = cosine_polynomial(z);
-    // quadrant modulo 4 as a number in 0..4
-    let q = (quadrant * 0.25).floor().mul_add(-4.0, quadrant);
-    let odd = q == 1.0 || q == 3.0;
-    let (sin, cos) = if odd { (c, s) } else { (s, c) };
-    let sin = if q >= 2.0 { -sin } else { sin };
-    let cos = if q == 1.0 || q == 2.0 { -cos } else { cos };
-    (sin, cos)
+    let s = (horner(z, &SINE) * z).fma(r, r);
+    let c = horner(z, &COSINE).fma(z, R::one());
+    // Quadrant modulo 4 is 0, 1, 2 or 3; halves fall between them.
+    let q = (quadrant * 0.25).floor().fma(R::constant(-4.0), quadrant);
+    let middle = (q - 1.5).abs() - 1.0;
+    // `middle` is 0.5 for quadrants 0 and 3, -0.5 for 1 and 2; odd ones swap sine and cosine.
+    let odd = -((q - 2.0).abs() - 1.0).abs() + 0.5;
+    let (sin, cos) = (odd.if_positive(c, s), odd.if_positive(s, c));
+    let sin = (q - 1.5).if_positive(-sin, sin);
+    (sin, middle.if_positive(cos, -cos))
 }
 
-#[inline(always)]
-fn sine_polynomial(r: f64, z: f64) -> f64 {
-    let p = (1.0_f64 / 355_687_428_096_000.0)
-        .mul_add(z, -1.0 / 1_307_674_368_000.0)
-        .mul_add(z, 1.0 / 6_227_020_800.0)
-        .mul_add(z, -1.0 / 39_916_800.0)
-        .mul_add(z, 1.0 / 362_880.0)
-        .mul_add(z, -1.0 / 5_040.0)
-        .mul_add(z, 1.0 / 120.0)
-        .mul_add(z, -1.0 / 6.0);
-    (p * z).mul_add(r, r)
-}
+const SINE: [f64; 8] = [
+    1.0 / 355_687_428_096_000.0,
+    -1.0 / 1_307_674_368_000.0,
+    1.0 / 6_227_020_800.0,
+    -1.0 / 39_916_800.0,
+    1.0 / 362_880.0,
+    -1.0 / 5_040.0,
+    1.0 / 120.0,
+    -1.0 / 6.0,
+];
 
-#[inline(always)]
-fn cosine_polynomial(z: f64) -> f64 {
-    let p = (1.0_f64 / 20_922_789_888_000.0)
-        .mul_add(z, -1.0 / 87_178_291_200.0)
-        .mul_add(z, 1.0 / 479_001_600.0)
-        .mul_add(z, -1.0 / 3_628_800.0)
-        .mul_add(z, 1.0 / 40_320.0)
-        .mul_add(z, -1.0 / 720.0)
-        .mul_add(z, 1.0 / 24.0)
-        .mul_add(z, -0.5);
-    p.mul_add(z, 1.0)
-}
+const COSINE: [f64; 8] = [
+    1.0 / 20_922_789_888_000.0,
+    -1.0 / 87_178_291_200.0,
+    1.0 / 479_001_600.0,
+    -1.0 / 3_628_800.0,
+    1.0 / 40_320.0,
+    -1.0 / 720.0,
+    1.0 / 24.0,
+    -0.5,
+];
 
 const LN2_HIGH: f64 = 6.931_471_803_691_238_2e-1;
 const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
+const EXPONENTIAL: [f64; 14] = [
+    1.0 / 6_227_020_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 39_916_800.0,
+    1.0 / 3_628_800.0,
+    1.0 / 362_880.0,
+    1.0 / 40_320.0,
+    1.0 / 5_040.0,
+    1.0 / 720.0,
+    1.0 / 120.0,
+    1.0 / 24.0,
+    1.0 / 6.0,
+    0.5,
+    1.0,
+    1.0,
+];
+
 /// Exponential of `x`, zero below -708, saturated above 708.
 #[inline(always)]
-pub(super) fn exp(x: f64) -> f64 {
-    let clamped = x.clamp(-708.0, 708.0);
-    let n = (clamped * std::f64::consts::LOG2_E).round_ties_even();
-    let r = n.mul_add(-LN2_LOW, n.mul_add(-LN2_HIGH, clamped));
-    let p = (1.0_f64 / 6_227_020_800.0)
-        .mul_add(r, 1.0 / 479_001_600.0)
-        .mul_add(r, 1.0 / 39_916_800.0)
-        .mul_add(r, 1.0 / 3_628_800.0)
-        .mul_add(r, 1.0 / 362_880.0)
-        .mul_add(r, 1.0 / 40_320.0)
-        .mul_add(r, 1.0 / 5_040.0)
-        .mul_add(r, 1.0 / 720.0)
-        .mul_add(r, 1.0 / 120.0)
-        .mul_add(r, 1.0 / 24.0)
-        .mul_add(r, 1.0 / 6.0)
-        .mul_add(r, 0.5)
-        .mul_add(r, 1.0)
-        .mul_add(r, 1.0);
-    // Adding 2^52 + 2^51 leaves the integer n in the low bits of the sum.
-    let magic = 6_755_399_441_055_744.0_f64;
-    let bits = ((n + magic).to_bits() << 52).wrapping_add(1.0_f64.to_bits());
-    let y = p * f64::from_bits(bits);
-    if x < -708.0 { 0.0 } else { y }
+pub(super) fn exp<R: Real>(x: R) -> R {
+    let limit = R::constant(708.0);
+    // A comparison with NaN is false: it passes through all three choices.
+    let below = (x - limit).if_positive(limit, x);
+    let clamped = (-limit - below).if_positive(-limit, below);
+    let n = (clamped * std::f64::consts::LOG2_E).round();
+    let r = n.fma(R::constant(-LN2_LOW), n.fma(R::constant(-LN2_HIGH), clamped));
+    let y = horner(r, &EXPONENTIAL) * n.two_to_the();
+    (-limit - x).if_positive(R::zero(), y)
 }
 
 /// Hyperbolic tangent of `x`.
 #[inline(always)]
-pub(super) fn tanh(x: f64) -> f64 {
-    let e = exp(-2.0 * x.abs());
-    ((1.0 - e) / (1.0 + e)).copysign(x)
+pub(super) fn tanh<R: Real>(x: R) -> R {
+    let e = exp(x.abs() * -2.0);
+    let size = (R::one() - e) / (R::one() + e);
+    x.if_positive(size, -size)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
 
     fn sweep(limit: f64) -> impl Iterator<Item = f64> {
         (0..200_001).map(move |i| (f64::from(i) / 100_000.0 - 1.0) * limit)
@@ -123,6 +166,7 @@ mod tests {
             }
         }
         assert!(exp(-1e9) <= 0.0);
+        assert!(exp(f64::NAN).is_nan() && tanh(f64::NAN).is_nan());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::Scalar;
 use super::elementary;
+use super::registers as vector;
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -10,51 +11,40 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 #[repr(C, align(32))]
 pub struct Lanes<const L: usize>(pub [f64; L]);
 
-impl<const L: usize> Lanes<L> {
-    #[inline(always)]
-    fn map2(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(from_fn(|i| f(self.0[i], other.0[i])))
-    }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        Self(from_fn(|i| f(self.0[i])))
-    }
-}
-
 macro_rules! elementwise {
-    ($trait:ident, $method:ident, $op:tt) => {
+    ($trait:ident, $method:ident) => {
         impl<const L: usize> $trait for Lanes<L> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.map2(other, |a, b| a $op b)
+                Self(vector::$method(self.0, other.0))
             }
         }
         impl<const L: usize> $trait<f64> for Lanes<L> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: f64) -> Self {
-                self.map(|a| a $op other)
+                Self(vector::$method(self.0, [other; L]))
             }
         }
     };
 }
-elementwise!(Add, add, +);
-elementwise!(Sub, sub, -);
-elementwise!(Mul, mul, *);
+elementwise!(Add, add);
+elementwise!(Sub, sub);
+elementwise!(Mul, mul);
 
 impl<const L: usize> Div for Lanes<L> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        self.map2(other, |a, b| a / b)
+        Self(vector::div(self.0, other.0))
     }
 }
 impl<const L: usize> Neg for Lanes<L> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|a| -a)
+        Self(vector::neg(self.0))
     }
 }
 impl<const L: usize> AddAssign for Lanes<L> {
@@ -96,34 +86,45 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
-        Self(from_fn(|i| self.0[i].mul_add(b.0[i], c.0[i])))
+        Self(vector::fma(self.0, b.0, c.0))
     }
     #[inline(always)]
     fn recip(self) -> Self {
-        self.map(|a| 1.0 / a)
+        Self(vector::div([1.0; L], self.0))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
+        Self(vector::sqrt(self.0))
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let (mut s, mut c) = ([0.0; L], [0.0; L]);
-        for i in 0..L {
-            (s[i], c[i]) = elementary::sin_cos(self.0[i]);
-        }
-        (Self(s), Self(c))
+        elementary::sin_cos(self)
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        self.map(elementary::exp)
+        elementary::exp(self)
     }
     #[inline(always)]
     fn tanh(self) -> Self {
-        self.map(elementary::tanh)
+        elementary::tanh(self)
     }
     #[inline(always)]
     fn if_positive(self, a: Self, b: Self) -> Self {
-        Self(from_fn(|i| if self.0[i] > 0.0 { a.0[i] } else { b.0[i] }))
+        Self(vector::if_positive(self.0, a.0, b.0))
+    }
+}
+
+impl<const L: usize> elementary::Real for Lanes<L> {
+    #[inline(always)]
+    fn round(self) -> Self {
+        Self(vector::round(self.0))
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self(vector::floor(self.0))
+    }
+    #[inline(always)]
+    fn two_to_the(self) -> Self {
+        Self(from_fn(|i| elementary::Real::two_to_the(self.0[i])))
     }
 }

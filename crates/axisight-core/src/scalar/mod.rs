@@ -7,6 +7,7 @@
 mod dual;
 mod elementary;
 mod lanes;
+mod registers;
 
 pub use dual::Dual;
 pub use lanes::Lanes;
@@ -60,6 +61,13 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// Sine and cosine; absolute error below 3e-16 for |x| < 1e6.
     fn sin_cos(self) -> (Self, Self);
+    /// Sine and cosine of every entry.
+    #[inline(always)]
+    fn sin_cos_each<const N: usize>(x: &[Self; N], out: &mut [(Self, Self); N]) {
+        for (x, out) in x.iter().zip(out) {
+            *out = x.sin_cos();
+        }
+    }
     /// Exponential; relative error below 3e-16, zero below -708.
     #[must_use]
     fn exp(self) -> Self;
@@ -129,6 +137,16 @@ impl Scalar for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         elementary::sin_cos(self)
+    }
+    #[inline(always)]
+    fn sin_cos_each<const N: usize>(x: &[Self; N], out: &mut [(Self, Self); N]) {
+        // Four at a time cost as much as one, and give the same bits.
+        for (x, out) in x.chunks(4).zip(out.chunks_mut(4)) {
+            let (s, c) = Lanes::<4>::from_lanes(|i| x.get(i).copied().unwrap_or(0.0)).sin_cos();
+            for (i, out) in out.iter_mut().enumerate().take(4) {
+                *out = (s.0[i], c.0[i]);
+            }
+        }
     }
     #[inline(always)]
     fn exp(self) -> Self {

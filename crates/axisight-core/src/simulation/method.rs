@@ -2,7 +2,7 @@
 
 use super::torque_path::Line;
 use super::{dormand_prince, runge_kutta4};
-use crate::robot::{Plant, PlantScratch};
+use crate::robot::{DynamicsScratch, Plant};
 use crate::scalar::Scalar;
 
 /// How the plant is integrated inside a sample.
@@ -29,7 +29,7 @@ impl Default for Method {
 
 /// Integrator state of one run: scratch and effort counters.
 pub struct Stepper<S> {
-    pub(super) plant_scratch: PlantScratch<S>,
+    pub(super) plant_scratch: DynamicsScratch<S>,
     pub(super) stages: Vec<Vec<S>>,
     pub(super) probe: Vec<S>,
     pub(super) applied: Vec<S>,
