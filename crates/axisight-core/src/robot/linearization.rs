@@ -49,7 +49,7 @@ pub fn linearize(
     let plain = Plant::<f64>::new(robot, &[], settings)?;
     let rest = equilibrium(&plain, driven)?;
     let x0 = plain.state_at_rest(&rest.motor_angle, &rest.joint_angle);
-    let lifted: Vec<EffectSetting<D>> = settings.iter().map(lift).collect();
+    let lifted: Vec<EffectSetting<D>> = settings.iter().map(EffectSetting::lifted).collect();
     let plant = Plant::<D>::new(robot, &[], &lifted)?;
     let (nx, nu) = (plant.n_states(), plant.axes.len());
     let applied: Vec<f64> = plain
@@ -100,12 +100,4 @@ pub fn linearize(
         c,
         equilibrium: rest,
     })
-}
-
-fn lift(setting: &EffectSetting<f64>) -> EffectSetting<D> {
-    EffectSetting {
-        name: setting.name.clone(),
-        axis: setting.axis,
-        parameters: setting.parameters.iter().map(|p| D::constant(*p)).collect(),
-    }
 }

@@ -25,6 +25,17 @@ pub struct EffectSetting<S> {
     pub parameters: Vec<S>,
 }
 
+impl EffectSetting<f64> {
+    /// The same setting over another scalar.
+    pub fn lifted<S: Scalar>(&self) -> EffectSetting<S> {
+        EffectSetting {
+            name: self.name.clone(),
+            axis: self.axis,
+            parameters: self.parameters.iter().map(|p| S::constant(*p)).collect(),
+        }
+    }
+}
+
 /// Why a plant cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {

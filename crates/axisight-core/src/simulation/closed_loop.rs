@@ -2,7 +2,7 @@
 
 use super::controller::ControlLoop;
 use super::method::{Interval, Method, Stepper};
-use super::torque_path::{Line, TorquePath};
+use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
 use crate::scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -92,6 +92,9 @@ pub enum SimulationError {
         /// What came.
         got: String,
     },
+    /// An implicit method without the Jacobian of [`Stepper::with_jacobian`].
+    #[error("method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}")]
+    NoJacobian(Method),
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,
@@ -109,6 +112,9 @@ pub fn simulate<S: Scalar>(
 ) -> Result<Status, SimulationError> {
     let n_axes = plant.axes.len();
     let n_samples = check(run, n_axes, S::LANES)?;
+    if run.method.may_be_implicit() && !stepper.has_jacobian() {
+        return Err(SimulationError::NoJacobian(run.method));
+    }
     let rest = equilibrium(plant, run.start)?;
     let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
     let mut controller = ControlLoop::new(
@@ -124,8 +130,7 @@ pub fn simulate<S: Scalar>(
         .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
         .collect();
     let mut signals = Signals::new(n_axes);
-    let mut substeps = 1;
-    let mut scratch_lines = Vec::new();
+    let mut buffers = TorqueBuffers::new(n_axes);
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Ok(Status::Cancelled(k));
@@ -134,19 +139,14 @@ pub fn simulate<S: Scalar>(
         signals.command(run, k, &mut controller);
         signals.disturb(plant, &x);
         observe(&signals.sample(k, &x));
-        let taken: Vec<S> = paths
-            .iter_mut()
-            .zip(&signals.command)
-            .map(|(path, u)| path.push(*u))
-            .collect();
         let interval = Interval {
             plant,
             command: &signals.command,
             sample_time: run.sample_time,
         };
-        let met = interval.advance(run.method, &mut x, &mut substeps, stepper, |n| {
-            sample_lines(&paths, &taken, n, &mut scratch_lines)
-        });
+        let mut torque = SampleTorque::new(&mut paths, &signals.command, &mut buffers);
+        let met = interval.advance(run.method, &mut x, stepper, &mut torque);
+        torque.finish();
         if x.iter()
             .any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite()))
         {
@@ -155,28 +155,8 @@ pub fn simulate<S: Scalar>(
         if !met {
             return Ok(Status::StepSizeCollapsed(k));
         }
-        for (path, u) in paths.iter_mut().zip(&taken) {
-            path.advance(*u);
-        }
     }
     Ok(Status::Completed)
-}
-
-/// Torque lines of all axes, sub-step by sub-step.
-fn sample_lines<S: Scalar>(
-    paths: &[TorquePath<S>],
-    command: &[S],
-    n: usize,
-    scratch: &mut Vec<Line<S>>,
-) -> Vec<Vec<Line<S>>> {
-    let mut out = vec![Vec::with_capacity(paths.len()); n];
-    for (path, u) in paths.iter().zip(command) {
-        path.lines(*u, n, scratch);
-        for (step, line) in out.iter_mut().zip(scratch.iter()) {
-            step.push(*line);
-        }
-    }
-    out
 }
 
 /// Signals of the current sample.

@@ -50,7 +50,7 @@ const ERROR: [f64; STAGES] = [
 ];
 
 /// States smaller than this [rad, rad/s] are held to an absolute error.
-const SMALLEST_STATE: f64 = 1e-3;
+pub(super) const SMALLEST_STATE: f64 = 1e-3;
 
 /// One step of length `h` [s]; returns the largest local error relative to the state.
 pub(super) fn step<S: Scalar>(
@@ -60,41 +60,84 @@ pub(super) fn step<S: Scalar>(
     lines: &[Line<S>],
     stepper: &mut Stepper<S>,
 ) -> f64 {
-    stepper.steps += 1;
+    stepper.effort.steps += 1;
     for stage in 0..STAGES {
-        for i in 0..x.len() {
-            let mut sum = x[i];
-            for (j, weight) in WEIGHT[stage].iter().enumerate().take(stage) {
-                if *weight != 0.0 {
-                    sum += stepper.stages[j][i] * (weight * h);
-                }
-            }
-            stepper.probe[i] = sum;
+        stepper.probe.copy_from_slice(x);
+        for (weight, k) in WEIGHT[stage][..stage.min(6)].iter().zip(&stepper.stages) {
+            add(&mut stepper.probe, *weight * h, k);
         }
         stepper.stage(interval.plant, stage, NODE[stage], lines, interval.command);
     }
-    let mut worst: f64 = 0.0;
-    for i in 0..x.len() {
-        let mut error = S::zero();
-        for (stage, weight) in stepper.stages.iter().zip(&ERROR) {
-            if *weight != 0.0 {
-                error += stage[i] * (weight * h);
-            }
+    // The last probe is the fifth-order solution; its own memory now takes the error.
+    x.copy_from_slice(&stepper.probe);
+    stepper.probe.fill(S::zero());
+    for (weight, k) in ERROR.iter().zip(&stepper.stages) {
+        add(&mut stepper.probe, *weight * h, k);
+    }
+    largest_relative(&stepper.probe, x)
+}
+
+/// `sum += weight * k`.
+#[inline(always)]
+fn add<S: Scalar>(sum: &mut [S], weight: f64, k: &[S]) {
+    if weight != 0.0 {
+        let weight = S::constant(weight);
+        for (s, k) in sum.iter_mut().zip(k) {
+            *s = k.fma(weight, *s);
         }
-        // The last probe is the fifth-order solution.
-        x[i] = stepper.probe[i];
+    }
+}
+
+/// Largest error in units of its state, over all lanes; NaN if any is.
+pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (e, x) in error.iter().zip(x) {
         for lane in 0..S::LANES {
-            let size = x[i].lane(lane).abs().max(SMALLEST_STATE);
-            let relative = error.lane(lane).abs() / size;
-            worst = if relative.is_nan() {
-                f64::NAN
-            } else {
-                worst.max(relative)
-            };
-            if worst.is_nan() {
-                return worst;
+            let relative = e.lane(lane).abs() / x.lane(lane).abs().max(SMALLEST_STATE);
+            if relative.is_nan() {
+                return f64::NAN;
             }
+            worst = worst.max(relative);
         }
     }
     worst
+}
+
+/// Boundary of the stability region on the negative real axis.
+const STABLE: f64 = 3.25;
+/// A sample of so many explicit sub-steps costs more than an implicit one.
+const DEAR: usize = 8;
+/// Samples in a row that must point to stiffness.
+const PATIENCE: u32 = 15;
+
+/// After an accepted sample with sub-steps `h`: is the step held down by stability?
+///
+/// The last two stages stand at the same time; their slopes over their distance estimate the
+/// dominating eigenvalue (Hairer, Wanner 1996, section IV.2).
+pub(super) fn watch_stiffness<S: Scalar>(stepper: &mut Stepper<S>, h: f64) {
+    if stepper.substeps < DEAR {
+        stepper.stiff_score = 0;
+        return;
+    }
+    let (mut slope, mut distance) = (0.0, 0.0);
+    for i in 0..stepper.probe.len() {
+        let mut apart = S::zero();
+        for (j, k) in stepper.stages.iter().enumerate().take(6) {
+            let sixth = WEIGHT[5].get(j).copied().unwrap_or(0.0);
+            apart += k[i] * (h * (WEIGHT[6][j] - sixth));
+        }
+        let change = stepper.stages[6][i] - stepper.stages[5][i];
+        slope += (0..S::LANES).map(|l| change.lane(l).powi(2)).sum::<f64>();
+        distance += (0..S::LANES).map(|l| apart.lane(l).powi(2)).sum::<f64>();
+    }
+    let stiff = h * h * slope > (0.5 * STABLE).powi(2) * distance;
+    stepper.stiff_score = if stiff { stepper.stiff_score + 1 } else { 0 };
+}
+
+pub(super) fn is_stiff<S: Scalar>(stepper: &Stepper<S>) -> bool {
+    stepper.has_jacobian() && stepper.stiff_score >= PATIENCE
+}
+
+pub(super) fn declare_stiff<S: Scalar>(stepper: &mut Stepper<S>) {
+    stepper.stiff_score = PATIENCE;
 }

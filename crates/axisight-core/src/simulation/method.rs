@@ -1,22 +1,42 @@
 //! Choice of integrator, and what all of them share.
 
-use super::torque_path::Line;
+use super::implicit::Implicit;
+use super::torque_path::{Line, SampleTorque};
 use super::{dormand_prince, runge_kutta4};
 use crate::robot::{DynamicsScratch, Plant};
 use crate::scalar::Scalar;
 
 /// How the plant is integrated inside a sample.
+///
+/// Every method ends its last step on the sample instant, where the controller acts and
+/// the command jumps: outputs are exact at the samples and no step crosses a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// Classical Runge-Kutta of order 4 with a fixed number of sub-steps per sample.
+    /// Classical Runge-Kutta of order 4 with a fixed number of sub-steps per sample and no
+    /// error control: the reference.
     RungeKutta4 {
         /// Sub-steps per sample.
         substeps: usize,
     },
-    /// Dormand-Prince 5(4); the sub-step is halved until the local error is below
+    /// Dormand-Prince 5(4), explicit; the sub-step is halved until the local error is below
     /// `tolerance` times the size of each state.
     DormandPrince {
         /// Relative local error per sub-step.
+        tolerance: f64,
+    },
+    /// Radau IIA of order 5, L-stable, for stiff plants.
+    RadauIia {
+        /// Relative local error per step.
+        tolerance: f64,
+    },
+    /// Rosenbrock method RODAS of order 4(3), L-stable, for stiff plants at loose tolerances.
+    Rosenbrock {
+        /// Relative local error per step.
+        tolerance: f64,
+    },
+    /// Dormand-Prince until the plant proves stiff, then Radau IIA.
+    Automatic {
+        /// Relative local error per step.
         tolerance: f64,
     },
 }
@@ -27,36 +47,73 @@ impl Default for Method {
     }
 }
 
+impl Method {
+    /// Whether the method may need the exact Jacobian of [`Stepper::with_jacobian`].
+    pub fn may_be_implicit(self) -> bool {
+        matches!(
+            self,
+            Self::RadauIia { .. } | Self::Rosenbrock { .. } | Self::Automatic { .. }
+        )
+    }
+}
+
+/// What a run cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Right-hand sides evaluated, those inside Jacobians not counted.
+    pub evaluations: u64,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps thrown away because their error was too large or the iteration did not converge.
+    pub rejections: u64,
+    /// Jacobians evaluated.
+    pub jacobians: u64,
+    /// Matrices factorized.
+    pub factorizations: u64,
+    /// Samples integrated by an implicit method.
+    pub implicit_samples: u64,
+}
+
 /// Integrator state of one run: scratch and effort counters.
 pub struct Stepper<S> {
     pub(super) plant_scratch: DynamicsScratch<S>,
     pub(super) stages: Vec<Vec<S>>,
     pub(super) probe: Vec<S>,
     pub(super) applied: Vec<S>,
-    /// Right-hand sides evaluated.
-    pub evaluations: u64,
-    /// Sub-steps taken.
-    pub steps: u64,
-    /// Sub-steps thrown away because their error was too large.
-    pub rejections: u64,
+    pub(super) start: Vec<S>,
+    pub(super) implicit: Option<Box<dyn Implicit<S>>>,
+    /// Sub-steps per sample of the error-controlled explicit method.
+    pub(super) substeps: usize,
+    /// Samples in a row whose explicit step was held down by stability.
+    pub(super) stiff_score: u32,
+    /// What the run cost so far.
+    pub effort: Effort,
 }
 
 /// Sub-step budget of one sample before a run is given up.
-const MAX_SUBSTEPS: usize = 4096;
+pub(super) const MAX_SUBSTEPS: usize = 4096;
 
 impl<S: Scalar> Stepper<S> {
-    /// Scratch for `plant`.
+    /// Scratch for `plant`; explicit methods only.
     pub fn new(plant: &Plant<S>) -> Self {
         let n = plant.n_states();
+        let zeros = vec![S::zero(); n];
         Self {
             plant_scratch: plant.scratch(),
-            stages: vec![vec![S::zero(); n]; dormand_prince::STAGES],
-            probe: vec![S::zero(); n],
+            stages: vec![zeros.clone(); dormand_prince::STAGES],
+            probe: zeros.clone(),
             applied: vec![S::zero(); plant.axes.len()],
-            evaluations: 0,
-            steps: 0,
-            rejections: 0,
+            start: zeros,
+            implicit: None,
+            substeps: 1,
+            stiff_score: 0,
+            effort: Effort::default(),
         }
+    }
+
+    /// Whether implicit methods can be used.
+    pub fn has_jacobian(&self) -> bool {
+        self.implicit.is_some()
     }
 
     /// Right-hand side at fraction `at` of the sub-step with torque `lines`.
@@ -72,7 +129,7 @@ impl<S: Scalar> Stepper<S> {
         for (a, line) in self.applied.iter_mut().zip(lines) {
             *a = line.at(at);
         }
-        self.evaluations += 1;
+        self.effort.evaluations += 1;
         plant.derivative(
             &self.probe,
             &self.applied,
@@ -91,42 +148,90 @@ pub(super) struct Interval<'a, S> {
 }
 
 impl<S: Scalar> Interval<'_, S> {
-    /// Advance `x` over the sample. `lines(n)` gives, for `n` sub-steps, the torque
-    /// lines of each sub-step over all axes. Returns false if the error bound
-    /// cannot be met. `substeps` carries the count from sample to sample.
+    /// Advance `x` over the sample; false if the error bound cannot be met.
     pub(super) fn advance(
         &self,
         method: Method,
         x: &mut [S],
-        substeps: &mut usize,
         stepper: &mut Stepper<S>,
-        mut lines: impl FnMut(usize) -> Vec<Vec<Line<S>>>,
+        torque: &mut SampleTorque<'_, S>,
     ) -> bool {
         match method {
             Method::RungeKutta4 { substeps } => {
                 let n = substeps.max(1);
-                for line in lines(n) {
-                    runge_kutta4::step(self, x, self.sample_time / n as f64, &line, stepper);
+                let h = self.sample_time / n as f64;
+                for i in 0..n {
+                    let lines = torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64);
+                    runge_kutta4::step(self, x, h, lines, stepper);
+                    torque.accept();
                 }
                 true
             }
             Method::DormandPrince { tolerance } => {
-                let start = x.to_vec();
-                loop {
-                    match self.attempt(*substeps, tolerance, x, stepper, &mut lines) {
-                        Some(error) => {
-                            // Order 5: halving the count raises the error about 32 times.
-                            if error < 1.0 / 64.0 && *substeps > 1 {
-                                *substeps /= 2;
-                            }
-                            return true;
-                        }
-                        None if *substeps >= MAX_SUBSTEPS => return false,
-                        None => {
-                            *substeps *= 2;
-                            x.copy_from_slice(&start);
-                        }
+                self.advance_explicitly(tolerance, x, stepper, torque)
+            }
+            Method::RadauIia { .. } | Method::Rosenbrock { .. } => {
+                self.advance_implicitly(method, x, stepper, torque)
+            }
+            Method::Automatic { tolerance } => {
+                if dormand_prince::is_stiff(stepper) {
+                    let radau = Method::RadauIia { tolerance };
+                    return self.advance_implicitly(radau, x, stepper, torque);
+                }
+                stepper.start.copy_from_slice(x);
+                if self.advance_explicitly(tolerance, x, stepper, torque) {
+                    let h = self.sample_time / stepper.substeps as f64;
+                    dormand_prince::watch_stiffness(stepper, h);
+                    return true;
+                }
+                // Explicit steps cannot meet the bound: stiff beyond doubt.
+                x.copy_from_slice(&stepper.start);
+                torque.rewind();
+                dormand_prince::declare_stiff(stepper);
+                self.advance_implicitly(Method::RadauIia { tolerance }, x, stepper, torque)
+            }
+        }
+    }
+
+    fn advance_implicitly(
+        &self,
+        method: Method,
+        x: &mut [S],
+        stepper: &mut Stepper<S>,
+        torque: &mut SampleTorque<'_, S>,
+    ) -> bool {
+        stepper.effort.implicit_samples += 1;
+        let Stepper {
+            implicit, effort, ..
+        } = stepper;
+        implicit
+            .as_mut()
+            .is_some_and(|solver| solver.advance(method, self, x, torque, effort))
+    }
+
+    /// Dormand-Prince with equal sub-steps, as many as the bound asks for.
+    fn advance_explicitly(
+        &self,
+        tolerance: f64,
+        x: &mut [S],
+        stepper: &mut Stepper<S>,
+        torque: &mut SampleTorque<'_, S>,
+    ) -> bool {
+        stepper.start.copy_from_slice(x);
+        loop {
+            match self.attempt(tolerance, x, stepper, torque) {
+                Some(error) => {
+                    // Order 5: halving the count raises the error about 32 times.
+                    if error < 1.0 / 64.0 && stepper.substeps > 1 {
+                        stepper.substeps /= 2;
                     }
+                    return true;
+                }
+                None if stepper.substeps >= MAX_SUBSTEPS => return false,
+                None => {
+                    stepper.substeps *= 2;
+                    x.copy_from_slice(&stepper.start);
+                    torque.rewind();
                 }
             }
         }
@@ -135,20 +240,22 @@ impl<S: Scalar> Interval<'_, S> {
     /// Largest error over the sample in units of the tolerance; `None` above one.
     fn attempt(
         &self,
-        n: usize,
         tolerance: f64,
         x: &mut [S],
         stepper: &mut Stepper<S>,
-        lines: &mut impl FnMut(usize) -> Vec<Vec<Line<S>>>,
+        torque: &mut SampleTorque<'_, S>,
     ) -> Option<f64> {
+        let n = stepper.substeps;
+        let h = self.sample_time / n as f64;
         let mut worst: f64 = 0.0;
-        for line in lines(n) {
-            let h = self.sample_time / n as f64;
-            let error = dormand_prince::step(self, x, h, &line, stepper) / tolerance;
+        for i in 0..n {
+            let lines = torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64);
+            let error = dormand_prince::step(self, x, h, lines, stepper) / tolerance;
             if error.is_nan() || error > 1.0 {
-                stepper.rejections += 1;
+                stepper.effort.rejections += 1;
                 return None;
             }
+            torque.accept();
             worst = worst.max(error);
         }
         Some(worst)

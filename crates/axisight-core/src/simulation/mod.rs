@@ -3,11 +3,12 @@
 mod closed_loop;
 mod controller;
 mod dormand_prince;
+mod implicit;
 mod method;
 mod noise;
 mod runge_kutta4;
 mod torque_path;
 
 pub use closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
-pub use method::{Method, Stepper};
+pub use method::{Effort, Method, Stepper};
 pub use noise::measurement_noise;

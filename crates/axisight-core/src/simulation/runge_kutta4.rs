@@ -12,17 +12,23 @@ pub(super) fn step<S: Scalar>(
     lines: &[Line<S>],
     stepper: &mut Stepper<S>,
 ) {
-    stepper.steps += 1;
+    stepper.effort.steps += 1;
     stepper.probe.copy_from_slice(x);
     stepper.stage(interval.plant, 0, 0.0, lines, interval.command);
     for (stage, at) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
-        for i in 0..x.len() {
-            stepper.probe[i] = x[i] + stepper.stages[stage - 1][i] * (h * at);
+        let slopes = &stepper.stages[stage - 1];
+        let width = S::constant(h * at);
+        for ((p, x), k) in stepper.probe.iter_mut().zip(&*x).zip(slopes) {
+            *p = k.fma(width, *x);
         }
         stepper.stage(interval.plant, stage, at, lines, interval.command);
     }
-    let k = &stepper.stages;
-    for i in 0..x.len() {
-        x[i] += (k[0][i] + (k[1][i] + k[2][i]) * 2.0 + k[3][i]) * (h / 6.0);
+    let [k1, k2, k3, k4, ..] = &stepper.stages[..] else {
+        return;
+    };
+    let (two, sixth) = (S::constant(2.0), S::constant(h / 6.0));
+    for ((((x, k1), k2), k3), k4) in x.iter_mut().zip(k1).zip(k2).zip(k3).zip(k4) {
+        let sum = (*k2 + *k3).fma(two, *k1 + *k4);
+        *x = sum.fma(sixth, *x);
     }
 }

@@ -25,6 +25,12 @@ impl<S: Scalar> Line<S> {
     pub(super) fn at(&self, s: f64) -> S {
         self.mean + self.slope * (s - 0.5)
     }
+
+    /// Change of the torque over the sub-step.
+    #[inline(always)]
+    pub(super) fn rise(&self) -> S {
+        self.slope
+    }
 }
 
 /// Keeps a lag of zero from dividing by zero; far below any time that matters.
@@ -86,40 +92,21 @@ impl<S: Scalar> TorquePath<S> {
         command
     }
 
-    /// Torque lines over `n` equal sub-steps of the sample, for the command `command`.
-    pub(super) fn lines(&self, command: S, n: usize, out: &mut Vec<Line<S>>) {
-        out.clear();
-        if self.delay.is_none() && self.lag.is_none() {
-            let line = Line {
-                mean: self.delivered(command),
-                slope: S::zero(),
-            };
-            out.resize(n, line);
-            return;
-        }
-        let mut state = self.lag.as_ref().map_or(command, |l| l.state);
-        for i in 0..n {
-            let from = i as f64 / n as f64;
-            let to = (i + 1) as f64 / n as f64;
-            out.push(self.line(command, from, to, &mut state));
-        }
+    /// Whether the torque varies inside a sample.
+    fn varies(&self) -> bool {
+        self.delay.is_some() || self.lag.is_some()
     }
 
-    /// Advance the lag to the end of the sample.
-    pub(super) fn advance(&mut self, command: S) {
-        let Some(mut state) = self.lag.as_ref().map(|l| l.state) else {
-            return;
-        };
-        self.line(command, 0.0, 1.0, &mut state);
-        if let Some(lag) = &mut self.lag {
-            lag.state = state;
-        }
+    /// Delivered torque after the lag, which starts the sample or step in `state`.
+    fn lag_state(&self) -> Option<S> {
+        self.lag.as_ref().map(|lag| lag.state)
     }
 
     fn delivered(&self, torque: S) -> S {
         self.kernels.iter().fold(torque, |t, k| k.drive(t))
     }
 
+    /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
     fn line(&self, command: S, from: f64, to: f64, state: &mut S) -> Line<S> {
         let width = to - from;
         let mut zeroth = S::zero();
@@ -183,6 +170,107 @@ impl<S: Scalar> TorquePath<S> {
         Moments {
             zeroth: held.zeroth + excess * zeroth,
             first: held.first + excess * (start * zeroth + own_first),
+        }
+    }
+}
+
+/// Torque of all axes over one sample, handed out span by span.
+pub(super) struct SampleTorque<'a, S> {
+    paths: &'a mut [TorquePath<S>],
+    buffers: &'a mut TorqueBuffers<S>,
+    varies: bool,
+}
+
+/// Memory of [`SampleTorque`] that outlives the samples.
+pub(super) struct TorqueBuffers<S> {
+    commands: Vec<S>,
+    /// Lag states at the start of the span in hand and at its end.
+    at_start: Vec<S>,
+    at_end: Vec<S>,
+    lines: Vec<Line<S>>,
+}
+
+impl<S: Scalar> TorqueBuffers<S> {
+    pub(super) fn new(n_axes: usize) -> Self {
+        let zeros = vec![S::zero(); n_axes];
+        Self {
+            commands: zeros.clone(),
+            at_start: zeros.clone(),
+            at_end: zeros,
+            lines: Vec::with_capacity(n_axes),
+        }
+    }
+}
+
+impl<'a, S: Scalar> SampleTorque<'a, S> {
+    /// Take the commands of a new sample.
+    pub(super) fn new(
+        paths: &'a mut [TorquePath<S>],
+        commands: &[S],
+        buffers: &'a mut TorqueBuffers<S>,
+    ) -> Self {
+        for ((taken, path), u) in buffers.commands.iter_mut().zip(&mut *paths).zip(commands) {
+            *taken = path.push(*u);
+        }
+        let varies = paths.iter().any(TorquePath::varies);
+        let mut torque = Self {
+            paths,
+            buffers,
+            varies,
+        };
+        torque.rewind();
+        torque.buffers.lines.clear();
+        if !varies {
+            let held = torque.paths.iter().zip(&torque.buffers.commands);
+            torque.buffers.lines.extend(held.map(|(path, u)| Line {
+                mean: path.delivered(*u),
+                slope: S::zero(),
+            }));
+        }
+        torque
+    }
+
+    /// Torque lines between the fractions `from` and `to` of the sample.
+    pub(super) fn span(&mut self, from: f64, to: f64) -> &[Line<S>] {
+        if self.varies {
+            let TorqueBuffers {
+                commands,
+                at_start,
+                at_end,
+                lines,
+            } = &mut *self.buffers;
+            at_end.copy_from_slice(at_start);
+            lines.clear();
+            for ((path, u), state) in self.paths.iter().zip(commands).zip(at_end) {
+                lines.push(path.line(*u, from, to, state));
+            }
+        }
+        &self.buffers.lines
+    }
+
+    /// The span in hand was integrated: the next one starts at its end.
+    pub(super) fn accept(&mut self) {
+        if self.varies {
+            let TorqueBuffers {
+                at_start, at_end, ..
+            } = &mut *self.buffers;
+            at_start.copy_from_slice(at_end);
+        }
+    }
+
+    /// Go back to the start of the sample.
+    pub(super) fn rewind(&mut self) {
+        for (state, path) in self.buffers.at_start.iter_mut().zip(&*self.paths) {
+            *state = path.lag_state().unwrap_or_else(S::zero);
+        }
+    }
+
+    /// The sample is over.
+    pub(super) fn finish(self) {
+        for (path, state) in self.paths.iter_mut().zip(&self.buffers.at_start) {
+            if let Some(lag) = &mut path.lag {
+                lag.state = *state;
+            }
         }
     }
 }
