@@ -199,14 +199,6 @@ fn loops(c: &mut Criterion) {
 criterion_group!(benches, loops);
 
 fn main() {
-    if std::env::args().any(|a| a == "--profile") {
-        let case = case();
-        let noise: Vec<_> = (0..16).map(|run| case.noise(run)).collect();
-        for _ in 0..200 {
-            black_box(case.batch::<Lanes<8>>(&noise));
-        }
-        return;
-    }
     summary();
     if std::env::args().any(|a| a == "--summary") {
         return;
