@@ -40,7 +40,7 @@ pub struct Run<'a> {
     pub drive: Drive<'a>,
     /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
     pub noise: &'a [&'a [f64]],
-    /// Integrator.
+    /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
     pub method: Method,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,

@@ -99,8 +99,7 @@ impl Waves {
         let (powers, chain) = addition_chain(&whole);
         let mut direct: Vec<f64> = Vec::new();
         for order in orders().filter(|n| whole_order(*n).is_none()) {
-            #[allow(clippy::float_cmp)] // the same number given twice
-            if !direct.iter().any(|d| *d == order) {
+            if !direct.contains(&order) {
                 direct.push(order);
             }
         }
