@@ -6,7 +6,7 @@ use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::robot::Plant;
 use axisight_core::simulation::{
-    self, Drive, Method, Run, Sample, SimulationError, Status, Stepper,
+    self, Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper,
 };
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -60,7 +60,7 @@ struct Traces {
 struct Outcome {
     traces: Traces,
     status: Status,
-    counters: [u64; 3],
+    effort: Effort,
 }
 
 /// Simulate one run from rest; `reference` says whether `input` is a velocity reference
@@ -133,9 +133,17 @@ pub fn simulate<'py>(
     };
     out.set_item("status", status)?;
     out.set_item("stopped_at", at)?;
-    out.set_item("evaluations", outcome.counters[0])?;
-    out.set_item("steps", outcome.counters[1])?;
-    out.set_item("rejections", outcome.counters[2])?;
+    let effort = outcome.effort;
+    for (name, count) in [
+        ("evaluations", effort.evaluations),
+        ("steps", effort.steps),
+        ("rejections", effort.rejections),
+        ("jacobians", effort.jacobians),
+        ("factorizations", effort.factorizations),
+        ("implicit_samples", effort.implicit_samples),
+    ] {
+        out.set_item(name, count)?;
+    }
     Ok(out)
 }
 
@@ -161,6 +169,6 @@ fn record(plant: &Plant<f64>, run: &Run<'_>) -> Result<Outcome, SimulationError>
     Ok(Outcome {
         traces,
         status,
-        counters: [stepper.evaluations, stepper.steps, stepper.rejections],
+        effort: stepper.effort,
     })
 }

@@ -180,7 +180,7 @@ pub fn trace<S: Scalar>(
     };
     let status = simulate(plant, &run, &mut stepper, &mut observe);
     out.status = status.unwrap_or_else(|error| panic!("{error}"));
-    out.evaluations = stepper.evaluations;
+    out.evaluations = stepper.effort.evaluations;
     out
 }
 

@@ -17,7 +17,7 @@ pub use chain::{Body, Chain, Pose};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
 pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
 pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
-pub use linearization::{Linearization, linearize};
+pub use linearization::{Linearization, LinearizationError, linearize};
 pub use modes::{Mode, modes, zoh_frequency_response};
 pub use parameters::{Parameter, ParameterError};
 pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError};

@@ -3,6 +3,7 @@
 use super::controller::ControlLoop;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
+use crate::effects::EffectError;
 use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
 use crate::scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,7 +40,7 @@ pub struct Run<'a> {
     pub drive: Drive<'a>,
     /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
     pub noise: &'a [&'a [f64]],
-    /// Integrator.
+    /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
     pub method: Method,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,
@@ -98,6 +99,9 @@ pub enum SimulationError {
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,
+    /// An effect is misused.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
 }
 
 /// Simulate until the longest lane ends; `observe` sees every sample.
@@ -160,16 +164,16 @@ pub fn simulate<S: Scalar>(
 }
 
 /// Signals of the current sample.
-struct Signals<S> {
-    measured: Vec<S>,
-    command: Vec<S>,
+pub(super) struct Signals<S> {
+    pub(super) measured: Vec<S>,
+    pub(super) command: Vec<S>,
     reference: Vec<S>,
-    torque_disturbance: Vec<S>,
-    position_disturbance: Vec<S>,
+    pub(super) torque_disturbance: Vec<S>,
+    pub(super) position_disturbance: Vec<S>,
 }
 
 impl<S: Scalar> Signals<S> {
-    fn new(n_axes: usize) -> Self {
+    pub(super) fn new(n_axes: usize) -> Self {
         let zeros = vec![S::zero(); n_axes];
         Self {
             measured: zeros.clone(),
@@ -192,7 +196,8 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
+    #[inline(always)]
+    pub(super) fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
         let n = self.command.len();
         match run.drive {
             Drive::Torque(torque) => {
@@ -223,7 +228,7 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
+    pub(super) fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
         Sample {
             index,
             command: &self.command,
@@ -236,7 +241,8 @@ impl<S: Scalar> Signals<S> {
 }
 
 /// Entry `(k, axis)` of each lane's array; zero beyond its end or without arrays.
-fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
+#[inline(always)]
+pub(super) fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
     S::from_lanes(|lane| {
         let array = arrays.get(lane).or_else(|| arrays.last());
         array
@@ -246,7 +252,7 @@ fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize
     })
 }
 
-fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
+pub(super) fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
     let shape = |field, expected: String, got: String| SimulationError::Shape {
         field,
         expected,
@@ -299,7 +305,10 @@ fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simulation
                 let expected = format!("samples of {n_axes} axes");
                 return Err(shape(name, expected, format!("{} numbers", array.len())));
             }
-            if let Some(i) = array.iter().position(|v| !v.is_finite()) {
+            // The whole array first: without an early exit the scan is vector code.
+            let all_finite = array.iter().fold(true, |all, v| all & v.is_finite());
+            let bad = || array.iter().position(|v| !v.is_finite());
+            if let Some(i) = (!all_finite).then(bad).flatten() {
                 let got = format!("{} at sample {}", array[i], i / n_axes);
                 return Err(shape(name, "finite numbers".to_owned(), got));
             }

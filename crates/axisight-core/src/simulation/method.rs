@@ -227,7 +227,10 @@ impl<S: Scalar> Interval<'_, S> {
                     }
                     return true;
                 }
-                None if stepper.substeps >= MAX_SUBSTEPS => return false,
+                None if stepper.substeps >= MAX_SUBSTEPS => {
+                    x.copy_from_slice(&stepper.start);
+                    return false;
+                }
                 None => {
                     stepper.substeps *= 2;
                     x.copy_from_slice(&stepper.start);

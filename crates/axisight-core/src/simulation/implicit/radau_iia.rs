@@ -37,8 +37,6 @@ const ERROR: [f64; 3] = [
 ];
 
 const MOST_ITERATIONS: usize = 10;
-/// Newton stops when the last change is this share of the tolerance.
-const ITERATION_SHARE: f64 = 1e-2;
 
 /// Factorized systems for one step length.
 struct Factors {
@@ -130,7 +128,7 @@ impl RadauIia {
             }
             // What is left after this iteration if it goes on converging at this rate.
             let left = rate.map_or(change, |r| r / (1.0 - r) * change);
-            if change <= 1e-3 * ITERATION_SHARE || (rate.is_some() && left <= ITERATION_SHARE) {
+            if change <= 1e-3 || (rate.is_some() && left <= 1.0) {
                 return true;
             }
             last = Some(change);
@@ -138,7 +136,7 @@ impl RadauIia {
         false
     }
 
-    /// One Newton update; returns its size in units of the tolerance.
+    /// One Newton update; returns its size in units of the iteration's tolerance.
     fn newton_step(&mut self, step: &Step<'_>, x: &[f64]) -> Option<f64> {
         let factors = self.factors.as_ref()?;
         let rate = 1.0 / step.length;
@@ -162,7 +160,7 @@ impl RadauIia {
             self.modes[2][i] += self.complex[i].im;
             for k in 0..3 {
                 let z: f64 = (0..3).map(|m| FROM_MODES[k][m] * self.modes[m][i]).sum();
-                let scale = step.tolerance * x[i].abs().max(SMALLEST_STATE);
+                let scale = step.iteration_tolerance * x[i].abs().max(SMALLEST_STATE);
                 let change = (z - self.stages[k][i]).abs() / scale;
                 size = if change.is_nan() { change } else { size.max(change) };
                 self.stages[k][i] = z;
