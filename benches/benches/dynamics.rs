@@ -73,6 +73,7 @@ fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
         start: &robot.operating_point,
         drive: Drive::Reference(&inputs),
         noise: &[],
+        resolution: 0.0,
         method: Method::RungeKutta4 { substeps: 1 },
         cancel: None,
     };

@@ -57,6 +57,7 @@ impl Case {
             start: &self.robot.operating_point,
             drive: Drive::Reference(&inputs),
             noise: &noise,
+            resolution: 0.0,
             method: Method::default(),
             cancel: None,
         };

@@ -1,7 +1,7 @@
 //! Between `NumPy` arrays and plain vectors.
 
 use crate::entry::InputError;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 /// Row-major copy of a two-dimensional array with `columns` columns.
@@ -15,6 +15,25 @@ pub fn rows(array: &PyReadonlyArray2<'_, f64>, field: &str, columns: usize) -> P
         )));
     }
     Ok(view.iter().copied().collect())
+}
+
+/// Row-major copies of the planes of a three-dimensional array, `columns` wide.
+pub fn planes(
+    array: &PyReadonlyArray3<'_, f64>,
+    field: &str,
+    columns: usize,
+) -> PyResult<Vec<Vec<f64>>> {
+    let view = array.as_array();
+    if view.shape()[2] != columns {
+        return Err(InputError::new_err(format!(
+            "{field}: expected shape (n_runs, n, {columns}), got {:?}",
+            view.shape()
+        )));
+    }
+    Ok(view
+        .outer_iter()
+        .map(|plane| plane.iter().copied().collect())
+        .collect())
 }
 
 /// An `(n, columns)` array from row-major numbers.

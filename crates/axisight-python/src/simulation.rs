@@ -1,36 +1,60 @@
-//! Simulation of one run.
+//! Simulation of one run and of many.
 
-use crate::convert::{array2, rows};
+use crate::convert::{array2, planes, rows};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
-use axisight_core::robot::Plant;
 use axisight_core::simulation::{
-    self, Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper,
+    self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, RunTrace, Status,
 };
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Integrator by name: `rk4` with sub-steps or `dopri5` with a tolerance.
+/// Integrator by name: `rk4` with sub-steps, the others with a tolerance.
 pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
-    match name {
-        "rk4" if substeps >= 1 => Ok(Method::RungeKutta4 { substeps }),
-        "rk4" => Err(input_error(format!(
-            "substeps: expected at least 1, got {substeps}"
-        ))),
-        "dopri5" if tolerance > 0.0 && tolerance < 1.0 => Ok(Method::DormandPrince { tolerance }),
-        "dopri5" => Err(input_error(format!(
+    let controlled = match name {
+        "rk4" if substeps >= 1 => return Ok(Method::RungeKutta4 { substeps }),
+        "rk4" => {
+            return Err(input_error(format!(
+                "substeps: expected at least 1, got {substeps}"
+            )));
+        }
+        "dopri5" => Method::DormandPrince { tolerance },
+        "radau5" => Method::RadauIia { tolerance },
+        "rodas4" => Method::Rosenbrock { tolerance },
+        "auto" => Method::Automatic { tolerance },
+        _ => {
+            return Err(input_error(format!(
+                "method: expected rk4, dopri5, radau5, rodas4 or auto, got {name}"
+            )));
+        }
+    };
+    if tolerance > 0.0 && tolerance < 1.0 {
+        Ok(controlled)
+    } else {
+        Err(input_error(format!(
             "tolerance: expected between 0 and 1, got {tolerance}"
-        ))),
+        )))
+    }
+}
+
+/// Equations by name.
+pub fn model(name: &str) -> PyResult<Model> {
+    match name {
+        "nonlinear" => Ok(Model::Nonlinear),
+        "linear" => Ok(Model::Linear),
         _ => Err(input_error(format!(
-            "method: expected rk4 or dopri5, got {name}"
+            "model: expected nonlinear or linear, got {name}"
         ))),
     }
 }
 
-/// White position noise `(n_samples, n_axes)` as a function of seed and run.
+/// Position noise `(n_samples, n_axes)` as a function of seed and run; white, or of first
+/// order with a cutoff.
 #[pyfunction]
+#[pyo3(signature = (seed, run, n_samples, n_axes, std, *, cutoff_hz=None, sample_time=None))]
+#[allow(clippy::too_many_arguments)] // arguments of a binding
 pub fn measurement_noise(
     py: Python<'_>,
     seed: u64,
@@ -38,35 +62,38 @@ pub fn measurement_noise(
     n_samples: usize,
     n_axes: usize,
     std: f64,
+    cutoff_hz: Option<f64>,
+    sample_time: Option<f64>,
 ) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    array2(
-        py,
-        simulation::measurement_noise(seed, run, n_samples, n_axes, std),
-        n_axes,
-    )
+    let noise = match (cutoff_hz, sample_time) {
+        (None, _) => simulation::measurement_noise(seed, run, n_samples, n_axes, std),
+        (Some(cutoff), Some(step)) if cutoff > 0.0 && step > 0.0 => {
+            simulation::coloured_noise(seed, run, n_samples, n_axes, std, cutoff, step)
+        }
+        _ => {
+            return Err(input_error(
+                "cutoff_hz, sample_time: expected both positive",
+            ));
+        }
+    };
+    array2(py, noise, n_axes)
 }
 
-/// Everything a run records, row-major.
-#[derive(Default)]
-struct Traces {
-    command: Vec<f64>,
-    measured: Vec<f64>,
-    motor: Vec<f64>,
-    joint: Vec<f64>,
-    torque_disturbance: Vec<f64>,
-    position_disturbance: Vec<f64>,
+/// How to simulate, apart from inputs.
+struct Options {
+    reference: bool,
+    start: Option<Vec<f64>>,
+    method: String,
+    substeps: usize,
+    tolerance: f64,
+    model: String,
+    resolution: f64,
+    threads: usize,
 }
 
-struct Outcome {
-    traces: Traces,
-    status: Status,
-    effort: Effort,
-}
-
-/// Simulate one run from rest; `reference` says whether `input` is a velocity reference
-/// [rad/s] or a torque [Nm].
+/// Simulate one run from rest.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, input, *, reference, noise=None, start=None, method="dopri5", substeps=1, tolerance=1e-7, cancel=None))]
+#[pyo3(signature = (robot, effects, input, *, reference, noise=None, start=None, method="dopri5", substeps=1, tolerance=1e-7, model="nonlinear", resolution=0.0, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn simulate<'py>(
     py: Python<'py>,
@@ -79,96 +106,199 @@ pub fn simulate<'py>(
     method: &str,
     substeps: usize,
     tolerance: f64,
+    model: &str,
+    resolution: f64,
     cancel: Option<&Bound<'py, CancelToken>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let n_axes = robot.description.n_axes();
     let field = if reference { "velocity_ref" } else { "torque" };
-    let input = rows(&input, field, n_axes)?;
-    let noise = noise.map(|n| rows(&n, "noise", n_axes)).transpose()?;
-    if noise.as_ref().is_some_and(|n| n.len() != input.len()) {
-        return Err(input_error(format!("noise: expected the shape of {field}")));
+    let input = vec![rows(&input, field, n_axes)?];
+    let noise = match noise {
+        Some(n) => vec![rows(&n, "noise", n_axes)?],
+        None => Vec::new(),
+    };
+    let options = Options {
+        reference,
+        start,
+        method: method.to_owned(),
+        substeps,
+        tolerance,
+        model: model.to_owned(),
+        resolution,
+        threads: 1,
+    };
+    let mut outcomes = run(py, robot, effects, &input, &noise, options, cancel)?;
+    let Some(outcome) = outcomes.pop() else {
+        return Err(input_error("input: expected a run"));
+    };
+    single(py, robot, outcome)
+}
+
+/// Simulate many runs from rest; the shape of the inputs is `(n_runs, n_samples, n_axes)`.
+#[pyfunction]
+#[pyo3(signature = (robot, effects, input, *, reference, noise=None, start=None, method="dopri5", substeps=1, tolerance=1e-7, model="nonlinear", resolution=0.0, threads=0, cancel=None))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+pub fn simulate_batch<'py>(
+    py: Python<'py>,
+    robot: &Robot,
+    effects: Vec<EffectTuple>,
+    input: PyReadonlyArray3<'py, f64>,
+    reference: bool,
+    noise: Option<PyReadonlyArray3<'py, f64>>,
+    start: Option<Vec<f64>>,
+    method: &str,
+    substeps: usize,
+    tolerance: f64,
+    model: &str,
+    resolution: f64,
+    threads: usize,
+    cancel: Option<&Bound<'py, CancelToken>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let n_axes = robot.description.n_axes();
+    let field = if reference { "velocity_ref" } else { "torque" };
+    let n_samples = input.as_array().shape()[1];
+    let input = planes(&input, field, n_axes)?;
+    let noise = match noise {
+        Some(n) => planes(&n, "noise", n_axes)?,
+        None => Vec::new(),
+    };
+    let options = Options {
+        reference,
+        start,
+        method: method.to_owned(),
+        substeps,
+        tolerance,
+        model: model.to_owned(),
+        resolution,
+        threads,
+    };
+    let outcomes = run(py, robot, effects, &input, &noise, options, cancel)?;
+    many(py, robot, outcomes, n_samples)
+}
+
+fn run(
+    py: Python<'_>,
+    robot: &Robot,
+    effects: Vec<EffectTuple>,
+    input: &[Vec<f64>],
+    noise: &[Vec<f64>],
+    options: Options,
+    cancel: Option<&Bound<'_, CancelToken>>,
+) -> PyResult<Vec<Outcome>> {
+    if !noise.is_empty() && !noise.iter().map(Vec::len).eq(input.iter().map(Vec::len)) {
+        return Err(input_error("noise: expected the shape of the input"));
     }
-    let start = start.unwrap_or_else(|| robot.description.operating_point.clone());
-    let method = self::method(method, substeps, tolerance)?;
-    let plant =
-        Plant::<f64>::new(&robot.description, &[], &settings(effects)).map_err(input_error)?;
     let cancel = flag(cancel);
-    let (arrays, noises) = ([&input[..]], noise.as_deref().map(|n| [n]));
-    let run = Run {
-        controller: &robot.description.controller,
-        sample_time: robot.description.sample_time,
+    let settings = settings(effects);
+    let operating_point = robot.description.operating_point.clone();
+    let start = options.start.unwrap_or(operating_point);
+    let batch = Batch {
+        robot: &robot.description,
+        settings: &settings,
         start: &start,
-        drive: if reference {
-            Drive::Reference(&arrays)
+        input: if options.reference {
+            BatchInput::Reference(input)
         } else {
-            Drive::Torque(&arrays)
+            BatchInput::Torque(input)
         },
-        noise: noises.as_ref().map_or(&[], |n| &n[..]),
-        method,
+        noise,
+        resolution: options.resolution,
+        model: model(&options.model)?,
+        method: method(&options.method, options.substeps, options.tolerance)?,
         cancel: Some(&*cancel),
     };
-    let outcome = detached(py, &cancel, || record(&plant, &run))?.map_err(input_error)?;
-    let out = PyDict::new(py);
-    let traces = outcome.traces;
-    out.set_item("torque_cmd_nm", array2(py, traces.command, n_axes)?)?;
-    out.set_item("position_rad", array2(py, traces.measured, n_axes)?)?;
-    out.set_item("motor_position_rad", array2(py, traces.motor, n_axes)?)?;
-    out.set_item(
-        "joint_position_rad",
-        array2(py, traces.joint, robot.description.n_joints())?,
-    )?;
-    out.set_item(
-        "torque_disturbance_nm",
-        array2(py, traces.torque_disturbance, n_axes)?,
-    )?;
-    out.set_item(
-        "position_disturbance_rad",
-        array2(py, traces.position_disturbance, n_axes)?,
-    )?;
-    let (status, at) = match outcome.status {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()
+        .map_err(input_error)?;
+    let done: Result<Vec<Outcome>, BatchError> =
+        detached(py, &cancel, || pool.install(|| simulation::simulate_batch(&batch)))?;
+    done.map_err(input_error)
+}
+
+/// Name of a status and the sample it speaks of.
+fn status(status: Status) -> (&'static str, Option<usize>) {
+    match status {
         Status::Completed => ("completed", None),
         Status::Diverged(k) => ("diverged", Some(k)),
         Status::StepSizeCollapsed(k) => ("step_size_collapsed", Some(k)),
         Status::Cancelled(k) => ("cancelled", Some(k)),
-    };
-    out.set_item("status", status)?;
-    out.set_item("stopped_at", at)?;
-    let effort = outcome.effort;
-    for (name, count) in [
+    }
+}
+
+fn counters(effort: Effort) -> [(&'static str, u64); 6] {
+    [
         ("evaluations", effort.evaluations),
         ("steps", effort.steps),
         ("rejections", effort.rejections),
         ("jacobians", effort.jacobians),
         ("factorizations", effort.factorizations),
         ("implicit_samples", effort.implicit_samples),
-    ] {
+    ]
+}
+
+/// Signals by name, with their columns.
+fn signals(trace: RunTrace, n_axes: usize, n_joints: usize) -> [(&'static str, Vec<f64>, usize); 6] {
+    [
+        ("torque_cmd_nm", trace.command, n_axes),
+        ("position_rad", trace.measured, n_axes),
+        ("motor_position_rad", trace.motor, n_axes),
+        ("joint_position_rad", trace.joint, n_joints),
+        ("torque_disturbance_nm", trace.torque_disturbance, n_axes),
+        ("position_disturbance_rad", trace.position_disturbance, n_axes),
+    ]
+}
+
+fn single<'py>(py: Python<'py>, robot: &Robot, outcome: Outcome) -> PyResult<Bound<'py, PyDict>> {
+    let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
+    let out = PyDict::new(py);
+    for (name, data, columns) in signals(outcome.trace, n_axes, n_joints) {
+        out.set_item(name, array2(py, data, columns)?)?;
+    }
+    let (name, at) = status(outcome.status);
+    out.set_item("status", name)?;
+    out.set_item("stopped_at", at)?;
+    for (name, count) in counters(outcome.effort) {
         out.set_item(name, count)?;
     }
     Ok(out)
 }
 
-fn record(plant: &Plant<f64>, run: &Run<'_>) -> Result<Outcome, SimulationError> {
-    let mut traces = Traces::default();
-    let mut stepper = Stepper::new(plant);
-    let mut observe = |sample: &Sample<'_, f64>| {
-        traces.command.extend(sample.command);
-        traces.measured.extend(sample.measured);
-        traces.motor.extend(
-            plant
-                .axes
-                .iter()
-                .map(|a| plant.motor_angle(a, sample.state)),
-        );
-        traces.joint.extend(plant.joint_angles(sample.state));
-        traces.torque_disturbance.extend(sample.torque_disturbance);
-        traces
-            .position_disturbance
-            .extend(sample.position_disturbance);
-    };
-    let status = simulation::simulate(plant, run, &mut stepper, &mut observe)?;
-    Ok(Outcome {
-        traces,
-        status,
-        effort: stepper.effort,
-    })
+/// Runs that ended early are filled up with NaN.
+fn many<'py>(
+    py: Python<'py>,
+    robot: &Robot,
+    outcomes: Vec<Outcome>,
+    n_samples: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
+    let n_runs = outcomes.len();
+    let out = PyDict::new(py);
+    let ends: Vec<_> = outcomes.iter().map(|o| status(o.status)).collect();
+    out.set_item("status", ends.iter().map(|e| e.0).collect::<Vec<_>>())?;
+    out.set_item("stopped_at", ends.iter().map(|e| e.1).collect::<Vec<_>>())?;
+    let efforts: Vec<Effort> = outcomes.iter().map(|o| o.effort).collect();
+    for (i, (name, _)) in counters(Effort::default()).iter().enumerate() {
+        let counts: Vec<u64> = efforts.iter().map(|e| counters(*e)[i].1).collect();
+        out.set_item(name, counts)?;
+    }
+    let mut stacks: Vec<(&str, Vec<f64>, usize)> = Vec::new();
+    for outcome in outcomes {
+        for (slot, (name, data, columns)) in
+            signals(outcome.trace, n_axes, n_joints).into_iter().enumerate()
+        {
+            if slot == stacks.len() {
+                stacks.push((name, Vec::with_capacity(n_runs * n_samples * columns), columns));
+            }
+            let stack = &mut stacks[slot].1;
+            let full = stack.len() + n_samples * columns;
+            stack.extend(data);
+            stack.resize(full, f64::NAN);
+        }
+    }
+    for (name, data, columns) in stacks {
+        let array = data.into_pyarray(py).reshape([n_runs, n_samples, columns])?;
+        out.set_item(name, array)?;
+    }
+    Ok(out)
 }

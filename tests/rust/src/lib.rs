@@ -154,6 +154,7 @@ pub fn trace<S: Scalar>(
     robot: &RobotDescription,
     drive: Drive<'_>,
     noise: &[&[f64]],
+    resolution: 0.0,
     method: Method,
 ) -> Trace<S> {
     let run = Run {
@@ -162,6 +163,7 @@ pub fn trace<S: Scalar>(
         start: &robot.operating_point,
         drive,
         noise,
+        resolution: 0.0,
         method,
         cancel: None,
     };

@@ -152,6 +152,7 @@ fn run_of<'a>(robot: &'a RobotDescription, drive: Drive<'a>, noise: &'a [&'a [f6
         start: &robot.operating_point,
         drive,
         noise,
+        resolution: 0.0,
         method: Method::default(),
         cancel: None,
     }

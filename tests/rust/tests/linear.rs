@@ -56,6 +56,7 @@ fn linear_trace<S: Scalar>(
     settings: &[EffectSetting<f64>],
     drive: Drive<'_>,
     noise: &[&[f64]],
+    resolution: 0.0,
     method: Method,
 ) -> Trace<S> {
     let run = Run {
@@ -64,6 +65,7 @@ fn linear_trace<S: Scalar>(
         start: &robot.operating_point,
         drive,
         noise,
+        resolution: 0.0,
         method,
         cancel: None,
     };
@@ -318,6 +320,7 @@ fn samples_show_ripple_at_the_true_angle() {
         start: &robot.operating_point,
         drive: Drive::Reference(&[&reference]),
         noise: &[&noise],
+        resolution: 0.0,
         method: ONE,
         cancel: None,
     };
@@ -463,6 +466,7 @@ fn misuse_is_refused_by_name() {
         start: &[0.0, 0.0, 0.1],
         drive: Drive::Torque(&[&torque]),
         noise: &[],
+        resolution: 0.0,
         method: ONE,
         cancel: Some(&flag),
     };

@@ -56,7 +56,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Asymmetric<S> {
-    fn motor_torque(&self, motor: &Motor<S>) -> S {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let t = (motor.speed * self.inverse_width).tanh();
         -(t * self.half_difference.fma(t, self.mean))
     }

@@ -45,7 +45,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Coulomb<S> {
-    fn motor_torque(&self, motor: &Motor<S>) -> S {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         -(self.level * (motor.speed * self.inverse_width).tanh())
     }
 }

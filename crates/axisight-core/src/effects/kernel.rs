@@ -135,7 +135,7 @@ impl EffectError {
 
 /// State of one motor as its effects see it.
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<S> {
+pub struct Motor<'a, S> {
     /// Motor angle phi [rad].
     pub angle: S,
     /// Motor speed [rad/s].
@@ -144,6 +144,8 @@ pub struct Motor<S> {
     pub command: S,
     /// Gear torque the motor carries, motor side [Nm]; zero for a rigid transmission.
     pub load: S,
+    /// States of the effect itself; empty where nothing is integrated (inverse dynamics).
+    pub internal: &'a [S],
 }
 
 /// The parts of a plant an arm or transmission effect may change before a run.
@@ -184,9 +186,15 @@ pub trait Kernel<S: Scalar>: Send + Sync {
         None
     }
     /// Torque added on the motor shaft [Nm]; friction is negative for positive speed.
-    fn motor_torque(&self, _motor: &Motor<S>) -> S {
+    fn motor_torque(&self, _motor: &Motor<'_, S>) -> S {
         S::zero()
     }
+    /// Number of states the effect has of its own; they start at zero.
+    fn n_internal(&self) -> usize {
+        0
+    }
+    /// Rate of change of these states [1/s].
+    fn internal_rate(&self, _motor: &Motor<'_, S>, _rate: &mut [S]) {}
     /// Deflection that loads the gear spring and its slope, from the geometric deflection [rad].
     fn deflection(&self, delta: S) -> (S, S) {
         (delta, S::one())

@@ -46,6 +46,7 @@ effect_table!(
     coulomb_friction,
     asymmetric_friction,
     stribeck_friction,
+    presliding_friction,
     backlash,
     nonlinear_stiffness,
     joint_stiffness,

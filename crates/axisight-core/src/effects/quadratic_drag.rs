@@ -28,7 +28,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Drag<S> {
-    fn motor_torque(&self, motor: &Motor<S>) -> S {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         -(self.0 * motor.speed * motor.speed.abs())
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Stribeck<S> {
-    fn motor_torque(&self, motor: &Motor<S>) -> S {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let hump = (-(motor.speed * self.inverse_speed).square()).exp();
         let level = self.excess.fma(hump, self.coulomb);
         -(level * (motor.speed * self.inverse_width).tanh())

@@ -34,7 +34,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Ripple<S> {
-    fn motor_torque(&self, motor: &Motor<S>) -> S {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let constant = self.constant.evaluate(motor.angle);
         self.proportional
             .evaluate(motor.angle)

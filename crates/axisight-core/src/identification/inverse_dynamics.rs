@@ -135,6 +135,7 @@ impl InverseDynamics {
                     speed,
                     command: at(&record.torque),
                     load: joint_force * axis.ratio,
+                    internal: &[],
                 };
                 let mut torque = joint_force * axis.ratio
                     + axis.motor_inertia * at(&record.acceleration)

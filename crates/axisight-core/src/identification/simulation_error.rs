@@ -170,6 +170,7 @@ impl SimulationErrorProblem {
                 },
             },
             noise: &[],
+            resolution: 0.0,
             method: self.method,
             cancel: self.cancel.as_deref(),
         };

@@ -12,6 +12,7 @@ use super::linear_algebra::solve_symmetric;
 use super::parameters::Parameter;
 use crate::effects::{self, EffectError, EffectInfo, Kernel, Motor, PlantParameters, Scope};
 use crate::scalar::Scalar;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// An effect with its place and parameters.
@@ -82,9 +83,16 @@ pub struct Axis<S> {
     pub gear: Option<Gear<S>>,
     /// Everything that acts on this axis.
     pub kernels: Vec<Arc<dyn Kernel<S>>>,
-    on_motor: Vec<Arc<dyn Kernel<S>>>,
+    on_motor: Vec<OnMotor<S>>,
     on_gear: Vec<Arc<dyn Kernel<S>>>,
     on_joint: Vec<Arc<dyn Kernel<S>>>,
+}
+
+/// An effect on a motor, and its own states among those of the plant.
+#[derive(Clone)]
+struct OnMotor<S> {
+    kernel: Arc<dyn Kernel<S>>,
+    internal: Range<usize>,
 }
 
 /// A robot with its effects, ready to be integrated.
@@ -99,6 +107,7 @@ pub struct Plant<S> {
     /// Elastic joints: index, stiffness, damping.
     pub elastic: Vec<(usize, S, S)>,
     n_motors: usize,
+    n_internal: usize,
 }
 
 impl<S: Scalar> Plant<S> {
@@ -131,6 +140,7 @@ impl<S: Scalar> Plant<S> {
                 .driven()
                 .filter(|(_, j, _)| j.compliance.is_some())
                 .count(),
+            n_internal: 0,
         };
         for setting in settings {
             plant.add_effect(setting)?;
@@ -166,6 +176,8 @@ impl<S: Scalar> Plant<S> {
         check_bounds(info, &setting.parameters)?;
         let kernel: Arc<dyn Kernel<S>> = effects::build(&setting.name, &setting.parameters)?.into();
         let n_axes = self.axes.len();
+        let first = self.n_states();
+        let internal = first..first + kernel.n_internal();
         let misplaced = |expected: String, got: String| EffectError::Axis {
             effect: info.name,
             expected,
@@ -204,7 +216,10 @@ impl<S: Scalar> Plant<S> {
                 });
                 axis.kernels.push(Arc::clone(&kernel));
                 match info.acts {
-                    effects::Acts::Motor => axis.on_motor.push(kernel),
+                    effects::Acts::Motor => {
+                        self.n_internal += internal.len();
+                        axis.on_motor.push(OnMotor { kernel, internal });
+                    }
                     effects::Acts::Transmission => axis.on_gear.push(kernel),
                     effects::Acts::Joint => axis.on_joint.push(kernel),
                     _ => {}
@@ -214,9 +229,9 @@ impl<S: Scalar> Plant<S> {
         Ok(())
     }
 
-    /// Number of states: `[phi, q, phi', q']`.
+    /// Number of states: `[phi, q, phi', q']`, then those of the effects.
     pub fn n_states(&self) -> usize {
-        2 * (self.n_motors + self.chain.len())
+        2 * (self.n_motors + self.chain.len()) + self.n_internal
     }
 
     /// Number of motor angles among the states (compliant gears).
@@ -239,6 +254,15 @@ impl<S: Scalar> Plant<S> {
             Some(gear) => rates[gear.slot],
             None => rates[self.n_motors + axis.joint] * (1.0 / axis.ratio),
         }
+    }
+
+    /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
+    pub fn motor_slots(&self) -> Vec<(usize, f64)> {
+        let slot = |axis: &Axis<S>| match &axis.gear {
+            Some(gear) => (gear.slot, 1.0),
+            None => (self.n_motors + axis.joint, 1.0 / axis.ratio),
+        };
+        self.axes.iter().map(slot).collect()
     }
 
     /// Joint angles in state `x`.
@@ -290,6 +314,7 @@ impl<S: Scalar> Plant<S> {
     ) {
         let (m, n) = (self.n_motors, self.chain.len());
         let (angles, rates) = x.split_at(m + n);
+        let rates = &rates[..m + n];
         let (q, v) = (&angles[m..], &rates[m..]);
         self.dynamics.update::<N>(q, v, scratch);
         let Some(terms) = scratch.sized::<N>() else {
@@ -302,7 +327,7 @@ impl<S: Scalar> Plant<S> {
         }
         dx[..m + n].copy_from_slice(rates);
         for (axis, (applied, command)) in self.axes.iter().zip(applied.iter().zip(command)) {
-            let torque = self.axis_torque(axis, x, *applied, *command);
+            let torque = self.axis_torque(axis, x, *applied, *command, dx);
             let joint = axis.joint;
             for kernel in &axis.on_joint {
                 force[joint] += kernel.joint_torque(q[joint]);
@@ -320,17 +345,25 @@ impl<S: Scalar> Plant<S> {
             force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
         }
         solve_symmetric(terms.inertia, force);
-        dx[m + n + m..].copy_from_slice(&force[..n]);
+        dx[m + n + m..2 * (m + n)].copy_from_slice(&force[..n]);
     }
 
     /// Torque that effects add on a motor in state `x` [Nm].
     pub fn motor_disturbance(&self, axis: &Axis<S>, x: &[S], command: S) -> S {
-        let free = self.axis_torque(axis, x, S::zero(), command).motor;
+        let free = self.axis_torque(axis, x, S::zero(), command, &mut []).motor;
         free + axis.viscous_friction * self.motor_speed(axis, x)
     }
 
+    /// Torques of an axis; rates of the effects' own states go where `dx` has room for them.
     #[inline]
-    fn axis_torque(&self, axis: &Axis<S>, x: &[S], applied: S, command: S) -> AxisTorque<S> {
+    fn axis_torque(
+        &self,
+        axis: &Axis<S>,
+        x: &[S],
+        applied: S,
+        command: S,
+        dx: &mut [S],
+    ) -> AxisTorque<S> {
         let (m, n) = (self.n_motors, self.chain.len());
         let (angle, speed, gear, load) = if let Some(gear) = &axis.gear {
             let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
@@ -350,15 +383,19 @@ impl<S: Scalar> Plant<S> {
             let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
             (q * up, v * up, S::zero(), S::zero())
         };
-        let state = Motor {
-            angle,
-            speed,
-            command,
-            load,
-        };
         let mut motor = applied - axis.viscous_friction * speed;
-        for kernel in &axis.on_motor {
+        for OnMotor { kernel, internal } in &axis.on_motor {
+            let state = Motor {
+                angle,
+                speed,
+                command,
+                load,
+                internal: &x[internal.clone()],
+            };
             motor += kernel.motor_torque(&state);
+            if let Some(rate) = dx.get_mut(internal.clone()) {
+                kernel.internal_rate(&state, rate);
+            }
         }
         AxisTorque { motor, gear, load }
     }

@@ -42,6 +42,8 @@ pub struct Run<'a> {
     pub noise: &'a [&'a [f64]],
     /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
     pub method: Method,
+    /// Step of the position sensor [rad]; zero for none.
+    pub resolution: f64,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,
 }
@@ -191,9 +193,23 @@ impl<S: Scalar> Signals<S> {
             for kernel in &axis.kernels {
                 error += kernel.sensor(angle);
             }
-            self.position_disturbance[i] = error;
-            self.measured[i] = angle + error;
+            self.read(i, angle, error, run.resolution);
         }
+    }
+
+    /// Reading of an axis at motor angle `angle`, to the nearest step of the sensor.
+    #[inline(always)]
+    pub(super) fn read(&mut self, axis: usize, angle: S, mut error: S, resolution: f64) {
+        if resolution > 0.0 {
+            let exact = angle + error;
+            // Rounding is flat between its jumps: derivatives pass as if it were not there.
+            error += S::from_lanes(|lane| {
+                let x = exact.lane(lane);
+                (x / resolution).round_ties_even() * resolution - x
+            });
+        }
+        self.position_disturbance[axis] = error;
+        self.measured[axis] = angle + error;
     }
 
     #[inline(always)]
@@ -281,6 +297,14 @@ pub(super) fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize,
         return Err(shape(
             "sample_time",
             "a positive time in seconds".to_owned(),
+            got,
+        ));
+    }
+    if !(run.resolution.is_finite() && run.resolution >= 0.0) {
+        let got = run.resolution.to_string();
+        return Err(shape(
+            "resolution",
+            "a step in radians, or zero".to_owned(),
             got,
         ));
     }

@@ -1,5 +1,6 @@
 //! Sampled-data simulation: controller at the sample time, plant in between.
 
+mod batch;
 mod closed_loop;
 mod controller;
 mod dormand_prince;
@@ -10,7 +11,8 @@ mod noise;
 mod runge_kutta4;
 mod torque_path;
 
+pub use batch::{Batch, BatchError, BatchInput, Model, Outcome, RunTrace, simulate_batch};
 pub use closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
 pub use linear::{LinearPlant, LinearPlantError, simulate_linear};
 pub use method::{Effort, Method, Stepper};
-pub use noise::measurement_noise;
+pub use noise::{coloured_noise, measurement_noise};

@@ -26,3 +26,25 @@ pub fn measurement_noise(
     }
     out
 }
+
+/// Gaussian position noise of standard deviation `std` [rad] and first-order spectrum, flat
+/// up to about `cutoff_hz`: white noise (as [`measurement_noise`] gives it) through a
+/// discrete low-pass, stationary from the first sample.
+pub fn coloured_noise(
+    seed: u64,
+    run: u64,
+    n_samples: usize,
+    n_axes: usize,
+    std: f64,
+    cutoff_hz: f64,
+    sample_time: f64,
+) -> Vec<f64> {
+    let mut out = measurement_noise(seed, run, n_samples, n_axes, std);
+    let keep = (-std::f64::consts::TAU * cutoff_hz * sample_time).exp();
+    // The variance of keep * old + fresh * new stays that of both.
+    let fresh = (1.0 - keep * keep).sqrt();
+    for k in n_axes..out.len() {
+        out[k] = keep * out[k - n_axes] + fresh * out[k];
+    }
+    out
+}

@@ -1,5 +1,6 @@
 //! What the linear loop needs to know of a robot, computed once.
 
+use std::ops::Range;
 use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
 use crate::effects::{self, Acts, EffectError, Kernel, Role};
@@ -71,6 +72,7 @@ pub struct LinearPlant {
     pub(super) start: Vec<f64>,
     /// State at rest, `[phi, q, phi', q']`.
     pub(super) rest: Vec<f64>,
+    joints: Range<usize>,
     pub(super) axes: Vec<LinearAxis>,
     /// Torque and resolver ripple of all axes.
     pub(super) waves: Waves,
@@ -100,13 +102,15 @@ impl LinearPlant {
             }
         }
         let linear = linearize(robot, &smooth, start)?;
+        let plain = Plant::<f64>::new(robot, &[], &smooth).map_err(LinearizationError::from)?;
         let axes = (0..whole.axes.len())
             .map(|i| LinearAxis::new(i, settings, &linear))
             .collect::<Result<Vec<_>, _>>()?;
         let at = &linear.equilibrium;
         Ok(Self {
             start: start.to_vec(),
-            rest: whole.state_at_rest(&at.motor_angle, &at.joint_angle),
+            rest: plain.state_at_rest(&at.motor_angle, &at.joint_angle),
+            joints: plain.n_motors()..plain.n_motors() + plain.chain.len(),
             propagator: Propagator::new(&linear.a, &linear.b, robot.sample_time),
             waves: Waves::new(&ripple_tables(settings, axes.len())),
             linear,
@@ -122,6 +126,16 @@ impl LinearPlant {
     /// Number of driven axes.
     pub fn n_axes(&self) -> usize {
         self.axes.len()
+    }
+
+    /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
+    pub fn motor_slots(&self) -> Vec<(usize, f64)> {
+        self.axes.iter().map(|a| (a.slot, a.scale)).collect()
+    }
+
+    /// The states that are joint angles.
+    pub fn joint_slots(&self) -> Range<usize> {
+        self.joints.clone()
     }
 
     /// Number of states.

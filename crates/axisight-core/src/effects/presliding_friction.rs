@@ -1,0 +1,111 @@
+//! Presliding friction: bristles that bend before the surfaces slip.
+
+use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use crate::scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "presliding_friction",
+    summary: "friction that yields like a spring before it slips, with a memory of its own",
+    equation: "tau_f = F_c (z + T_b z'),  z' = (phi' - |phi'| z / g) / delta,  g = 1 + (s - 1) exp(-(phi' / v_s)^2)",
+    source: "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), eqs. (1)-(4) with sigma_0 = F_c / delta, sigma_1 = sigma_0 T_b",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    parameters: &[
+        ParameterInfo {
+            name: "coulomb_nm",
+            unit: "Nm",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e4,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "static_ratio",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 1.0,
+            lower: 1.0,
+            upper: 10.0,
+            typical: 1.5,
+        },
+        ParameterInfo {
+            name: "stribeck_speed_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 3.0,
+            lower: 1e-4,
+            upper: 60.0,
+            typical: 3.0,
+        },
+        ParameterInfo {
+            name: "presliding_rad",
+            unit: "rad (motor side)",
+            role: Role::Shape,
+            neutral: 1e-2,
+            lower: 1e-9,
+            upper: 10.0,
+            typical: 1e-3,
+        },
+        ParameterInfo {
+            name: "bristle_time_s",
+            unit: "s",
+            role: Role::Shape,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1.0,
+            typical: 1e-4,
+        },
+    ],
+};
+
+struct Presliding<S> {
+    coulomb: S,
+    excess: S,
+    inverse_speed: S,
+    inverse_travel: S,
+    bristle_time: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Presliding {
+        coulomb: p[0],
+        excess: p[1] - 1.0,
+        inverse_speed: p[2].recip(),
+        inverse_travel: p[3].recip(),
+        bristle_time: p[4],
+    })
+}
+
+impl<S: Scalar> Presliding<S> {
+    /// Deflection of the bristles, in units of the one at which they slip, and its rate.
+    fn bristles(&self, motor: &Motor<'_, S>) -> (S, S) {
+        let hump = (-(motor.speed * self.inverse_speed).square()).exp();
+        let level = self.excess.fma(hump, S::one());
+        match motor.internal.first() {
+            Some(z) => {
+                let slip = motor.speed.abs() * (*z / level);
+                (*z, (motor.speed - slip) * self.inverse_travel)
+            }
+            // Without a state of its own (inverse dynamics): slipping all the time.
+            None => (motor.speed.if_positive(level, -level), S::zero()),
+        }
+    }
+}
+
+impl<S: Scalar> Kernel<S> for Presliding<S> {
+    fn n_internal(&self) -> usize {
+        1
+    }
+
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
+        let (z, rate) = self.bristles(motor);
+        -(self.coulomb * self.bristle_time.fma(rate, z))
+    }
+
+    fn internal_rate(&self, motor: &Motor<'_, S>, rate: &mut [S]) {
+        if let Some(out) = rate.first_mut() {
+            *out = self.bristles(motor).1;
+        }
+    }
+}
