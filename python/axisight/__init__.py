@@ -23,7 +23,7 @@ from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.logs import Case, Log, check_log, read_case, read_log
 from axisight.plots import plot_gap_map, plot_log, plot_overlay, plot_ranking, plot_simulation
 from axisight.robot import Robot, load_robot
-from axisight.simulation import simulate
+from axisight.simulation import simulate, simulate_batch
 
 __all__ = [
     "AxisightError",
@@ -60,4 +60,5 @@ __all__ = [
     "robot_parameter",
     "robot_parameters",
     "simulate",
+    "simulate_batch",
 ]

@@ -26,6 +26,7 @@ __all__ = [
     "fit_simulation",
     "measurement_noise",
     "simulate",
+    "simulate_batch",
 ]
 
 __version__: str
@@ -37,7 +38,8 @@ _Effect: TypeAlias = tuple[str, int | None, _Numbers]
 _Effects: TypeAlias = Sequence[_Effect]
 # Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
 _Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
-_Method: TypeAlias = Literal["rk4", "dopri5"]
+_Method: TypeAlias = Literal["rk4", "dopri5", "radau5", "rodas4", "auto"]
+_Model: TypeAlias = Literal["nonlinear", "linear"]
 
 @type_check_only
 class ParameterInfo(TypedDict):
@@ -78,8 +80,9 @@ class SimulationOutput(TypedDict):
     Arrays have shape (n_samples, n_axes) except ``joint_position_rad`` (n_samples, n_joints).
     ``position_rad`` is the measurement: ``motor_position_rad`` plus
     ``position_disturbance_rad``, which includes the noise. ``stopped_at`` is the sample
-    (from 0) at which a run that did not complete ended. ``evaluations``, ``steps`` and
-    ``rejections`` count right-hand sides and sub-steps.
+    (from 0) at which a run that did not complete ended. The counters are right-hand sides,
+    sub-steps, rejected sub-steps, Jacobians, factorized matrices and samples that were
+    integrated by an implicit method; all zero for the linear model.
     """
 
     torque_cmd_nm: _Array
@@ -93,6 +96,31 @@ class SimulationOutput(TypedDict):
     evaluations: int
     steps: int
     rejections: int
+    jacobians: int
+    factorizations: int
+    implicit_samples: int
+
+@type_check_only
+class BatchOutput(TypedDict):
+    """What many runs recorded: as `SimulationOutput` with a first dimension (or list) of runs.
+
+    A run that ended early is NaN after the sample at which it stopped.
+    """
+
+    torque_cmd_nm: _Array
+    position_rad: _Array
+    motor_position_rad: _Array
+    joint_position_rad: _Array
+    torque_disturbance_nm: _Array
+    position_disturbance_rad: _Array
+    status: list[str]
+    stopped_at: list[int | None]
+    evaluations: list[int]
+    steps: list[int]
+    rejections: list[int]
+    jacobians: list[int]
+    factorizations: list[int]
+    implicit_samples: list[int]
 
 @type_check_only
 class ParameterSpec(Protocol):
@@ -362,6 +390,8 @@ def simulate(
     method: _Method | str = "dopri5",
     substeps: int = 1,
     tolerance: float = 1e-7,
+    model: _Model | str = "nonlinear",
+    resolution: float = 0.0,
     cancel: CancelToken | None = None,
 ) -> SimulationOutput:
     """Simulate one run from rest.
@@ -369,12 +399,45 @@ def simulate(
     ``input`` (n_samples, n_axes) is a motor-side velocity reference [rad/s] through the
     controller if ``reference``, else a commanded torque [Nm]. ``noise`` [rad], of the same
     shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
-    angles at rest, None the operating point. ``method`` is "rk4" with ``substeps`` per sample or
-    "dopri5" with a relative ``tolerance`` per sub-step.
+    angles at rest, None the operating point. ``method`` is "rk4" with ``substeps`` per sample, or
+    an error-controlled one with a relative ``tolerance`` per step. ``resolution`` [rad] is the
+    step of the position sensor, 0 for none.
     """
 
-def measurement_noise(seed: int, run: int, n_samples: int, n_axes: int, std: float) -> _Array:
-    """White Gaussian position noise, shape (n_samples, n_axes), in the unit of ``std`` [rad].
+def simulate_batch(
+    robot: Robot,
+    effects: _Effects,
+    input: _Array,
+    *,
+    reference: bool,
+    noise: _Array | None = None,
+    start: _Numbers | None = None,
+    method: _Method | str = "dopri5",
+    substeps: int = 1,
+    tolerance: float = 1e-7,
+    model: _Model | str = "nonlinear",
+    resolution: float = 0.0,
+    threads: int = 0,
+    cancel: CancelToken | None = None,
+) -> BatchOutput:
+    """Simulate many runs: as `simulate` with arrays (n_runs, n_samples, n_axes).
+
+    ``threads`` 0 takes every core; results do not depend on it.
+    """
+
+def measurement_noise(
+    seed: int,
+    run: int,
+    n_samples: int,
+    n_axes: int,
+    std: float,
+    *,
+    cutoff_hz: float | None = None,
+    sample_time: float | None = None,
+) -> _Array:
+    """Gaussian position noise, shape (n_samples, n_axes), in the unit of ``std`` [rad].
+
+    White, or of first order with corner ``cutoff_hz`` at ``sample_time`` [s].
 
     A function of ``seed``, ``run`` and axis alone, so that any run can be made again.
     """
