@@ -1,0 +1,218 @@
+"""Ten seconds of the nonlinear 20-state closed loop at 2 kHz: this package, SciPy, pydiffsol.
+
+Run ``python benches/peers/nonlinear_loop.py`` from the root of the repository.
+
+All solve the same robot with full rigid-body terms in the same motion (every axis swings by
+0.35 rad, with four tones up to 36.7 Hz on top). The peers' right-hand side is an independent
+model compiled by numba (``common/numba_plant.py``), checked here against the package.
+
+* *sampled*: the task as specified, a controller at 2 kHz and its torque held in between.
+  A solver has to start anew at every sample. The error of everyone is measured against one
+  reference, a fixed-step Runge-Kutta run of the independent model with 32 sub-steps.
+* *smooth*: kinder to the peers. The same controller in continuous time on the same smooth
+  references, so one call solves the whole run and nothing restarts; outputs at the 20,001
+  samples. Our package knows sampled controllers only, so its time is that of the sampled
+  run. Errors are against a reference of the smooth run.
+
+Every solver gets the loosest tolerance at which its worst position, motors and joints
+alike, has a relative RMS error of at most 1e-6. Absolute tolerances are the relative ones
+times the largest excursion of each state. Radau gets a compiled Jacobian.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import axisight
+import numpy as np
+import scipy
+from common import loops, numba_plant, setting, smooth
+from common.loops import Task, relative_rms
+from common.timing import cpu, loosest, timed
+
+Array = np.ndarray
+RTOL = [10.0**-e for e in np.arange(3.0, 10.1, 0.5)]
+
+
+@dataclass
+class Row:
+    """One line of the table."""
+
+    label: str
+    settings: str
+    error: float
+    seconds: float
+
+
+def peer(
+    label: str,
+    prepare: Callable[[Task, float], Callable[[], Array]],
+    task: Task,
+    reference: Array,
+    args: argparse.Namespace,
+    scan_s: float,
+) -> Row:
+    """Scan the tolerance on a part of the run, then time the whole run."""
+    part = task.for_seconds(scan_s)
+
+    def error(rtol: float) -> float:
+        return relative_rms(prepare(part, rtol)(), reference[: part.n_samples])
+
+    rtol, _ = loosest(error, RTOL, args.wanted)
+    while True:
+        seconds, out = timed(prepare(task, rtol), args.peer_repeats)
+        reached = relative_rms(out, reference)
+        if reached <= args.wanted or rtol <= RTOL[-1]:
+            return Row(label, f"rtol {rtol:.0e}", reached, seconds)
+        rtol = RTOL[RTOL.index(rtol) + 1]
+
+
+def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> tuple:
+    """Our two explicit methods at the loosest setting; microseconds per evaluation."""
+    rows, per_evaluation = [], {}
+    options = {
+        "dopri5": [{"tolerance": t} for t in RTOL],
+        "rk4": [{"substeps": n} for n in (1, 2, 3, 4, 6, 8)],
+    }
+    for method, choices in options.items():
+
+        def error(choice: dict, method: str = method) -> float:
+            return relative_rms(setting.ours(s, method=method, **choice)[0], reference)
+
+        choice, _ = loosest(error, choices, args.wanted)
+        run = lambda m=method, c=choice: axisight.simulate(s.robot, s.reference, method=m, **c)  # noqa: E731
+        seconds, _ = timed(run, args.repeats)
+        positions, attrs = setting.ours(s, method=method, **choice)
+        text = ", ".join(f"{k} {v:.3g}" for k, v in choice.items())
+        rows.append(
+            Row(f"axisight {method}", text, relative_rms(positions, reference), seconds)
+        )
+        per_evaluation[method] = 1e6 * seconds / attrs["right_hand_sides"]
+    return rows, per_evaluation
+
+
+def pydiffsol_row(s: setting.Setting, reference: Array, args: argparse.Namespace) -> tuple:
+    """pydiffsol's tsit45 on the smooth run, and its microseconds per evaluation."""
+    import pydiffsol  # noqa: PLC0415
+    from common import diffsl_plant  # noqa: PLC0415
+
+    task, none = s.smooth, np.array([])
+    rest = task.start[: s.model.n_axes]
+    code = diffsl_plant.smooth_loop(
+        s.model, s.tones, rest, s.feed_forward, task.start, task.size
+    )
+    ode = pydiffsol.Ode(code, ode_solver=pydiffsol.tsit45)
+    times = smooth.times(task)
+
+    def solve(rtol: float) -> Array:
+        ode.rtol, ode.atol, ode.h0 = rtol, rtol, 1e-5
+        return np.asarray(ode.solve_dense(none, times).ys).T
+
+    rtol, _ = loosest(lambda r: relative_rms(solve(r), reference), RTOL, args.wanted)
+    seconds, out = timed(lambda: solve(rtol), args.repeats)
+    plain, solution = timed(lambda: ode.solve(none, times[-1]), args.repeats)
+    steps = len(solution.ts) - 1
+    row = Row("pydiffsol tsit45", f"rtol {rtol:.0e}", relative_rms(out, reference), seconds)
+    # Six stages a step, the seventh is the next one's first. Rejected steps are not told, so
+    # this is an upper bound.
+    return row, 1e6 * plain / (6 * steps), steps
+
+
+def print_rows(title: str, rows: list[Row], ours: Row) -> None:
+    print(f"\n{title}")
+    print(f"{'':26}{'settings':18}{'rel. RMS error':>15}{'CPU s':>10}{'peer/ours':>11}")
+    for r in rows:
+        ratio = r.seconds / ours.seconds
+        print(f"{r.label:26}{r.settings:18}{r.error:15.1e}{r.seconds:10.4f}{ratio:11.2f}")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--wanted", type=float, default=1e-6)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--peer-repeats", type=int, default=1)
+    parser.add_argument("--scan-seconds", type=float, default=0.5, help="for sampled peers")
+    args = parser.parse_args()
+    s = setting.make(args.seconds)
+    inverse, linear = numba_plant.check(s.model, s.robot.core)
+    print(cpu())
+    print(f"SciPy {scipy.__version__}, one thread, {args.seconds:g} s, {len(s.reference)} samples")
+    print(f"independent model against ours: inverse dynamics {inverse:.0e}, linear {linear:.0e}")
+
+    fine, finer = (loops.rk4_sampled(s.sampled, n)() for n in (16, 32))
+    smooth_fine, smooth_finer = (loops.rk4_sampled(s.smooth, n)() for n in (16, 32))
+    print(
+        f"references converged to {relative_rms(fine, finer) / 15:.0e} (sampled)"
+        f" and {relative_rms(smooth_fine, smooth_finer) / 15:.0e} (smooth)"
+    )
+    own, per_evaluation = own_rows(s, finer, args)
+    best = min(own, key=lambda r: r.seconds)
+
+    def rk4(task: Task, reference: Array) -> Row:
+        n, _ = loosest(
+            lambda n: relative_rms(loops.rk4_sampled(task, n)(), reference),
+            [1, 2, 3, 4, 6, 8],
+            args.wanted,
+        )
+        seconds, out = timed(loops.rk4_sampled(task, n), args.repeats)
+        return Row("numba RK4 loop", f"substeps {n}", relative_rms(out, reference), seconds)
+
+    rows = [rk4(s.sampled, finer)]
+    for label, prepare in (
+        ("SciPy LSODA", loops.lsoda_sampled),
+        ("SciPy Radau", loops.radau_sampled),
+    ):
+        rows.append(peer(label, prepare, s.sampled, finer, args, args.scan_seconds))
+    print_rows("sampled: restart at every sample", own + rows, best)
+
+    rows = [rk4(s.smooth, smooth_finer)]
+    for label, prepare in (
+        ("SciPy LSODA, odeint", smooth.lsoda),
+        ("SciPy LSODA, solve_ivp", smooth.scipy_ivp("LSODA")),
+        ("SciPy DOP853, solve_ivp", smooth.scipy_ivp("DOP853")),
+        ("SciPy Radau, solve_ivp", smooth.scipy_ivp("Radau")),
+    ):
+        rows.append(peer(label, prepare, s.smooth, smooth_finer, args, args.seconds))
+    row, each, steps = pydiffsol_row(s, smooth_finer, args)
+    print_rows("smooth: no restarts, ours sampled", [best, *rows, row], best)
+
+    raw, _ = timed(lambda: loops.rk4_sampled(s.sampled, 1)(), args.repeats)
+    print("\nmicroseconds per right-hand side, solver included")
+    for method, us in per_evaluation.items():
+        print(f"{'axisight ' + method:26}{us:8.3f}")
+    print(f"{'numba RK4 loop':26}{1e6 * raw / (4 * len(s.reference)):8.3f}")
+    print(f"{'pydiffsol tsit45':26}{each:8.3f}  ({steps} steps, rejected ones unknown)")
+    if hasattr(axisight, "simulate_batch"):
+        batch_row(s, best, args)
+    else:
+        print("\nbatch: not in this version of the package")
+
+
+def batch_row(s: setting.Setting, best: Row, args: argparse.Namespace) -> None:
+    """Time per run in a batch of 64 against a single run, one thread."""
+    runs = 64
+    scale = np.linspace(0.5, 1.0, runs)[:, None, None]
+    references = np.ascontiguousarray(scale * s.reference)
+    method, choice = best.label.split()[1], best.settings.split()
+    options = {choice[0]: int(choice[1]) if method == "rk4" else float(choice[1])}
+    seconds, _ = timed(
+        lambda: axisight.simulate_batch(
+            s.robot, references, threads=1, method=method, **options
+        ),
+        1,
+    )
+    per_run = seconds / runs
+    print(f"\nbatch of {runs}: {per_run:.4f} s a run, single {best.seconds:.4f} s,")
+    print(f"ratio {best.seconds / per_run:.2f}")
+
+
+if __name__ == "__main__":
+    main()
