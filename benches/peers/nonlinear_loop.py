@@ -103,10 +103,7 @@ def pydiffsol_row(s: setting.Setting, reference: Array, args: argparse.Namespace
     from common import diffsl_plant  # noqa: PLC0415
 
     task, none = s.smooth, np.array([])
-    rest = task.start[: s.model.n_axes]
-    code = diffsl_plant.smooth_loop(
-        s.model, s.tones, rest, s.feed_forward, task.start, task.size
-    )
+    code = diffsl_plant.smooth_loop(s.model, s.tones, task.start, s.feed_forward, task.size)
     ode = pydiffsol.Ode(code, ode_solver=pydiffsol.tsit45)
     times = smooth.times(task)
 

@@ -156,16 +156,16 @@ def cvode_sampled(task: Task, rtol: float) -> Callable[[], Array]:
     period = task.sample_time
     warm(task, returning(task.plant), returning_jacobian(task))
 
-    def rhs(t: float, y: Array, yp: Array, u: Array) -> None:
-        held(t, y, u, yp)
-
-    def jac(t: float, y: Array, yp: Array, out: Array, u: Array) -> None:
-        fill(t, y, u, out)
-
     u_shared = np.zeros(task.plant.n_axes)
+
+    def rhs(t: float, y: Array, yp: Array) -> None:
+        held(t, y, u_shared, yp)
+
+    def jac(t: float, y: Array, yp: Array, out: Array) -> None:
+        fill(t, y, u_shared, out)
+
     solver = CVODE(
         rhs,
-        userdata=u_shared,
         jacfn=jac,
         rtol=rtol,
         atol=rtol * task.size,

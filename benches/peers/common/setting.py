@@ -8,7 +8,7 @@ from pathlib import Path
 import axisight
 import numpy as np
 from common import numba_plant, robot_model
-from common.loops import Task, controller, rk4_sampled
+from common.loops import Task, controller
 from common.tones import Tones
 
 Array = np.ndarray
@@ -30,8 +30,13 @@ class Setting:
     feed_forward: Array
 
 
-def make(seconds: float, extras: robot_model.Extras | None = None) -> Setting:
-    """The 20-state robot in a run of ``seconds``, with the two forms of its loop."""
+def make(
+    seconds: float, extras: robot_model.Extras | None = None, smooth: bool = True
+) -> Setting:
+    """The 20-state robot in a run of ``seconds``, with the two forms of its loop.
+
+    Without ``smooth`` the second form is not compiled, and is the first again.
+    """
     text = (ROOT / "python/axisight/presets" / f"{PRESET}.toml").read_text("utf-8")
     robot = axisight.load_robot(PRESET)
     model = robot_model.read(text)
@@ -42,8 +47,9 @@ def make(seconds: float, extras: robot_model.Extras | None = None) -> Setting:
     start = robot_model.equilibrium_state(rest, extras)
     torque = rest["motor_torque"]
     held = numba_plant.held_torque(model, extras)
-    looped = numba_plant.smooth_loop(model, tones, rest["motor_angle"], torque, extras)
-    size = np.ones(held.n_states)
+    looped = held
+    if smooth:
+        looped = numba_plant.smooth_loop(model, tones, rest["motor_angle"], torque, extras)
     command = controller(model, torque)
     n_positions = model.n_axes + model.n_joints
 
@@ -52,7 +58,7 @@ def make(seconds: float, extras: robot_model.Extras | None = None) -> Setting:
         period = model.sample_time
         return Task(plant, jacobian, command, start, reference, period, size, n_positions)
 
-    size = typical_size(task(held, size))
+    size = typical_size(robot, reference)
     if extras is not None and extras.lugre is not None:
         # Bristles settle near the static torque over their stiffness.
         deflection = extras.lugre.static_nm / extras.lugre.stiffness_nm_rad
@@ -62,14 +68,12 @@ def make(seconds: float, extras: robot_model.Extras | None = None) -> Setting:
     )
 
 
-def typical_size(task: Task) -> Array:
-    """Largest excursion of each state in the run: the scale of absolute tolerances.
-
-    Velocities from differences of the positions.
-    """
-    positions = rk4_sampled(task, 2)()
+def typical_size(robot: axisight.Robot, reference: Array) -> Array:
+    """Largest excursion of each state without effects: the scale of absolute tolerances."""
+    out = axisight.simulate(robot, reference)
+    positions = np.hstack([out["motor_position_rad"], out["joint_position_rad"]])
     travel = np.abs(positions - positions[0]).max(axis=0)
-    speed = np.abs(np.diff(positions, axis=0)).max(axis=0) / task.sample_time
+    speed = np.abs(np.diff(positions, axis=0)).max(axis=0) / robot.sample_time_s
     return np.concatenate([travel, speed])
 
 
