@@ -25,7 +25,6 @@ import argparse
 import sys
 from collections.abc import Callable
 
-import axisight
 import mujoco
 import numba
 import numpy as np
@@ -34,8 +33,10 @@ from common.loops import relative_rms
 from common.timing import cpu, timed
 from mujoco import rollout
 
+import axisight
+
 sys.path.insert(0, str(setting.ROOT / "tests" / "python"))
-import mujoco_model  # noqa: E402
+import mujoco_model
 
 Array = np.ndarray
 UNUSED = (
@@ -75,7 +76,7 @@ def independent(s: setting.Setting, torque: Array) -> Callable[[int], Array]:
     """Positions of the independent model under held torques, by sub-steps per sample."""
 
     @numba.njit
-    def command(k, w_ref, x, previous, phi_ref, u):  # noqa: ANN001, ANN202
+    def command(k, w_ref, x, previous, phi_ref, u):
         for i in range(len(u)):
             u[i] = w_ref[k, i]
 

@@ -29,12 +29,13 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import axisight
 import numpy as np
 import scipy
 from common import loops, numba_plant, setting, smooth
 from common.loops import Task, relative_rms
 from common.timing import cpu, loosest, timed
+
+import axisight
 
 Array = np.ndarray
 RTOL = [10.0**-e for e in np.arange(3.0, 10.1, 0.5)]
@@ -90,9 +91,7 @@ def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> 
         seconds, _ = timed(run, args.repeats)
         positions, attrs = setting.ours(s, method=method, **choice)
         text = ", ".join(f"{k} {v:.3g}" for k, v in choice.items())
-        rows.append(
-            Row(f"axisight {method}", text, relative_rms(positions, reference), seconds)
-        )
+        rows.append(Row(f"axisight {method}", text, relative_rms(positions, reference), seconds))
         per_evaluation[method] = 1e6 * seconds / attrs["right_hand_sides"]
     return rows, per_evaluation
 
@@ -181,7 +180,7 @@ def main() -> None:
     row, each, steps = pydiffsol_row(s, smooth_finer, args)
     print_rows("smooth: no restarts, ours sampled", [best, *rows, row], best)
 
-    raw, _ = timed(lambda: loops.rk4_sampled(s.sampled, 1)(), args.repeats)
+    raw, _ = timed(loops.rk4_sampled(s.sampled, 1), args.repeats)
     print("\nmicroseconds per right-hand side, solver included")
     for method, us in per_evaluation.items():
         print(f"{'axisight ' + method:26}{us:8.3f}")
@@ -201,9 +200,7 @@ def batch_row(s: setting.Setting, best: Row, args: argparse.Namespace) -> None:
     method, choice = best.label.split()[1], best.settings.split()
     options = {choice[0]: int(choice[1]) if method == "rk4" else float(choice[1])}
     seconds, _ = timed(
-        lambda: axisight.simulate_batch(
-            s.robot, references, threads=1, method=method, **options
-        ),
+        lambda: axisight.simulate_batch(s.robot, references, threads=1, method=method, **options),
         1,
     )
     per_run = seconds / runs

@@ -29,15 +29,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import argparse
 from collections.abc import Callable
 
-import axisight
 import numpy as np
 import scipy
 import sksundae
-from axisight.effects import Effect, effect_table
 from common import loops, setting, smooth
 from common.loops import relative_rms
 from common.robot_model import Extras, Lugre
 from common.timing import cpu, timed
+
+import axisight
+from axisight.effects import Effect, effect_table
 
 SMOOTH_STIFFNESS = 50.0
 FACTOR = 1e5

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+
 from common import robot_model
 from common.expressions import Scalar, Tape, lines
 from common.numba_plant import smooth_torque
@@ -45,7 +46,9 @@ def source(rates: list[Scalar], outputs: list[Scalar], initial: Array) -> str:
     """DiffSL text: initial states, intermediate scalars, derivatives, outputs."""
     assignments, texts = lines([*rates, *outputs])
     n = len(rates)
-    parts = ["u_i { " + ", ".join(f"{state(i)} = {number(v)}" for i, v in enumerate(initial)) + " }"]
+    parts = [
+        "u_i { " + ", ".join(f"{state(i)} = {number(v)}" for i, v in enumerate(initial)) + " }"
+    ]
     parts += [f"{name} {{ {plain(text)} }}" for name, text in assignments]
     parts.append("F_i { " + ", ".join(plain(t) for t in texts[:n]) + " }")
     parts.append("out_i { " + ", ".join(plain(t) for t in texts[n:]) + " }")

@@ -157,9 +157,7 @@ def operations(results: list[Scalar]) -> int:
     """Number of arithmetic operations and function calls in one evaluation."""
     tape = results[0].tape
     used = _uses(tape, results)
-    return sum(
-        1 for n, u in zip(tape.nodes, used, strict=True) if u and n.operation not in _LEAVES
-    )
+    return sum(1 for n, u in zip(tape.nodes, used, strict=True) if u and n.operation not in _LEAVES)
 
 
 _LEAVES = ("leaf", "constant")

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from scipy import integrate
+
 from common.numba_plant import Plant
 from common.robot_model import Model
-from scipy import integrate
 
 Array = np.ndarray
 
@@ -49,7 +50,7 @@ def controller(model: Model, feed_forward: Array) -> Callable:
     rest = np.array(feed_forward, dtype=float)
 
     @numba.njit
-    def command(k, w_ref, x, previous, phi_ref, u):  # noqa: ANN001, ANN202
+    def command(k, w_ref, x, previous, phi_ref, u):
         for i in range(count):
             speed = (x[i] - previous[i]) / period if k > 0 else 0.0
             u[i] = rest[i] + kp[i] * (w_ref[k, i] - speed) + ki[i] * (phi_ref[i] - x[i])
@@ -77,7 +78,7 @@ def returning(plant: Plant) -> Callable:
     held, n = plant.held, plant.n_states
 
     @numba.njit
-    def function(t, x, u):  # noqa: ANN001, ANN202
+    def function(t, x, u):
         dx = np.empty(n)
         held(t, x, u, dx)
         return dx
@@ -90,7 +91,7 @@ def returning_jacobian(task: Task) -> Callable:
     fill, n = task.jacobian, task.plant.n_states
 
     @numba.njit
-    def function(t, x, u):  # noqa: ANN001, ANN202
+    def function(t, x, u):
         out = np.empty((n, n))
         fill(t, x, u, out)
         return out
@@ -195,7 +196,7 @@ def rk4_loop(task: Task) -> Callable:
     period = task.sample_time
 
     @numba.njit
-    def loop(start, reference, substeps):  # noqa: ANN001, ANN202
+    def loop(start, reference, substeps):
         x, probe = start.copy(), np.empty(n)
         k1, k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
         previous, phi_ref, u = x[:motors].copy(), x[:motors].copy(), np.zeros(motors)

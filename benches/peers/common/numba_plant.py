@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+
 from common import robot_model
 from common.expressions import Scalar, lines, operations
 from common.tones import Tones
@@ -29,7 +30,7 @@ def compiled(signature: str, results: list[Scalar], out: str) -> Callable:
     body += [f"    {out}[{i}] = {text}" for i, text in enumerate(texts)]
     source = f"def function({signature}):\n" + "\n".join(body) + "\n"
     scope = {"sin": math.sin, "cos": math.cos, "exp": math.exp, "tanh": math.tanh, "abs": abs}
-    exec(compile(source, "<straight-line model>", "exec"), scope)  # noqa: S102
+    exec(compile(source, "<straight-line model>", "exec"), scope)
     return numba.njit(fastmath=FASTMATH, error_model="numpy")(scope["function"])
 
 
@@ -68,7 +69,7 @@ def smooth_loop(
     return Plant(len(x), model.n_axes, operations(dx), compiled("t, x, u, dx", dx, "dx"))
 
 
-def smooth_torque(model, tones, start, feed_forward, x, tape) -> list[Scalar]:  # noqa: ANN001
+def smooth_torque(model, tones, start, feed_forward, x, tape) -> list[Scalar]:
     """``u_ff + kp (w_ref - w) + ki (phi_ref - phi)`` in continuous time."""
     w_ref, phi_ref = tones.traced(tape)
     kp, ki = model.controller["kp"], model.controller["ki"]
@@ -91,7 +92,7 @@ def jacobian_of(plant: Plant, size: Array) -> Callable:
     step = 1.5e-8 * size
 
     @numba.njit
-    def jacobian(t, x, u, out):  # noqa: ANN001, ANN202
+    def jacobian(t, x, u, out):
         base, moved, probe = np.empty(n), np.empty(n), x.copy()
         held(t, x, u, base)
         for j in range(n):

@@ -15,6 +15,7 @@ import tomllib
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from common.expressions import Scalar, Tape
 
 Vector = list[Scalar]
@@ -229,9 +230,7 @@ def gather(motions: list, inertias: list, wrenches: list) -> tuple[list, list]:
             first = inertia is None
             inertia = inertias[i] if first else inertia.plus(inertias[i])
             moment, force = wrenches[i]
-            wrench = (
-                (moment, force) if first else (add(wrench[0], moment), add(wrench[1], force))
-            )
+            wrench = (moment, force) if first else (add(wrench[0], moment), add(wrench[1], force))
         axis, lever = motions[i]
         bias[i] = dot(axis, wrench[0]) + dot(lever, wrench[1])
         moment, force = inertia.times(axis, lever)

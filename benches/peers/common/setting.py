@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import axisight
 import numpy as np
+
+import axisight
 from common import numba_plant, robot_model
 from common.loops import Task, controller
 from common.tones import Tones
@@ -30,9 +31,7 @@ class Setting:
     feed_forward: Array
 
 
-def make(
-    seconds: float, extras: robot_model.Extras | None = None, smooth: bool = True
-) -> Setting:
+def make(seconds: float, extras: robot_model.Extras | None = None, smooth: bool = True) -> Setting:
     """The 20-state robot in a run of ``seconds``, with the two forms of its loop.
 
     Without ``smooth`` the second form is not compiled, and is the first again.

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from common.loops import Task, returning, returning_jacobian, warm
 from scipy import integrate
+
+from common.loops import Task, returning, returning_jacobian, warm
 
 Array = np.ndarray
 
