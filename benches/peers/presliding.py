@@ -11,7 +11,8 @@ with F_c 0.5 Nm, F_s 0.8 Nm, v_s 1 rad/s (sigma_2 w is the motor's viscous frict
 In sliding, z settles at the rate sigma_0 |w| / g. *Smooth*: sigma_0 = 50 Nm/rad makes that
 1e3 1/s at 10 rad/s, as fast as the fastest structural mode. *Stiff*: 1e5 times that,
 5e6 Nm/rad; break-away then comes after 1.6e-7 rad of motor angle, the rate in sliding is
-1e8 1/s, and a sticking motor oscillates on its bristles at 2e4 rad/s. sigma_1 damps that oscillation critically, 2 sqrt(sigma_0 J).
+1e8 1/s, and a sticking motor oscillates on its
+bristles at 2e4 rad/s. sigma_1 damps that oscillation critically, 2 sqrt(sigma_0 J).
 
 Both peers get the compiled model and a compiled Jacobian. *Sampled* and *smooth loop* are as
 in ``nonlinear_loop.py``: with a restart at every sample, and the controller in continuous

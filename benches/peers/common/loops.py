@@ -107,15 +107,19 @@ def warm(task: Task, *functions: Callable) -> None:
 
 
 def lsoda_sampled(task: Task, rtol: float) -> Callable[[], Array]:
-    """SciPy's LSODA through ``odeint``, the interface with the least Python per step."""
+    """SciPy's LSODA through ``ode``, its interface with the least Python per restart.
+
+    ``odeint`` takes 5 to 10 % longer here, the class ``LSODA`` more than twice as long.
+    """
     function = returning(task.plant)
     warm(task, function)
-    ends = np.array([0.0, task.sample_time])
-    atol = rtol * task.size
+    solver = integrate.ode(function)
+    solver.set_integrator("lsoda", rtol=rtol, atol=rtol * task.size, nsteps=100_000)
 
     def advance(x: Array, u: Array) -> Array:
-        out = integrate.odeint(function, x, ends, (u,), tfirst=True, rtol=rtol, atol=atol)
-        return out[1]
+        solver.set_f_params(u)
+        solver.set_initial_value(x, 0.0)
+        return solver.integrate(task.sample_time)
 
     return lambda: sampled(task, advance)
 
