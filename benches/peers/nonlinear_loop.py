@@ -28,52 +28,17 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from common import diffsol_runs, loops, numba_plant, setting, smooth
 from common.loops import Task, relative_rms
-from common.timing import cpu, loosest, timed
+from common.scan import RTOL, Row, loosest, peer, print_rows
+from common.timing import cpu, timed
 
 import axisight
 
 Array = np.ndarray
-RTOL = [10.0**-e for e in np.arange(3.0, 10.1, 0.5)]
-
-
-@dataclass
-class Row:
-    """One line of the table."""
-
-    label: str
-    settings: str
-    error: float
-    seconds: float
-
-
-def peer(
-    label: str,
-    prepare: Callable[[Task, float], Callable[[], Array]],
-    task: Task,
-    reference: Array,
-    args: argparse.Namespace,
-    scan_s: float,
-) -> Row:
-    """Scan the tolerance on a part of the run, then time the whole run."""
-    part = task.for_seconds(scan_s)
-
-    def error(rtol: float) -> float:
-        return relative_rms(prepare(part, rtol)(), reference[: part.n_samples])
-
-    rtol, _ = loosest(error, RTOL, args.wanted)
-    while True:
-        seconds, out = timed(prepare(task, rtol), args.peer_repeats)
-        reached = relative_rms(out, reference)
-        if reached <= args.wanted or rtol <= RTOL[-1]:
-            return Row(label, f"rtol {rtol:.0e}", reached, seconds)
-        rtol = RTOL[RTOL.index(rtol) + 1]
 
 
 def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> tuple:
@@ -88,7 +53,7 @@ def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> 
         def error(choice: dict, method: str = method) -> float:
             return relative_rms(setting.ours(s, method=method, **choice)[0], reference)
 
-        choice, _ = loosest(error, choices, args.wanted)
+        choice = loosest(error, choices, args.wanted)
         run = lambda m=method, c=choice: axisight.simulate(s.robot, s.reference, method=m, **c)  # noqa: E731
         seconds, _ = timed(run, args.repeats)
         positions, attrs = setting.ours(s, method=method, **choice)
@@ -98,22 +63,13 @@ def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> 
     return rows, per_evaluation
 
 
-def print_rows(title: str, rows: list[Row], ours: Row) -> None:
-    print(f"\n{title}")
-    print(f"{'':26}{'settings':18}{'rel. RMS error':>15}{'CPU s':>10}{'peer/ours':>11}")
-    for r in rows:
-        ratio = r.seconds / ours.seconds
-        print(f"{r.label:26}{r.settings:18}{r.error:15.1e}{r.seconds:10.4f}{ratio:11.2f}")
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--wanted", type=float, default=1e-6)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--peer-repeats", type=int, default=1)
-    parser.add_argument("--scan-seconds", type=float, default=0.5, help="for sampled peers")
+    parser.add_argument("--scan-seconds", type=float, default=1.0, help="part for the first scan")
     args = parser.parse_args()
     s = setting.make(args.seconds)
     inverse, linear = numba_plant.check(s.model, s.robot.core)
@@ -131,7 +87,7 @@ def main() -> None:
     best = min(own, key=lambda r: r.seconds)
 
     def rk4(task: Task, reference: Array) -> Row:
-        n, _ = loosest(
+        n = loosest(
             lambda n: relative_rms(loops.rk4_sampled(task, n)(), reference),
             [1, 2, 3, 4, 6, 8],
             args.wanted,
@@ -146,7 +102,7 @@ def main() -> None:
         ("SciPy LSODA", loops.lsoda_sampled),
         ("SciPy Radau", loops.radau_sampled),
     ):
-        rows.append(peer(label, prepare, s.sampled, finer, args, args.scan_seconds))
+        rows.append(peer(label, prepare, s.sampled, finer, args.wanted, args.scan_seconds))
     print_rows("sampled: restart at every sample", own + rows, best)
 
     rows = [rk4(s.smooth, smooth_finer)]
@@ -158,7 +114,7 @@ def main() -> None:
         ("SciPy Radau, solve_ivp", smooth.scipy_ivp("Radau")),
         ("pydiffsol tsit45", whole.prepare),
     ):
-        rows.append(peer(label, prepare, s.smooth, smooth_finer, args, args.seconds))
+        rows.append(peer(label, prepare, s.smooth, smooth_finer, args.wanted, args.scan_seconds))
     print_rows("smooth: no restarts, ours sampled", [best, *rows], best)
     per_evaluation["numba RK4 loop"] = (
         1e6 * timed(loops.rk4_sampled(s.sampled, 1), args.repeats)[0] / (4 * len(s.reference))

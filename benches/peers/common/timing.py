@@ -33,18 +33,3 @@ def cpu() -> str:
             if line.startswith("model name"):
                 return line.split(":", 1)[1].strip()
     return platform.processor() or platform.machine()
-
-
-def loosest(
-    run: Callable[[Any], float], settings: list[Any], wanted: float
-) -> tuple[Any, list[tuple[Any, float]]]:
-    """First of the settings, loosest first, whose error is at most ``wanted``; all tried.
-
-    The last one is taken if none is good enough.
-    """
-    tried = []
-    for setting in settings:
-        tried.append((setting, run(setting)))
-        if tried[-1][1] <= wanted:
-            break
-    return tried[-1][0], tried
