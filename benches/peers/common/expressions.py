@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-Number = "Scalar | float"
 FUNCTIONS = ("sin", "cos", "exp", "abs", "tanh")
 
 

@@ -36,12 +36,11 @@ def compiled(signature: str, results: list[Scalar], out: str) -> Callable:
 
 @dataclass
 class Plant:
-    """Compiled functions of one robot with its extras."""
+    """One robot with its extras; ``held(t, x, u, dx)`` fills dx under motor torques u."""
 
     n_states: int
     n_axes: int
     operations: int
-    """``held(t, x, u, dx)``: motor torques u held."""
     held: Callable
 
 

@@ -52,19 +52,26 @@ def peer(
 ) -> Row:
     """Scan the tolerance on the first ``scan_s`` of the run, then time the whole run.
 
-    Tightened further if the whole run turns out worse than its beginning.
+    The whole run may turn out better or worse than its beginning, so the tolerance is
+    loosened or tightened from there.
     """
     part = task.for_seconds(scan_s)
 
     def error(rtol: float) -> float:
         return relative_rms(prepare(part, rtol)(), reference[: part.n_samples])
 
-    rtol = loosest(error, RTOL, wanted)
-    while True:
-        row = fixed(label, prepare, task, reference, rtol)
-        if row.error <= wanted or rtol == RTOL[-1]:
-            return row
-        rtol = RTOL[RTOL.index(rtol) + 1]
+    place = RTOL.index(loosest(error, RTOL, wanted))
+    best = fixed(label, prepare, task, reference, RTOL[place])
+    direction = -1 if best.error <= wanted else 1
+    while 0 <= place + direction < len(RTOL):
+        place += direction
+        row = fixed(label, prepare, task, reference, RTOL[place])
+        if direction < 0 and row.error > wanted:
+            break
+        best = row
+        if direction > 0 and row.error <= wanted:
+            break
+    return best
 
 
 def print_rows(title: str, rows: list[Row], ours: Row | None) -> None:
