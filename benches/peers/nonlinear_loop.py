@@ -39,28 +39,95 @@ from common.timing import cpu, timed
 import axisight
 
 Array = np.ndarray
+SUBSTEPS = [1, 2, 3, 4, 6, 8]
+REFERENCE_SUBSTEPS = (16, 32)
 
 
 def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> tuple:
     """Our two explicit methods at the loosest setting; microseconds per evaluation."""
     rows, per_evaluation = [], {}
-    options = {
+    choices = {
         "dopri5": [{"tolerance": t} for t in RTOL],
-        "rk4": [{"substeps": n} for n in (1, 2, 3, 4, 6, 8)],
+        "rk4": [{"substeps": n} for n in SUBSTEPS],
     }
-    for method, choices in options.items():
+    for method, settings in choices.items():
 
         def error(choice: dict, method: str = method) -> float:
             return relative_rms(setting.ours(s, method=method, **choice)[0], reference)
 
-        choice = loosest(error, choices, args.wanted)
-        run = lambda m=method, c=choice: axisight.simulate(s.robot, s.reference, method=m, **c)  # noqa: E731
+        choice = loosest(error, settings, args.wanted)
+        options = {"method": method, **choice}
+        run = lambda o=options: axisight.simulate(s.robot, s.reference, **o)  # noqa: E731
         seconds, _ = timed(run, args.repeats)
-        positions, attrs = setting.ours(s, method=method, **choice)
+        positions, attrs = setting.ours(s, **options)
         text = ", ".join(f"{k} {v:.3g}" for k, v in choice.items())
-        rows.append(Row(f"axisight {method}", text, relative_rms(positions, reference), seconds))
+        reached = relative_rms(positions, reference)
+        rows.append(Row(f"axisight {method}", text, reached, seconds, options))
         per_evaluation[f"axisight {method}"] = 1e6 * seconds / attrs["right_hand_sides"]
     return rows, per_evaluation
+
+
+def numba_row(task: Task, reference: Array, args: argparse.Namespace) -> Row:
+    """The compiled loop with as few sub-steps as will do."""
+
+    def error(substeps: int) -> float:
+        return relative_rms(loops.rk4_sampled(task, substeps)(), reference)
+
+    n = loosest(error, SUBSTEPS, args.wanted)
+    seconds, out = timed(loops.rk4_sampled(task, n), args.repeats)
+    return Row("numba RK4 loop", f"substeps {n}", relative_rms(out, reference), seconds)
+
+
+def sampled_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> list[Row]:
+    """Peers with a restart at every sample."""
+    peers = {
+        "pydiffsol tsit45": diffsol_runs.Sampled(s.model, s.sampled).prepare,
+        "SciPy LSODA": loops.lsoda_sampled,
+        "SciPy Radau": loops.radau_sampled,
+    }
+    return [numba_row(s.sampled, reference, args)] + [
+        peer(label, prepare, s.sampled, reference, args.wanted, args.scan_seconds)
+        for label, prepare in peers.items()
+    ]
+
+
+def smooth_rows(s: setting.Setting, args: argparse.Namespace) -> tuple[list[Row], float]:
+    """Peers in one call, and pydiffsol's microseconds per evaluation."""
+    fine, finer = (loops.rk4_sampled(s.smooth, n)() for n in REFERENCE_SUBSTEPS)
+    print(f"\nsmooth reference converged to {relative_rms(fine, finer) / 15:.0e}")
+    whole = diffsol_runs.Smooth(s.model, s.tones, s.feed_forward, s.smooth)
+    peers = {
+        "SciPy LSODA, odeint": smooth.lsoda,
+        "SciPy LSODA, solve_ivp": smooth.scipy_ivp("LSODA"),
+        "SciPy DOP853, solve_ivp": smooth.scipy_ivp("DOP853"),
+        "SciPy Radau, solve_ivp": smooth.scipy_ivp("Radau"),
+        "pydiffsol tsit45": whole.prepare,
+    }
+    rows = [numba_row(s.smooth, finer, args)] + [
+        peer(label, prepare, s.smooth, finer, args.wanted, args.scan_seconds)
+        for label, prepare in peers.items()
+    ]
+    # Six stages a step, the seventh is the next one's first. Rejected steps are not told, so
+    # this is an upper bound.
+    bare, steps = timed(whole.bare, args.repeats)
+    return rows, 1e6 * bare / (6 * steps)
+
+
+def batch_row(s: setting.Setting, best: Row) -> None:
+    """Time per run in a batch of 64 against a single run, one thread."""
+    if not hasattr(axisight, "simulate_batch"):
+        print("\nbatch: not in this version of the package")
+        return
+    runs = 64
+    # Runs of different amplitude: no run may profit from being another's copy.
+    scale = np.linspace(0.5, 1.0, runs)[:, None, None]
+    references = np.ascontiguousarray(scale * s.reference)
+    seconds, _ = timed(
+        lambda: axisight.simulate_batch(s.robot, references, threads=1, **best.options)
+    )
+    each = seconds / runs
+    print(f"\nbatch of {runs}: {each:.4f} s a run, single {best.seconds:.4f} s", end="")
+    print(f", ratio {best.seconds / each:.2f}")
 
 
 def main() -> None:
@@ -77,75 +144,21 @@ def main() -> None:
     print(f"SciPy {scipy.__version__}, one thread, {args.seconds:g} s, {len(s.reference)} samples")
     print(f"independent model against ours: inverse dynamics {inverse:.0e}, linear {linear:.0e}")
 
-    fine, finer = (loops.rk4_sampled(s.sampled, n)() for n in (16, 32))
-    smooth_fine, smooth_finer = (loops.rk4_sampled(s.smooth, n)() for n in (16, 32))
-    print(
-        f"references converged to {relative_rms(fine, finer) / 15:.0e} (sampled)"
-        f" and {relative_rms(smooth_fine, smooth_finer) / 15:.0e} (smooth)"
-    )
+    fine, finer = (loops.rk4_sampled(s.sampled, n)() for n in REFERENCE_SUBSTEPS)
+    print(f"sampled reference converged to {relative_rms(fine, finer) / 15:.0e}")
     own, per_evaluation = own_rows(s, finer, args)
     best = min(own, key=lambda r: r.seconds)
-
-    def rk4(task: Task, reference: Array) -> Row:
-        n = loosest(
-            lambda n: relative_rms(loops.rk4_sampled(task, n)(), reference),
-            [1, 2, 3, 4, 6, 8],
-            args.wanted,
-        )
-        seconds, out = timed(loops.rk4_sampled(task, n), args.repeats)
-        return Row("numba RK4 loop", f"substeps {n}", relative_rms(out, reference), seconds)
-
-    rows = [rk4(s.sampled, finer)]
-    restarting = diffsol_runs.Sampled(s.model, s.sampled)
-    for label, prepare in (
-        ("pydiffsol tsit45", restarting.prepare),
-        ("SciPy LSODA", loops.lsoda_sampled),
-        ("SciPy Radau", loops.radau_sampled),
-    ):
-        rows.append(peer(label, prepare, s.sampled, finer, args.wanted, args.scan_seconds))
-    print_rows("sampled: restart at every sample", own + rows, best)
-
-    rows = [rk4(s.smooth, smooth_finer)]
-    whole = diffsol_runs.Smooth(s.model, s.tones, s.feed_forward, s.smooth)
-    for label, prepare in (
-        ("SciPy LSODA, odeint", smooth.lsoda),
-        ("SciPy LSODA, solve_ivp", smooth.scipy_ivp("LSODA")),
-        ("SciPy DOP853, solve_ivp", smooth.scipy_ivp("DOP853")),
-        ("SciPy Radau, solve_ivp", smooth.scipy_ivp("Radau")),
-        ("pydiffsol tsit45", whole.prepare),
-    ):
-        rows.append(peer(label, prepare, s.smooth, smooth_finer, args.wanted, args.scan_seconds))
+    print_rows("sampled: restart at every sample", own + sampled_rows(s, finer, args), best)
+    rows, diffsol_us = smooth_rows(s, args)
     print_rows("smooth: no restarts, ours sampled", [best, *rows], best)
-    per_evaluation["numba RK4 loop"] = (
-        1e6 * timed(loops.rk4_sampled(s.sampled, 1), args.repeats)[0] / (4 * len(s.reference))
-    )
-    # Six stages a step, the seventh is the next one's first. Rejected steps are not told, so
-    # this is an upper bound.
-    bare, steps = timed(whole.bare, args.repeats)
-    per_evaluation["pydiffsol tsit45, smooth"] = 1e6 * bare / (6 * steps)
+
+    compiled, _ = timed(loops.rk4_sampled(s.sampled, 1), args.repeats)
+    per_evaluation["numba RK4 loop"] = 1e6 * compiled / (4 * len(s.reference))
+    per_evaluation["pydiffsol tsit45, smooth"] = diffsol_us
     print("\nmicroseconds per right-hand side, solver included")
     for label, us in per_evaluation.items():
         print(f"{label:26}{us:8.3f}")
-    if hasattr(axisight, "simulate_batch"):
-        batch_row(s, best, args)
-    else:
-        print("\nbatch: not in this version of the package")
-
-
-def batch_row(s: setting.Setting, best: Row, args: argparse.Namespace) -> None:
-    """Time per run in a batch of 64 against a single run, one thread."""
-    runs = 64
-    scale = np.linspace(0.5, 1.0, runs)[:, None, None]
-    references = np.ascontiguousarray(scale * s.reference)
-    method, choice = best.label.split()[1], best.settings.split()
-    options = {choice[0]: int(choice[1]) if method == "rk4" else float(choice[1])}
-    seconds, _ = timed(
-        lambda: axisight.simulate_batch(s.robot, references, threads=1, method=method, **options),
-        1,
-    )
-    per_run = seconds / runs
-    print(f"\nbatch of {runs}: {per_run:.4f} s a run, single {best.seconds:.4f} s,")
-    print(f"ratio {best.seconds / per_run:.2f}")
+    batch_row(s, best)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,13 @@ SHORT_S = 2.0
 
 @dataclass
 class Row:
-    """One line of a table."""
+    """One line of a table; ``options`` are the arguments of a run of ours."""
 
     label: str
     settings: str
     error: float
     seconds: float
+    options: dict[str, Any] = field(default_factory=dict)
 
 
 def loosest(run: Callable[[Any], float], settings: list[Any], wanted: float) -> Any:
