@@ -19,7 +19,6 @@ What is compared with what:
 import argparse
 import sys
 import time
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from axisight import _core
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
+import mujoco_model  # noqa: E402
 import pinocchio_model  # noqa: E402
 
 
@@ -44,58 +44,9 @@ def best(action: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def vector(x: list[float]) -> str:
-    """Numbers for an XML attribute."""
-    return " ".join(repr(float(v)) for v in x)
-
-
-def mjcf(text: str, integrator: str, timestep: float) -> str:
-    """The robot as MJCF: hinges with springs, rotors, and tendons for the gears."""
-    data = tomllib.loads(text)
-    bodies, close, rotors, tendons, motors = "", "", "", "", ""
-    for joint in data["joint"]:
-        elastic = joint["kind"] == "elastic"
-        spring = (
-            f'stiffness="{joint["stiffness"]!r}" damping="{joint["damping"]!r}"' if elastic else ""
-        )
-        bodies += f'<body pos="{vector(joint["origin"])}">'
-        bodies += f'<joint name="{joint["name"]}" axis="{vector(joint["axis"])}" {spring}/>'
-        if "link" in joint:
-            link = joint["link"]
-            bodies += (
-                f'<inertial pos="{vector(link["com"])}" mass="{link["mass"]!r}"'
-                f' fullinertia="{vector(link["inertia"])}"/>'
-            )
-        else:
-            # MuJoCo wants mass in every moving body; this much changes nothing visible.
-            bodies += '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
-        close += "</body>"
-        if elastic:
-            continue
-        drive, name = joint["drive"], joint["name"]
-        inertia = drive["motor_inertia"]
-        rotors += (
-            f'<body pos="0 0 -1"><joint name="{name}_rotor" axis="0 0 1"'
-            f' damping="{drive["viscous_friction"]!r}"/>'
-            f'<inertial pos="0 0 0" mass="1" diaginertia="{vector([inertia] * 3)}"/></body>'
-        )
-        tendons += (
-            f'<fixed name="{name}_gear" stiffness="{joint["stiffness"]!r}"'
-            f' damping="{joint["damping"]!r}" springlength="0">'
-            f'<joint joint="{name}_rotor" coef="{drive["gear_ratio"]!r}"/>'
-            f'<joint joint="{name}" coef="-1"/></fixed>'
-        )
-        motors += f'<motor joint="{name}_rotor"/>'
-    return f"""<mujoco><compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
-    <option timestep="{timestep!r}" integrator="{integrator}" gravity="{vector(data["gravity"])}">
-    <flag contact="disable" constraint="disable"/></option>
-    <worldbody>{rotors}{bodies}{close}</worldbody>
-    <tendon>{tendons}</tendon><actuator>{motors}</actuator></mujoco>"""
-
-
 def check_same_plant(robot: _core.Robot, text: str) -> float:
     """Largest relative difference of the accelerations at rest with 1 Nm extra."""
-    model = mujoco.MjModel.from_xml_string(mjcf(text, "RK4", robot.sample_time_s))
+    model = mujoco.MjModel.from_xml_string(mujoco_model.build(text, "RK4", robot.sample_time_s))
     data = mujoco.MjData(model)
     rest = robot.equilibrium([])
     a, b, _ = robot.linearize([])
@@ -171,7 +122,7 @@ def rows(repeats: int) -> list[tuple[str, float, float, str]]:
     )
     difference = check_same_plant(robot, text)
     for name in ("RK4", "Euler", "implicitfast"):
-        xml = mujoco.MjModel.from_xml_string(mjcf(text, name, dt))
+        xml = mujoco.MjModel.from_xml_string(mujoco_model.build(text, name, dt))
         world = mujoco.MjData(xml)
 
         def roll(xml: mujoco.MjModel = xml, world: mujoco.MjData = world) -> None:

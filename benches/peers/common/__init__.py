@@ -1,0 +1,1 @@
+"""What the side-by-side runs share: an independent model of the robot, drives, tables."""
