@@ -1,13 +1,13 @@
 //! Simulation of one run and of many.
 
-use crate::convert::{array2, planes, rows};
+use crate::convert::{array2, array3, planes, rows};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::simulation::{
-    self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, RunTrace, Status,
+    self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, Status, Traces,
 };
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -127,11 +127,11 @@ pub fn simulate<'py>(
         resolution,
         threads: 1,
     };
-    let mut outcomes = run(py, robot, effects, &input, &noise, options, cancel)?;
-    let Some(outcome) = outcomes.pop() else {
+    let (traces, outcomes) = run(py, robot, effects, &input, &noise, options, cancel)?;
+    let Some(outcome) = outcomes.first() else {
         return Err(input_error("input: expected a run"));
     };
-    single(py, robot, outcome)
+    single(py, robot, traces, *outcome)
 }
 
 /// Simulate many runs from rest; the shape of the inputs is `(n_runs, n_samples, n_axes)`.
@@ -156,7 +156,6 @@ pub fn simulate_batch<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let n_axes = robot.description.n_axes();
     let field = if reference { "velocity_ref" } else { "torque" };
-    let n_samples = input.as_array().shape()[1];
     let input = planes(&input, field, n_axes)?;
     let noise = match noise {
         Some(n) => planes(&n, "noise", n_axes)?,
@@ -172,8 +171,8 @@ pub fn simulate_batch<'py>(
         resolution,
         threads,
     };
-    let outcomes = run(py, robot, effects, &input, &noise, options, cancel)?;
-    many(py, robot, outcomes, n_samples)
+    let (traces, outcomes) = run(py, robot, effects, &input, &noise, options, cancel)?;
+    many(py, robot, traces, &outcomes)
 }
 
 fn run(
@@ -184,7 +183,7 @@ fn run(
     noise: &[Vec<f64>],
     options: Options,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Vec<Outcome>> {
+) -> PyResult<(Traces, Vec<Outcome>)> {
     if !noise.is_empty() && !noise.iter().map(Vec::len).eq(input.iter().map(Vec::len)) {
         return Err(input_error("noise: expected the shape of the input"));
     }
@@ -211,7 +210,7 @@ fn run(
         .num_threads(options.threads)
         .build()
         .map_err(input_error)?;
-    let done: Result<Vec<Outcome>, BatchError> =
+    let done: Result<(Traces, Vec<Outcome>), BatchError> =
         detached(py, &cancel, || pool.install(|| simulation::simulate_batch(&batch)))?;
     done.map_err(input_error)
 }
@@ -238,67 +237,61 @@ fn counters(effort: Effort) -> [(&'static str, u64); 6] {
 }
 
 /// Signals by name, with their columns.
-fn signals(trace: RunTrace, n_axes: usize, n_joints: usize) -> [(&'static str, Vec<f64>, usize); 6] {
+fn signals(traces: Traces, robot: &Robot) -> [(&'static str, Vec<f64>, usize); 6] {
+    let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
     [
-        ("torque_cmd_nm", trace.command, n_axes),
-        ("position_rad", trace.measured, n_axes),
-        ("motor_position_rad", trace.motor, n_axes),
-        ("joint_position_rad", trace.joint, n_joints),
-        ("torque_disturbance_nm", trace.torque_disturbance, n_axes),
-        ("position_disturbance_rad", trace.position_disturbance, n_axes),
+        ("torque_cmd_nm", traces.command, n_axes),
+        ("position_rad", traces.measured, n_axes),
+        ("motor_position_rad", traces.motor, n_axes),
+        ("joint_position_rad", traces.joint, n_joints),
+        ("torque_disturbance_nm", traces.torque_disturbance, n_axes),
+        (
+            "position_disturbance_rad",
+            traces.position_disturbance,
+            n_axes,
+        ),
     ]
 }
 
-fn single<'py>(py: Python<'py>, robot: &Robot, outcome: Outcome) -> PyResult<Bound<'py, PyDict>> {
-    let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
+/// One run; its arrays end with the sample at which it stopped.
+fn single<'py>(
+    py: Python<'py>,
+    robot: &Robot,
+    traces: Traces,
+    outcome: Outcome,
+) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    for (name, data, columns) in signals(outcome.trace, n_axes, n_joints) {
-        out.set_item(name, array2(py, data, columns)?)?;
-    }
     let (name, at) = status(outcome.status);
     out.set_item("status", name)?;
     out.set_item("stopped_at", at)?;
     for (name, count) in counters(outcome.effort) {
         out.set_item(name, count)?;
     }
+    let seen = at.map_or(traces.n_samples, |k| k + 1);
+    for (name, mut data, columns) in signals(traces, robot) {
+        data.truncate(seen * columns);
+        out.set_item(name, array2(py, data, columns)?)?;
+    }
     Ok(out)
 }
 
-/// Runs that ended early are filled up with NaN.
 fn many<'py>(
     py: Python<'py>,
     robot: &Robot,
-    outcomes: Vec<Outcome>,
-    n_samples: usize,
+    traces: Traces,
+    outcomes: &[Outcome],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
-    let n_runs = outcomes.len();
     let out = PyDict::new(py);
     let ends: Vec<_> = outcomes.iter().map(|o| status(o.status)).collect();
     out.set_item("status", ends.iter().map(|e| e.0).collect::<Vec<_>>())?;
     out.set_item("stopped_at", ends.iter().map(|e| e.1).collect::<Vec<_>>())?;
-    let efforts: Vec<Effort> = outcomes.iter().map(|o| o.effort).collect();
     for (i, (name, _)) in counters(Effort::default()).iter().enumerate() {
-        let counts: Vec<u64> = efforts.iter().map(|e| counters(*e)[i].1).collect();
+        let counts: Vec<u64> = outcomes.iter().map(|o| counters(o.effort)[i].1).collect();
         out.set_item(name, counts)?;
     }
-    let mut stacks: Vec<(&str, Vec<f64>, usize)> = Vec::new();
-    for outcome in outcomes {
-        for (slot, (name, data, columns)) in
-            signals(outcome.trace, n_axes, n_joints).into_iter().enumerate()
-        {
-            if slot == stacks.len() {
-                stacks.push((name, Vec::with_capacity(n_runs * n_samples * columns), columns));
-            }
-            let stack = &mut stacks[slot].1;
-            let full = stack.len() + n_samples * columns;
-            stack.extend(data);
-            stack.resize(full, f64::NAN);
-        }
-    }
-    for (name, data, columns) in stacks {
-        let array = data.into_pyarray(py).reshape([n_runs, n_samples, columns])?;
-        out.set_item(name, array)?;
+    let n_samples = traces.n_samples;
+    for (name, data, columns) in signals(traces, robot) {
+        out.set_item(name, array3(py, data, n_samples, columns)?)?;
     }
     Ok(out)
 }

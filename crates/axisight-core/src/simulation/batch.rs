@@ -12,6 +12,7 @@ use super::method::{Effort, Method, Stepper};
 use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
 use crate::scalar::{Lanes, Scalar};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 /// Runs in lock-step: two registers of four hide the latency of one another's operations.
@@ -66,28 +67,29 @@ pub struct Batch<'a> {
     pub cancel: Option<&'a AtomicBool>,
 }
 
-/// What a run recorded, row-major; it ends with the sample that failed, if one did.
+/// Signals of all runs, `(n_runs, n_samples, columns)` row-major; NaN after the sample at
+/// which a run stopped.
 #[derive(Debug, Clone, Default)]
-pub struct RunTrace {
-    /// Commanded torques [Nm], `(n, n_axes)`.
+pub struct Traces {
+    /// Samples of each run.
+    pub n_samples: usize,
+    /// Commanded torques [Nm], per axis.
     pub command: Vec<f64>,
-    /// Measured motor positions [rad], `(n, n_axes)`.
+    /// Measured motor positions [rad], per axis.
     pub measured: Vec<f64>,
-    /// True motor positions [rad], `(n, n_axes)`.
+    /// True motor positions [rad], per axis.
     pub motor: Vec<f64>,
-    /// Joint positions [rad], `(n, n_joints)`.
+    /// Joint positions [rad], per joint.
     pub joint: Vec<f64>,
-    /// Torque added on the motors [Nm], `(n, n_axes)`.
+    /// Torque added on the motors [Nm], per axis.
     pub torque_disturbance: Vec<f64>,
-    /// Error of the measured positions [rad], `(n, n_axes)`.
+    /// Error of the measured positions [rad], per axis.
     pub position_disturbance: Vec<f64>,
 }
 
-/// A run and how it ended.
-#[derive(Debug, Clone)]
+/// How a run ended and what it cost.
+#[derive(Debug, Clone, Copy)]
 pub struct Outcome {
-    /// Signals.
-    pub trace: RunTrace,
     /// End of the run.
     pub status: Status,
     /// Cost; shared by the runs of a group, zero for the linear plant.
@@ -112,116 +114,212 @@ pub enum BatchError {
 ///
 /// # Errors
 /// [`BatchError`] for misuse; trouble of a run is its status.
-pub fn simulate_batch(batch: &Batch<'_>) -> Result<Vec<Outcome>, BatchError> {
+pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), BatchError> {
     let linear = match batch.model {
         Model::Linear => Some(LinearPlant::new(batch.robot, batch.settings, batch.start)?),
         Model::Nonlinear => None,
     };
-    let n_runs = batch.input.runs().len();
+    let runs = batch.input.runs();
+    let (n_axes, n_joints) = (batch.robot.n_axes().max(1), batch.robot.n_joints().max(1));
+    let n_samples = runs.first().map_or(0, |r| r.len() / n_axes);
+    if let Some(i) = runs.iter().position(|r| r.len() != n_samples * n_axes) {
+        let expected = format!("{n_samples} samples in every run");
+        let got = format!("{} numbers in run {}", runs[i].len(), i + 1);
+        return Err(SimulationError::Shape {
+            field: "input",
+            expected,
+            got,
+        }
+        .into());
+    }
     let width = if batch.method.may_be_implicit() && linear.is_none() {
         1
     } else {
         LANES
     };
-    let groups: Vec<Vec<usize>> = (0..n_runs)
-        .collect::<Vec<_>>()
-        .chunks(width)
-        .map(<[usize]>::to_vec)
-        .collect();
-    let done: Vec<Vec<Outcome>> = groups
-        .par_iter()
-        .map(|runs| group(batch, linear.as_ref(), runs))
+    let size = n_samples * n_axes;
+    let zeros = |columns: usize| vec![0.0; runs.len() * n_samples * columns];
+    let mut traces = Traces {
+        n_samples,
+        command: zeros(n_axes),
+        measured: zeros(n_axes),
+        motor: zeros(n_axes),
+        joint: zeros(n_joints),
+        torque_disturbance: zeros(n_axes),
+        position_disturbance: zeros(n_axes),
+    };
+    // Chunks of no length are not allowed; there is nothing to cut then.
+    let per_axis = (size * width).max(1);
+    let per_joint = (n_samples * n_joints * width).max(1);
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    let parts = traces
+        .command
+        .chunks_mut(per_axis)
+        .zip(traces.measured.chunks_mut(per_axis))
+        .zip(traces.motor.chunks_mut(per_axis))
+        .zip(traces.joint.chunks_mut(per_joint))
+        .zip(traces.torque_disturbance.chunks_mut(per_axis))
+        .zip(traces.position_disturbance.chunks_mut(per_axis));
+    for (i, (((((command, measured), motor), joint), torque), position)) in parts.enumerate() {
+        groups.push(Group {
+            runs: (i * width..((i + 1) * width).min(runs.len())).collect(),
+            n_samples,
+            signals: [command, measured, motor, joint, torque, position],
+        });
+    }
+    let outcomes: Vec<Vec<Outcome>> = groups
+        .par_iter_mut()
+        .map(|group| group.simulate(batch, linear.as_ref()))
         .collect::<Result<_, _>>()?;
-    Ok(done.into_iter().flatten().collect())
+    Ok((traces, outcomes.into_iter().flatten().collect()))
 }
 
-/// Simulate runs in lock-step; if one of them fails, each alone, so that it spoils no other.
-fn group(
-    batch: &Batch<'_>,
-    linear: Option<&LinearPlant>,
-    runs: &[usize],
-) -> Result<Vec<Outcome>, BatchError> {
-    if let [run] = runs {
-        return Ok(vec![single(batch, linear, *run)?]);
-    }
-    let (traces, status, effort) = match linear {
-        Some(plant) => linear_runs::<Lanes<LANES>>(batch, plant, runs)?,
-        None => {
-            let lifted: Vec<_> = batch.settings.iter().map(EffectSetting::lifted).collect();
-            let plant = Plant::<Lanes<LANES>>::new(batch.robot, &[], &lifted)?;
-            let stepper = Stepper::new(&plant);
-            nonlinear_runs(batch, &plant, stepper, runs)?
-        }
-    };
-    if !matches!(status, Status::Completed | Status::Cancelled(_)) {
-        return runs.iter().map(|run| single(batch, linear, *run)).collect();
-    }
-    Ok(traces
-        .into_iter()
-        .map(|trace| Outcome {
-            trace,
-            status,
-            effort,
-        })
-        .collect())
+/// Runs in lock-step and where their signals go.
+struct Group<'a> {
+    runs: Vec<usize>,
+    n_samples: usize,
+    /// Command, measured, motor, joint, torque and position disturbance.
+    signals: [&'a mut [f64]; 6],
 }
 
-fn single(
-    batch: &Batch<'_>,
-    linear: Option<&LinearPlant>,
-    run: usize,
-) -> Result<Outcome, BatchError> {
-    let (traces, status, effort) = match linear {
-        Some(plant) => linear_runs::<f64>(batch, plant, &[run])?,
-        None => {
-            let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
-            let stepper = if batch.method.may_be_implicit() {
-                Stepper::with_jacobian(&plant, batch.robot, &[], batch.settings)?
-            } else {
-                Stepper::new(&plant)
+impl Group<'_> {
+    /// All at once; if one of them fails, each alone, so that it spoils no other.
+    fn simulate(
+        &mut self,
+        batch: &Batch<'_>,
+        linear: Option<&LinearPlant>,
+    ) -> Result<Vec<Outcome>, BatchError> {
+        let lanes: Vec<usize> = (0..self.runs.len()).collect();
+        if lanes.len() > 1 {
+            let outcome = match linear {
+                Some(plant) => self.linear::<Lanes<LANES>>(batch, plant, &lanes)?,
+                None => {
+                    let lifted: Vec<_> = batch.settings.iter().map(EffectSetting::lifted).collect();
+                    let plant = Plant::<Lanes<LANES>>::new(batch.robot, &[], &lifted)?;
+                    self.nonlinear(batch, &plant, Stepper::new(&plant), &lanes)?
+                }
             };
-            nonlinear_runs(batch, &plant, stepper, &[run])?
+            if matches!(outcome.status, Status::Completed | Status::Cancelled(_)) {
+                return Ok(vec![outcome; lanes.len()]);
+            }
         }
-    };
-    Ok(Outcome {
-        trace: traces.into_iter().next().unwrap_or_default(),
-        status,
-        effort,
-    })
-}
+        let alone = lanes.iter().map(|lane| self.single(batch, linear, *lane));
+        alone.collect()
+    }
 
-type Recorded = (Vec<RunTrace>, Status, Effort);
+    fn single(
+        &mut self,
+        batch: &Batch<'_>,
+        linear: Option<&LinearPlant>,
+        lane: usize,
+    ) -> Result<Outcome, BatchError> {
+        let outcome = match linear {
+            Some(plant) => self.linear::<f64>(batch, plant, &[lane])?,
+            None => {
+                let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
+                let stepper = if batch.method.may_be_implicit() {
+                    Stepper::with_jacobian(&plant, batch.robot, &[], batch.settings)?
+                } else {
+                    Stepper::new(&plant)
+                };
+                self.nonlinear(batch, &plant, stepper, &[lane])?
+            }
+        };
+        if let Status::Diverged(k) | Status::StepSizeCollapsed(k) | Status::Cancelled(k) =
+            outcome.status
+        {
+            // A cancelled run has not seen sample k, a failed one has.
+            let seen = k + usize::from(!matches!(outcome.status, Status::Cancelled(_)));
+            self.blank(lane, seen);
+        }
+        Ok(outcome)
+    }
 
-fn nonlinear_runs<S: Scalar>(
-    batch: &Batch<'_>,
-    plant: &Plant<S>,
-    mut stepper: Stepper<S>,
-    runs: &[usize],
-) -> Result<Recorded, BatchError> {
-    let mut recorder = Recorder::new(batch, runs);
-    let slots: Vec<(usize, f64)> = plant.motor_slots();
-    let joints = plant.n_motors()..plant.n_motors() + plant.chain.len();
-    let status = batch.with_run(runs, |run| {
-        simulate(plant, run, &mut stepper, &mut |sample| {
-            recorder.take(sample, &slots, &joints);
+    /// NaN from sample `first` on.
+    fn blank(&mut self, lane: usize, first: usize) {
+        let count = self.runs.len() * self.n_samples;
+        for signal in &mut self.signals {
+            let columns = signal.len() / count.max(1);
+            let own = lane * self.n_samples * columns..(lane + 1) * self.n_samples * columns;
+            signal[own][first * columns..].fill(f64::NAN);
+        }
+    }
+
+    fn nonlinear<S: Scalar>(
+        &mut self,
+        batch: &Batch<'_>,
+        plant: &Plant<S>,
+        mut stepper: Stepper<S>,
+        lanes: &[usize],
+    ) -> Result<Outcome, BatchError> {
+        let motors = plant.motor_slots();
+        let joints = plant.n_motors()..plant.n_motors() + plant.chain.len();
+        let runs: Vec<usize> = lanes.iter().map(|l| self.runs[*l]).collect();
+        let status = batch.with_run(&runs, |run| {
+            simulate(plant, run, &mut stepper, &mut |sample| {
+                self.take(lanes, sample, &motors, &joints);
+            })
+        })?;
+        Ok(Outcome {
+            status,
+            effort: stepper.effort,
         })
-    })?;
-    Ok((recorder.traces, status, stepper.effort))
-}
+    }
 
-fn linear_runs<S: Scalar>(
-    batch: &Batch<'_>,
-    plant: &LinearPlant,
-    runs: &[usize],
-) -> Result<Recorded, BatchError> {
-    let mut recorder = Recorder::new(batch, runs);
-    let (slots, joints) = (plant.motor_slots(), plant.joint_slots());
-    let status = batch.with_run(runs, |run| {
-        simulate_linear::<S>(plant, run, &mut |sample| {
-            recorder.take(sample, &slots, &joints);
+    fn linear<S: Scalar>(
+        &mut self,
+        batch: &Batch<'_>,
+        plant: &LinearPlant,
+        lanes: &[usize],
+    ) -> Result<Outcome, BatchError> {
+        let (motors, joints) = (plant.motor_slots(), plant.joint_slots());
+        let runs: Vec<usize> = lanes.iter().map(|l| self.runs[*l]).collect();
+        let status = batch.with_run(&runs, |run| {
+            simulate_linear::<S>(plant, run, &mut |sample| {
+                self.take(lanes, sample, &motors, &joints);
+            })
+        })?;
+        Ok(Outcome {
+            status,
+            effort: Effort::default(),
         })
-    })?;
-    Ok((recorder.traces, status, Effort::default()))
+    }
+
+    /// Keep a sample of each lane.
+    #[inline(always)]
+    fn take<S: Scalar>(
+        &mut self,
+        lanes: &[usize],
+        sample: &Sample<'_, S>,
+        motors: &[(usize, f64)],
+        joints: &Range<usize>,
+    ) {
+        let n = self.n_samples;
+        let [command, measured, motor, joint, torque, position] = &mut self.signals;
+        let keep = |to: &mut [f64], values: &[S]| {
+            for (slot, lane) in lanes.iter().enumerate() {
+                let row = (lane * n + sample.index) * values.len();
+                if let Some(to) = to.get_mut(row..row + values.len()) {
+                    for (to, value) in to.iter_mut().zip(values) {
+                        *to = value.lane(slot);
+                    }
+                }
+            }
+        };
+        keep(command, sample.command);
+        keep(measured, sample.measured);
+        keep(torque, sample.torque_disturbance);
+        keep(position, sample.position_disturbance);
+        keep(joint, &sample.state[joints.clone()]);
+        for (slot, lane) in lanes.iter().enumerate() {
+            let row = (lane * n + sample.index) * motors.len();
+            if let Some(to) = motor.get_mut(row..row + motors.len()) {
+                for (to, (state, scale)) in to.iter_mut().zip(motors) {
+                    *to = sample.state[*state].lane(slot) * scale;
+                }
+            }
+        }
+    }
 }
 
 impl Batch<'_> {
@@ -245,52 +343,5 @@ impl Batch<'_> {
             method: self.method,
             cancel: self.cancel,
         })
-    }
-}
-
-/// Keeps every sample of every lane up to the end of its input.
-struct Recorder {
-    traces: Vec<RunTrace>,
-    lengths: Vec<usize>,
-}
-
-impl Recorder {
-    fn new(batch: &Batch<'_>, runs: &[usize]) -> Self {
-        let n_axes = batch.robot.n_axes().max(1);
-        let size = |run: &usize| batch.input.runs()[*run].len();
-        let trace = |run: &usize| RunTrace {
-            command: Vec::with_capacity(size(run)),
-            measured: Vec::with_capacity(size(run)),
-            motor: Vec::with_capacity(size(run)),
-            joint: Vec::with_capacity(size(run) / n_axes * batch.robot.n_joints()),
-            torque_disturbance: Vec::with_capacity(size(run)),
-            position_disturbance: Vec::with_capacity(size(run)),
-        };
-        Self {
-            traces: runs.iter().map(trace).collect(),
-            lengths: runs.iter().map(|r| size(r) / n_axes).collect(),
-        }
-    }
-
-    #[inline(always)]
-    fn take<S: Scalar>(
-        &mut self,
-        sample: &Sample<'_, S>,
-        motors: &[(usize, f64)],
-        joints: &std::ops::Range<usize>,
-    ) {
-        for (lane, (trace, length)) in self.traces.iter_mut().zip(&self.lengths).enumerate() {
-            if sample.index >= *length {
-                continue;
-            }
-            let own = |values: &[S], to: &mut Vec<f64>| to.extend(values.iter().map(|v| v.lane(lane)));
-            own(sample.command, &mut trace.command);
-            own(sample.measured, &mut trace.measured);
-            own(sample.torque_disturbance, &mut trace.torque_disturbance);
-            own(sample.position_disturbance, &mut trace.position_disturbance);
-            own(&sample.state[joints.clone()], &mut trace.joint);
-            let angles = motors.iter().map(|(i, scale)| sample.state[*i].lane(lane) * scale);
-            trace.motor.extend(angles);
-        }
     }
 }

@@ -11,7 +11,7 @@ mod noise;
 mod runge_kutta4;
 mod torque_path;
 
-pub use batch::{Batch, BatchError, BatchInput, Model, Outcome, RunTrace, simulate_batch};
+pub use batch::{Batch, BatchError, BatchInput, Model, Outcome, Traces, simulate_batch};
 pub use closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
 pub use linear::{LinearPlant, LinearPlantError, simulate_linear};
 pub use method::{Effort, Method, Stepper};
