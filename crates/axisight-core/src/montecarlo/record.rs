@@ -1,0 +1,123 @@
+//! What is kept of a simulated experiment: the sum over its measured periods, and what
+//! tells drift and growth.
+
+use crate::frf::Spectra;
+use crate::scalar::Scalar;
+use crate::signal::{Dft, DftScratch};
+use crate::simulation::Sample;
+use nalgebra::Complex;
+
+/// Recorder of `S::LANES` experiments in lock-step.
+pub(super) struct Recorder<S> {
+    n_axes: usize,
+    period: usize,
+    waiting: usize,
+    total: usize,
+    /// Sums over the measured periods, row-major `(sample, axis)`.
+    command: Vec<S>,
+    position: Vec<S>,
+    /// Over the last quarter of the last two periods, per axis: sums of position, command
+    /// and squared command.
+    tails: [Vec<[S; 3]>; 2],
+}
+
+impl<S: Scalar> Recorder<S> {
+    pub(super) fn new(n_axes: usize, period: usize, waiting: usize, periods: usize) -> Self {
+        let tail = vec![[S::zero(); 3]; n_axes];
+        Self {
+            n_axes,
+            period,
+            waiting,
+            total: waiting + periods,
+            command: vec![S::zero(); period * n_axes],
+            position: vec![S::zero(); period * n_axes],
+            tails: [tail.clone(), tail],
+        }
+    }
+
+    /// Forget the last experiments.
+    pub(super) fn clear(&mut self) {
+        self.tails
+            .iter_mut()
+            .flatten()
+            .for_each(|t| *t = [S::zero(); 3]);
+    }
+
+    pub(super) fn observe(&mut self, sample: &Sample<'_, S>) {
+        let (period, k) = (sample.index / self.period, sample.index % self.period);
+        let at = k * self.n_axes;
+        if period == self.waiting {
+            self.command[at..at + self.n_axes].copy_from_slice(sample.command);
+            self.position[at..at + self.n_axes].copy_from_slice(sample.measured);
+        } else if period > self.waiting {
+            for i in 0..self.n_axes {
+                self.command[at + i] += sample.command[i];
+                self.position[at + i] += sample.measured[i];
+            }
+        }
+        if k >= self.tail_start() && period + 2 >= self.total {
+            let tail = &mut self.tails[period + 2 - self.total];
+            for (i, sums) in tail.iter_mut().enumerate() {
+                let u = sample.command[i];
+                sums[0] += sample.measured[i];
+                sums[1] += u;
+                sums[2] = u.fma(u, sums[2]);
+            }
+        }
+    }
+
+    fn tail_start(&self) -> usize {
+        self.period - (self.period / 4).max(1)
+    }
+
+    /// Whether the commands of `lane` keep growing: their scatter more than doubles from
+    /// one period to the next, which only an unstable loop does once excited steadily.
+    pub(super) fn grows(&self, lane: usize) -> bool {
+        let count = (self.period - self.tail_start()) as f64;
+        (0..self.n_axes).any(|i| {
+            let scatter = |tail: &[[S; 3]]| {
+                let (mean, square) = (tail[i][1].lane(lane) / count, tail[i][2].lane(lane) / count);
+                (square - mean * mean, square)
+            };
+            let ((before, _), (after, size)) = (scatter(&self.tails[0]), scatter(&self.tails[1]));
+            // Rounding of a constant command is no scatter.
+            after > 4.0 * before && after > 1e-12 * size
+        })
+    }
+
+    /// Spectra of one lane at `lines`; the linear drift of the position is removed.
+    pub(super) fn spectra(
+        &self,
+        lane: usize,
+        dft: &Dft,
+        lines: &[usize],
+        scratch: &mut DftScratch,
+    ) -> Spectra {
+        let n = self.n_axes;
+        let zero = Complex::default();
+        let mut out = Spectra {
+            input: vec![zero; lines.len() * n],
+            output: vec![zero; lines.len() * n],
+        };
+        let measured = (self.total - self.waiting) as f64;
+        let count = (self.period - self.tail_start()) as f64;
+        for i in 0..n {
+            let tail = |t: usize| self.tails[t][i][0].lane(lane);
+            // Drift per period, times the periods summed, per sample.
+            let slope = (tail(1) - tail(0)) / count * measured / self.period as f64;
+            let samples = (0..self.period).map(|k| {
+                let at = k * n + i;
+                let drift = slope * k as f64;
+                (
+                    self.command[at].lane(lane),
+                    self.position[at].lane(lane) - drift,
+                )
+            });
+            dft.pair(samples, lines, scratch, |line, u, y| {
+                out.input[line * n + i] = u / measured;
+                out.output[line * n + i] = y / measured;
+            });
+        }
+        out
+    }
+}

@@ -1,0 +1,187 @@
+//! Simulation of a group of experiments; the one place that knows linear from nonlinear.
+
+use super::record::Recorder;
+use super::study::{Study, StudyError, StudySettings};
+use crate::frf::Spectra;
+use crate::robot::{EffectSetting, Plant, RobotDescription};
+use crate::scalar::Scalar;
+use crate::signal::DftScratch;
+use crate::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
+use std::sync::atomic::AtomicBool;
+
+/// Which plant a study simulates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Model {
+    /// Linearized about the start; see [`crate::robot::linearize`].
+    Linear,
+    /// Full equations of motion.
+    Nonlinear(Method),
+}
+
+impl Model {
+    /// Whether the effects of the study suit the model.
+    pub(super) fn check(self, _settings: &StudySettings) -> Result<(), StudyError> {
+        Ok(())
+    }
+}
+
+/// One experiment of one run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Job {
+    pub(super) run: u64,
+    pub(super) experiment: usize,
+}
+
+/// The plant of a group of experiments.
+pub(super) enum GroupPlant {
+    Nonlinear {
+        robot: RobotDescription,
+        effects: Vec<EffectSetting<f64>>,
+        method: Method,
+    },
+}
+
+impl GroupPlant {
+    pub(super) fn new(
+        model: Model,
+        robot: RobotDescription,
+        effects: Vec<EffectSetting<f64>>,
+        _start: &[f64],
+    ) -> Option<Self> {
+        Plant::<f64>::new(&robot, &[], &effects).ok()?;
+        let method = match model {
+            Model::Linear => Method::DormandPrince { tolerance: 1e-9 },
+            Model::Nonlinear(method) => method,
+        };
+        Some(Self::Nonlinear {
+            robot,
+            effects,
+            method,
+        })
+    }
+
+    fn simulate<S: Scalar>(
+        &self,
+        run: &Run<'_>,
+        recorder: &mut Recorder<S>,
+    ) -> Result<Status, SimulationError> {
+        match self {
+            Self::Nonlinear { robot, effects, .. } => {
+                let lifted: Vec<_> = effects.iter().map(lift).collect();
+                let Ok(plant) = Plant::<S>::new(robot, &[], &lifted) else {
+                    return Ok(Status::Diverged(0));
+                };
+                let mut stepper = Stepper::new(&plant);
+                simulate(&plant, run, &mut stepper, &mut |s| recorder.observe(s))
+            }
+        }
+    }
+
+    fn method(&self) -> Method {
+        match self {
+            Self::Nonlinear { method, .. } => *method,
+        }
+    }
+}
+
+fn lift<S: Scalar>(setting: &EffectSetting<f64>) -> EffectSetting<S> {
+    EffectSetting {
+        name: setting.name.clone(),
+        axis: setting.axis,
+        parameters: setting.parameters.iter().map(|p| S::constant(*p)).collect(),
+    }
+}
+
+/// How an experiment ended.
+pub(super) enum Outcome {
+    Completed(Spectra),
+    /// The commands keep growing.
+    Unstable,
+    Stopped(Status),
+    NoEquilibrium,
+}
+
+/// Simulate up to `S::LANES` experiments on one plant, in lock-step.
+///
+/// A status other than completed belongs to the whole group: see [`Group::run`].
+fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>, Status> {
+    let (study, seed) = (group.study, group.seed);
+    let settings = &study.settings;
+    let mut broadband: Vec<(u64, Vec<f64>)> = Vec::new();
+    for job in jobs {
+        if broadband.last().is_none_or(|(run, _)| *run != job.run) {
+            broadband.push((job.run, study.broadband(seed, job.run)));
+        }
+    }
+    let of_run = |run: u64| {
+        let found = broadband.iter().find(|(r, _)| *r == run);
+        found.map_or(&[][..], |(_, b)| b)
+    };
+    let references: Vec<Vec<f64>> = jobs
+        .iter()
+        .map(|job| study.reference(of_run(job.run), job.experiment))
+        .collect();
+    let noises: Vec<Vec<f64>> = jobs
+        .iter()
+        .filter_map(|job| study.noise(seed, job.run, job.experiment))
+        .collect();
+    let references: Vec<&[f64]> = references.iter().map(Vec::as_slice).collect();
+    let noises: Vec<&[f64]> = noises.iter().map(Vec::as_slice).collect();
+    let mut recorder = Recorder::<S>::new(
+        study.n_axes(),
+        study.period_samples(),
+        settings.waiting_periods,
+        settings.periods,
+    );
+    recorder.clear();
+    let run = Run {
+        controller: &settings.robot.controller,
+        sample_time: settings.robot.sample_time,
+        start: &settings.start,
+        drive: Drive::Reference(&references),
+        noise: &noises,
+        method: group.plant.method(),
+        cancel: Some(group.cancel),
+    };
+    match group.plant.simulate(&run, &mut recorder) {
+        Ok(Status::Completed) => {}
+        Ok(status) => return Err(status),
+        Err(_) => return Ok(jobs.iter().map(|_| Outcome::NoEquilibrium).collect()),
+    }
+    let mut scratch = DftScratch::default();
+    let multisine = &settings.multisine;
+    let outcomes = (0..jobs.len()).map(|lane| {
+        if recorder.grows(lane) {
+            return Outcome::Unstable;
+        }
+        let (dft, lines) = (multisine.dft(), multisine.lines());
+        Outcome::Completed(recorder.spectra(lane, dft, lines, &mut scratch))
+    });
+    Ok(outcomes.collect())
+}
+
+/// Experiments that share a plant.
+pub(super) struct Group<'a> {
+    pub(super) study: &'a Study,
+    pub(super) seed: u64,
+    pub(super) plant: &'a GroupPlant,
+    pub(super) cancel: &'a AtomicBool,
+}
+
+impl Group<'_> {
+    /// Simulate `jobs`, at most `S::LANES` of them. Where one lane stops, all do; the jobs
+    /// are then repeated one by one, so that a run cannot spoil its neighbours.
+    pub(super) fn run<S: Scalar>(&self, jobs: &[Job]) -> Vec<Outcome> {
+        match lock_step::<S>(self, jobs) {
+            Ok(outcomes) => outcomes,
+            Err(status @ Status::Cancelled(_)) => {
+                jobs.iter().map(|_| Outcome::Stopped(status)).collect()
+            }
+            Err(status) if jobs.len() == 1 => vec![Outcome::Stopped(status)],
+            Err(_) => jobs
+                .iter()
+                .flat_map(|job| self.run::<f64>(std::slice::from_ref(job)))
+                .collect(),
+        }
+    }
+}
