@@ -1,7 +1,9 @@
 //! Helpers shared by the benches.
 #![allow(clippy::panic)] // a bench that cannot start says so
 
-use axisight_core::robot::{RobotDescription, read_robot};
+pub mod linear_loop;
+
+use axisight_core::robot::{EffectSetting, RobotDescription, read_robot};
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
 pub fn preset() -> RobotDescription {
@@ -18,4 +20,39 @@ pub fn reference(n_samples: usize, n_axes: usize, sample_time: f64) -> Vec<f64> 
             tone(t, 2.3 + axis) + 0.5 * tone(t, 9.1 + 1.7 * axis) + 0.3 * tone(t, 31.0 - axis)
         })
         .collect()
+}
+
+/// Torque and resolver ripple of every axis (thesis, Table 8.1).
+pub fn table_8_1(n_axes: usize) -> Vec<EffectSetting<f64>> {
+    let torque = [
+        (3.0, 0.06, 1.45),
+        (36.0, 0.11, 0.90),
+        (72.0, 0.08, 0.20),
+        (18.0, 0.04, 0.0),
+    ];
+    let resolver = [
+        (2.0, 0.4e-3, -1.84),
+        (10.0, 0.2e-3, 0.81),
+        (12.0, 0.22e-3, 2.94),
+        (48.0, 0.18e-3, 2.94),
+    ];
+    // `a sin(n phi + p)` as order, cosine and sine amplitude.
+    let terms = |table: &[(f64, f64, f64)]| -> Vec<f64> {
+        let triples = table
+            .iter()
+            .map(|(n, a, p): &(f64, f64, f64)| [*n, a * p.sin(), a * p.cos()]);
+        triples.flatten().collect()
+    };
+    let setting = |axis, name: &str, parameters| EffectSetting {
+        name: name.to_owned(),
+        axis: Some(axis),
+        parameters,
+    };
+    let both = |axis| {
+        [
+            setting(axis, "torque_ripple", terms(&torque)),
+            setting(axis, "resolver_ripple", terms(&resolver)),
+        ]
+    };
+    (0..n_axes).flat_map(both).collect()
 }

@@ -15,7 +15,7 @@ mod vector;
 pub use chain::{Body, Chain, ChainState};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
 pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
-pub use linearization::{Linearization, linearize};
+pub use linearization::{Linearization, LinearizationError, linearize};
 pub use modes::{Mode, modes, zoh_frequency_response};
 pub use parameters::{Parameter, ParameterError};
 pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError, PlantScratch};

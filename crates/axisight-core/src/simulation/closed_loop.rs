@@ -3,6 +3,7 @@
 use super::controller::ControlLoop;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{Line, TorquePath};
+use crate::effects::EffectError;
 use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
 use crate::scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -95,6 +96,9 @@ pub enum SimulationError {
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,
+    /// An effect is misused.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
 }
 
 /// Simulate until the longest lane ends; `observe` sees every sample.
@@ -180,16 +184,16 @@ fn sample_lines<S: Scalar>(
 }
 
 /// Signals of the current sample.
-struct Signals<S> {
-    measured: Vec<S>,
-    command: Vec<S>,
+pub(super) struct Signals<S> {
+    pub(super) measured: Vec<S>,
+    pub(super) command: Vec<S>,
     reference: Vec<S>,
-    torque_disturbance: Vec<S>,
-    position_disturbance: Vec<S>,
+    pub(super) torque_disturbance: Vec<S>,
+    pub(super) position_disturbance: Vec<S>,
 }
 
 impl<S: Scalar> Signals<S> {
-    fn new(n_axes: usize) -> Self {
+    pub(super) fn new(n_axes: usize) -> Self {
         let zeros = vec![S::zero(); n_axes];
         Self {
             measured: zeros.clone(),
@@ -212,7 +216,8 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
+    #[inline(always)]
+    pub(super) fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
         let n = self.command.len();
         match run.drive {
             Drive::Torque(torque) => {
@@ -243,7 +248,7 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
+    pub(super) fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
         Sample {
             index,
             command: &self.command,
@@ -256,7 +261,8 @@ impl<S: Scalar> Signals<S> {
 }
 
 /// Entry `(k, axis)` of each lane's array; zero beyond its end or without arrays.
-fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
+#[inline(always)]
+pub(super) fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
     S::from_lanes(|lane| {
         let array = arrays.get(lane).or_else(|| arrays.last());
         array
@@ -266,7 +272,7 @@ fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize
     })
 }
 
-fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
+pub(super) fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
     let shape = |field, expected: String, got: String| SimulationError::Shape {
         field,
         expected,

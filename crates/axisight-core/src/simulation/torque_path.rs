@@ -60,12 +60,17 @@ struct Moments<S> {
 impl<S: Scalar> TorquePath<S> {
     /// Path of `axis`, settled at the command `rest`.
     pub(super) fn new(axis: &Axis<S>, rest: S, sample_time: f64) -> Self {
+        Self::through(axis.kernels.clone(), rest, sample_time)
+    }
+
+    /// Path through `kernels`, settled at the command `rest`.
+    pub(super) fn through(kernels: Vec<Arc<dyn Kernel<S>>>, rest: S, sample_time: f64) -> Self {
         let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);
-        let delay = total(axis.kernels.iter().filter_map(|k| k.delay()).collect());
-        let lag = total(axis.kernels.iter().filter_map(|k| k.lag()).collect());
+        let delay = total(kernels.iter().filter_map(|k| k.delay()).collect());
+        let lag = total(kernels.iter().filter_map(|k| k.lag()).collect());
         Self {
             sample_time,
-            kernels: axis.kernels.clone(),
+            kernels,
             delay: delay.map(|d| Delay::new(d * (1.0 / sample_time), rest)),
             lag: lag.map(|time_constant| Lag {
                 time_constant: time_constant + SHORTEST_LAG_S,
@@ -144,21 +149,24 @@ impl<S: Scalar> TorquePath<S> {
     }
 
     /// The commands in force between `from` and `to` (fractions of the sample).
-    fn pieces(&self, command: S, from: f64, to: f64) -> Vec<(S, S, S)> {
+    fn pieces(&self, command: S, from: f64, to: f64) -> impl Iterator<Item = (S, S, S)> + use<S> {
         let (start, end) = (S::constant(from), S::constant(to));
-        let Some(delay) = &self.delay else {
-            return vec![(command, start, end)];
+        let pair = match &self.delay {
+            None => [Some((command, start, end)), None],
+            Some(delay) => {
+                let (older, newer) = (delay.history[0], delay.history[1]);
+                let switch = delay.fraction;
+                // A switch at the very start stays in, for its derivative.
+                if switch.lane(0) < from {
+                    [Some((newer, start, end)), None]
+                } else if switch.lane(0) >= to {
+                    [Some((older, start, end)), None]
+                } else {
+                    [Some((older, start, switch)), Some((newer, switch, end))]
+                }
+            }
         };
-        let (older, newer) = (delay.history[0], delay.history[1]);
-        let switch = delay.fraction;
-        // A switch at the very start stays in, for its derivative.
-        if switch.lane(0) < from {
-            vec![(newer, start, end)]
-        } else if switch.lane(0) >= to {
-            vec![(older, start, end)]
-        } else {
-            vec![(older, start, switch), (newer, switch, end)]
-        }
+        pair.into_iter().flatten()
     }
 
     /// Moments over a piece of length `width` that starts `start` into the

@@ -1,0 +1,245 @@
+//! What the linear loop needs to know of a robot, computed once.
+
+use super::harmonics::Waves;
+use super::propagator::Propagator;
+use crate::effects::{self, Acts, EffectError, Kernel, Role};
+use crate::robot::{
+    EffectSetting, Linearization, LinearizationError, Plant, PlantError, RobotDescription,
+    linearize,
+};
+use crate::scalar::Scalar;
+use std::sync::Arc;
+
+/// Effects whose slope at rest describes them in motion too.
+const IN_STATE_MATRIX: [&str; 8] = [
+    "viscous_friction",
+    "joint_stiffness",
+    "nonlinear_stiffness",
+    "joint_damping",
+    "motor_inertia",
+    "payload",
+    "gravity_compensation",
+    "cable_stiffness",
+];
+
+/// Why a robot has no linear plant.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LinearPlantError {
+    /// The robot cannot be linearized.
+    #[error(transparent)]
+    Linearization(#[from] LinearizationError),
+    /// An effect that a straight line does not describe.
+    #[error(
+        "effect `{effect}`: expected one that is smooth about rest, got one without a \
+         linearization that holds in motion; use the nonlinear plant"
+    )]
+    NotLinear {
+        /// Effect.
+        effect: String,
+    },
+    /// An axis angle that the linearization does not see as one state.
+    #[error("axis {axis}: expected a motor angle in proportion to one state, got none")]
+    NoMotorAngle {
+        /// Driven axis, from 1.
+        axis: usize,
+    },
+}
+
+/// One driven axis of a linear plant.
+#[derive(Debug, Clone)]
+pub(super) struct LinearAxis {
+    /// State the motor angle is proportional to.
+    pub(super) slot: usize,
+    /// Motor angle per state [rad/rad].
+    pub(super) scale: f64,
+    /// Motor angle at rest [rad].
+    pub(super) angle: f64,
+    /// Torque the drive delivers at rest [Nm].
+    pub(super) torque: f64,
+    /// Viscous friction added by effects, motor side [Nm s/rad].
+    pub(super) viscous: f64,
+    /// Effects on the commanded torque.
+    path: Vec<EffectSetting<f64>>,
+    /// Torque and resolver ripple.
+    pub(super) waves: Waves,
+}
+
+/// A robot linearized about rest, with its ripple and torque path, ready for
+/// [`simulate_linear`](super::simulate_linear).
+#[derive(Debug, Clone)]
+pub struct LinearPlant {
+    pub(super) linear: Linearization,
+    /// Driven joint angles it was linearized at [rad].
+    pub(super) start: Vec<f64>,
+    /// State at rest, `[phi, q, phi', q']`.
+    pub(super) rest: Vec<f64>,
+    pub(super) axes: Vec<LinearAxis>,
+    /// Propagation over one sample of the robot.
+    pub(super) propagator: Propagator,
+}
+
+impl LinearPlant {
+    /// Linearize `robot` with `settings` at rest, driven joints at `start` [rad].
+    ///
+    /// Effects at their neutral values are allowed whatever they are: they do nothing.
+    ///
+    /// # Errors
+    /// [`LinearPlantError`] when an effect has no linearization (use the nonlinear plant),
+    /// or the plant cannot be built or does not settle.
+    pub fn new(
+        robot: &RobotDescription,
+        settings: &[EffectSetting<f64>],
+        start: &[f64],
+    ) -> Result<Self, LinearPlantError> {
+        let whole = Plant::<f64>::new(robot, &[], settings).map_err(LinearizationError::from)?;
+        let mut smooth = Vec::new();
+        for setting in settings {
+            match treatment(setting)? {
+                Treatment::StateMatrix | Treatment::Path => smooth.push(setting.clone()),
+                Treatment::Ripple | Treatment::Nothing => {}
+            }
+        }
+        let linear = linearize(robot, &smooth, start)?;
+        let axes = (0..whole.axes.len())
+            .map(|i| LinearAxis::new(i, settings, &linear))
+            .collect::<Result<Vec<_>, _>>()?;
+        let at = &linear.equilibrium;
+        Ok(Self {
+            start: start.to_vec(),
+            rest: whole.state_at_rest(&at.motor_angle, &at.joint_angle),
+            propagator: Propagator::new(&linear.a, &linear.b, robot.sample_time),
+            linear,
+            axes,
+        })
+    }
+
+    /// The linearization in use; states `[phi, q, phi', q']`.
+    pub fn linearization(&self) -> &Linearization {
+        &self.linear
+    }
+
+    /// Number of driven axes.
+    pub fn n_axes(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// Number of states.
+    pub fn n_states(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Multiplications and additions of one step of one run, by part; an `a * b + c` counts
+    /// once. For statements of efficiency.
+    pub fn operations(&self) -> Operations {
+        let ripple = self.has_torque_ripple();
+        Operations {
+            propagation: self.propagator.operations(ripple),
+            harmonics: self.axes.iter().map(|a| a.waves.operations()).sum(),
+        }
+    }
+
+    pub(super) fn has_torque_ripple(&self) -> bool {
+        self.axes.iter().any(|a| a.waves.acts_on_torque())
+    }
+
+    pub(super) fn has_waves(&self) -> bool {
+        self.axes.iter().any(|a| !a.waves.is_empty())
+    }
+}
+
+/// Arithmetic operations of one step of one run; a fused multiply-add counts once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Operations {
+    /// Linear propagation and its correction for the ripple.
+    pub propagation: usize,
+    /// Sines, cosines, their products and sums.
+    pub harmonics: usize,
+}
+
+enum Treatment {
+    StateMatrix,
+    Path,
+    Ripple,
+    Nothing,
+}
+
+fn treatment(setting: &EffectSetting<f64>) -> Result<Treatment, LinearPlantError> {
+    let misused = |e: EffectError| LinearizationError::from(PlantError::from(e));
+    let info = effects::info(&setting.name).map_err(misused)?;
+    let name = setting.name.as_str();
+    if matches!(name, "torque_ripple" | "resolver_ripple") {
+        return Ok(Treatment::Ripple);
+    }
+    if info.acts == Acts::TorquePath {
+        return Ok(Treatment::Path);
+    }
+    if IN_STATE_MATRIX.contains(&name) {
+        return Ok(Treatment::StateMatrix);
+    }
+    let parameters = info.parameters.iter().zip(&setting.parameters);
+    let mut amplitudes = parameters.filter(|(p, _)| p.role == Role::Amplitude);
+    #[allow(clippy::float_cmp)] // neutral is a value one sets, not one that comes out
+    if amplitudes.all(|(p, value)| *value == p.neutral) {
+        return Ok(Treatment::Nothing);
+    }
+    Err(LinearPlantError::NotLinear {
+        effect: setting.name.clone(),
+    })
+}
+
+impl LinearAxis {
+    fn new(
+        index: usize,
+        settings: &[EffectSetting<f64>],
+        linear: &Linearization,
+    ) -> Result<Self, LinearPlantError> {
+        let mine = || settings.iter().filter(|s| s.axis == Some(index));
+        let named = |name| mine().filter(move |s| s.name == name);
+        let path: Vec<_> = mine()
+            .filter(|s| effects::info(&s.name).is_ok_and(|i| i.acts == Acts::TorquePath))
+            .cloned()
+            .collect();
+        let (mut constant, mut proportional) = (Vec::new(), Vec::new());
+        for setting in named("torque_ripple") {
+            // Three harmonics of constant size, then one in proportion to the command.
+            let (c, p) = setting.parameters.split_at(setting.parameters.len().min(9));
+            constant.extend_from_slice(c);
+            proportional.extend_from_slice(p);
+        }
+        let resolver: Vec<f64> = named("resolver_ripple")
+            .flat_map(|s| s.parameters.iter().copied())
+            .collect();
+        let no_angle = LinearPlantError::NoMotorAngle { axis: index + 1 };
+        let (slot, scale) = (0..linear.c.ncols())
+            .map(|j| (j, linear.c[(index, j)]))
+            .find(|(_, c)| *c != 0.0)
+            .ok_or(no_angle)?;
+        let at = &linear.equilibrium;
+        let command = at.motor_torque.get(index).copied().unwrap_or(0.0);
+        let mut axis = Self {
+            slot,
+            scale,
+            angle: at.motor_angle.get(index).copied().unwrap_or(0.0),
+            torque: command,
+            viscous: named("viscous_friction")
+                .filter_map(|s| s.parameters.first())
+                .sum(),
+            path,
+            waves: Waves::new(&constant, &proportional, &resolver),
+        };
+        let kernels = axis
+            .path_kernels::<f64>()
+            .map_err(|e| LinearizationError::from(PlantError::from(e)))?;
+        axis.torque = kernels.iter().fold(command, |t, k| k.drive(t));
+        Ok(axis)
+    }
+
+    /// The effects on the commanded torque.
+    pub(super) fn path_kernels<S: Scalar>(&self) -> Result<Vec<Arc<dyn Kernel<S>>>, EffectError> {
+        let built = self.path.iter().map(|setting| {
+            let lifted: Vec<S> = setting.parameters.iter().map(|p| S::constant(*p)).collect();
+            effects::build(&setting.name, &lifted).map(Arc::from)
+        });
+        built.collect()
+    }
+}

@@ -1,0 +1,251 @@
+//! The sampled loop around the linear plant.
+
+use super::harmonics::Ripple;
+use super::plant::LinearPlant;
+use super::propagator::Propagator;
+use super::tiles::Tiles;
+use crate::scalar::Scalar;
+use crate::simulation::closed_loop::{
+    Run, Sample, Signals, SimulationError, Status, check, lane_value,
+};
+use crate::simulation::controller::ControlLoop;
+use crate::simulation::method::Method;
+use crate::simulation::torque_path::{Line, TorquePath};
+use std::borrow::Cow;
+use std::sync::atomic::Ordering;
+
+/// Simulate the linear plant until the longest lane ends; `observe` sees every sample.
+///
+/// Everything but the ripple is exact for any sample time. The ripple has an error of order
+/// 4 in the step; `Method::RungeKutta4 { substeps }` divides the sample into that many
+/// steps, any other method takes one, which is good to about `(n phi' h)^4 / 400` of the
+/// amplitude of harmonic `n` at motor speed `phi'` and step `h`. `state` is the deviation
+/// added to the state at rest. `run.start` must be where `plant` was linearized.
+///
+/// # Errors
+/// [`SimulationError`] for misuse; trouble during the run is a [`Status`].
+pub fn simulate_linear<S: Scalar>(
+    plant: &LinearPlant,
+    run: &Run<'_>,
+    observe: &mut impl FnMut(&Sample<'_, S>),
+) -> Result<Status, SimulationError> {
+    let n_samples = check(run, plant.n_axes(), S::LANES)?;
+    #[allow(clippy::float_cmp)] // the same numbers, not nearby ones
+    if run.start != plant.start {
+        return Err(SimulationError::Shape {
+            field: "start",
+            expected: format!("{:?}, where the plant was linearized", plant.start),
+            got: format!("{:?}", run.start),
+        });
+    }
+    let mut state = LinearLoop::<S>::new(plant, run)?;
+    Ok(samples(&mut state, run, n_samples, observe))
+}
+
+#[inline(always)]
+fn samples<S: Scalar>(
+    state: &mut LinearLoop<'_, S>,
+    run: &Run<'_>,
+    n_samples: usize,
+    observe: &mut impl FnMut(&Sample<'_, S>),
+) -> Status {
+    for k in 0..n_samples {
+        if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Status::Cancelled(k);
+        }
+        state.signals(run, k);
+        observe(&state.signals.sample(k, &state.absolute));
+        state.take_commands();
+        for substep in 0..state.substeps {
+            state.step(substep);
+        }
+        if !state.settle() {
+            return Status::Diverged(k);
+        }
+    }
+    Status::Completed
+}
+
+/// Everything that changes during a run.
+struct LinearLoop<'a, S> {
+    plant: &'a LinearPlant,
+    propagator: Cow<'a, Propagator>,
+    substeps: usize,
+    torque_ripple: bool,
+    controller: ControlLoop<S>,
+    paths: Vec<TorquePath<S>>,
+    signals: Signals<S>,
+    /// What each drive makes of its command [Nm].
+    taken: Vec<S>,
+    /// Torque over each sub-step, per axis.
+    lines: Vec<Vec<Line<S>>>,
+    /// Ripple at the present motor angles.
+    ripple: Vec<Ripple<S>>,
+    powers: Vec<[S; 2]>,
+    /// `[t_0, d_0, x]`: torque and its change over the step, deviation of the state; padded.
+    input: Vec<S>,
+    /// Predicted deviation at the end of the step, padded.
+    predicted: Vec<S>,
+    /// `[e_1, e_2]`: what the prediction of the torque missed.
+    missed: Vec<S>,
+    /// `[phi, q, phi', q']`.
+    absolute: Vec<S>,
+}
+
+impl<'a, S: Scalar> LinearLoop<'a, S> {
+    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Result<Self, SimulationError> {
+        let (n, m) = (plant.n_states(), plant.n_axes());
+        let substeps = match run.method {
+            Method::RungeKutta4 { substeps } => substeps.max(1),
+            Method::DormandPrince { .. } => 1,
+        };
+        let step = run.sample_time / substeps as f64;
+        #[allow(clippy::float_cmp)] // prepared for exactly this step or not
+        let propagator = if step == plant.propagator.step {
+            Cow::Borrowed(&plant.propagator)
+        } else {
+            Cow::Owned(Propagator::new(&plant.linear.a, &plant.linear.b, step))
+        };
+        let at = &plant.linear.equilibrium;
+        let lift = |values: &[f64]| -> Vec<S> { values.iter().map(|v| S::constant(*v)).collect() };
+        let (angle, torque) = (lift(&at.motor_angle), lift(&at.motor_torque));
+        let mut paths = Vec::with_capacity(m);
+        for (axis, u) in plant.axes.iter().zip(&torque) {
+            paths.push(TorquePath::through(
+                axis.path_kernels()?,
+                *u,
+                run.sample_time,
+            ));
+        }
+        let scratch = plant.axes.iter().map(|a| a.waves.scratch()).max();
+        let mut powers = vec![[S::zero(); 2]; scratch.unwrap_or(1)];
+        let ripple = plant
+            .axes
+            .iter()
+            .map(|axis| axis.waves.evaluate(S::constant(axis.angle), &mut powers))
+            .collect();
+        let padded = Tiles::padded(n);
+        Ok(Self {
+            plant,
+            propagator,
+            substeps,
+            torque_ripple: plant.has_torque_ripple(),
+            controller: ControlLoop::new(run.controller, run.sample_time, &angle, &torque),
+            paths,
+            signals: Signals::new(m),
+            taken: torque,
+            lines: vec![Vec::with_capacity(substeps); m],
+            ripple,
+            powers,
+            input: vec![S::zero(); 2 * m + padded],
+            predicted: vec![S::zero(); padded],
+            missed: vec![S::zero(); 2 * m],
+            absolute: lift(&plant.rest),
+        })
+    }
+
+    /// Measure, command, and note what acts on the motors.
+    #[inline(always)]
+    fn signals(&mut self, run: &Run<'_>, k: usize) {
+        let (n, m) = (self.plant.n_states(), self.plant.n_axes());
+        let deviation = &self.input[2 * m..];
+        for (i, axis) in self.plant.axes.iter().enumerate() {
+            let angle = deviation[axis.slot] * axis.scale + axis.angle;
+            let error = lane_value::<S>(run.noise, k, i, m) + self.ripple[i].resolver.value;
+            self.signals.position_disturbance[i] = error;
+            self.signals.measured[i] = angle + error;
+        }
+        self.signals.command(run, k, &mut self.controller);
+        for (i, axis) in self.plant.axes.iter().enumerate() {
+            let speed = deviation[axis.slot + n / 2] * axis.scale;
+            let ripple = self.ripple[i].torque(self.signals.command[i]).value;
+            self.signals.torque_disturbance[i] = ripple - speed * axis.viscous;
+        }
+    }
+
+    /// Hand the commands to the drives.
+    #[inline(always)]
+    fn take_commands(&mut self) {
+        for (i, path) in self.paths.iter_mut().enumerate() {
+            self.taken[i] = path.push(self.signals.command[i]);
+            path.lines(self.taken[i], self.substeps, &mut self.lines[i]);
+            path.advance(self.taken[i]);
+        }
+    }
+
+    /// Advance the deviation by one sub-step.
+    #[inline(always)]
+    fn step(&mut self, substep: usize) {
+        let (n, m) = (self.plant.n_states(), self.plant.n_axes());
+        let step = self.propagator.step;
+        for (i, axis) in self.plant.axes.iter().enumerate() {
+            let line = self.lines[i][substep];
+            let ripple = self.ripple[i].torque(self.signals.command[i]);
+            let speed = self.input[2 * m + axis.slot + n / 2] * (axis.scale * step);
+            let (from, to) = (line.at(0.0), line.at(1.0));
+            let change = ripple.slope * speed;
+            self.input[i] = from - S::constant(axis.torque) + ripple.value;
+            self.input[m + i] = to - from + change;
+            // Minus what a straight line predicts for the end of the step.
+            self.missed[i] = -(ripple.value + change);
+            self.missed[m + i] = -change;
+        }
+        self.propagator
+            .predict
+            .multiply(&self.input, None, &mut self.predicted);
+        if self.torque_ripple {
+            self.correct();
+        } else {
+            self.input[2 * m..].copy_from_slice(&self.predicted);
+            if self.plant.has_waves() {
+                for (i, axis) in self.plant.axes.iter().enumerate() {
+                    let angle = self.predicted[axis.slot] * axis.scale + axis.angle;
+                    self.ripple[i] = axis.waves.evaluate(angle, &mut self.powers);
+                }
+            }
+        }
+    }
+
+    /// Correct the prediction for the ripple at its end.
+    #[inline(always)]
+    fn correct(&mut self) {
+        let (n, m) = (self.plant.n_states(), self.plant.n_axes());
+        let step = self.propagator.step;
+        for (i, axis) in self.plant.axes.iter().enumerate() {
+            let angle = self.predicted[axis.slot] * axis.scale + axis.angle;
+            let speed = self.predicted[axis.slot + n / 2] * (axis.scale * step);
+            self.ripple[i] = axis.waves.evaluate(angle, &mut self.powers);
+            let ripple = self.ripple[i].torque(self.signals.command[i]);
+            self.missed[i] += ripple.value;
+            self.missed[m + i] = ripple.slope.fma(speed, self.missed[m + i]);
+        }
+        let deviation = &mut self.input[2 * m..];
+        self.propagator
+            .correct
+            .multiply(&self.missed, Some(&self.predicted), deviation);
+        // The true angle is a fourth-order distance from the predicted one: its square
+        // is far below the error of the method, so the evaluation serves both.
+        for (i, axis) in self.plant.axes.iter().enumerate() {
+            let by = (deviation[axis.slot] - self.predicted[axis.slot]) * axis.scale;
+            self.ripple[i] = self.ripple[i].moved(by);
+        }
+    }
+
+    /// Absolute state at the new sample; false if it is not finite.
+    #[inline(always)]
+    fn settle(&mut self) -> bool {
+        let deviation = &self.input[2 * self.plant.n_axes()..];
+        // Infinity and NaN times zero are NaN, which stays.
+        let mut trace = S::zero();
+        for ((x, d), rest) in self
+            .absolute
+            .iter_mut()
+            .zip(deviation)
+            .zip(&self.plant.rest)
+        {
+            *x = *d + *rest;
+            trace = d.fma(S::zero(), trace);
+        }
+        (0..S::LANES).all(|l| !trace.lane(l).is_nan())
+    }
+}
