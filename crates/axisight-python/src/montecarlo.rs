@@ -81,7 +81,7 @@ impl MonteCarloStudy {
         let effects = settings(effects);
         let method = self::method(method, substeps, tolerance)?;
         let models = [
-            ("linear", Model::Linear),
+            ("linear", Model::Linear { substeps }),
             ("nonlinear", Model::Nonlinear(method)),
         ];
         let outputs = [
@@ -89,7 +89,11 @@ impl MonteCarloStudy {
             ("velocity", Output::Velocity),
             ("acceleration", Output::Acceleration),
         ];
-        let grid = choice("multisine.grid", grid, &[("all", Grid::All), ("odd", Grid::Odd)])?;
+        let grid = choice(
+            "multisine.grid",
+            grid,
+            &[("all", Grid::All), ("odd", Grid::Odd)],
+        )?;
         let spread = spread
             .into_iter()
             .map(|(name, distribution, relative, absolute)| {

@@ -150,7 +150,8 @@ impl QuantileSketch {
             let range = usize::try_from(range[0])
                 .ok()
                 .zip(usize::try_from(range[1]).ok());
-            let part = range.and_then(|(from, to)| Some((buckets.get(from..to)?, &counts[from..to])));
+            let part =
+                range.and_then(|(from, to)| Some((buckets.get(from..to)?, &counts[from..to])));
             let Some((buckets, counts)) = part else {
                 return Err(wrong("increasing starts", format!("{starts:?}")));
             };

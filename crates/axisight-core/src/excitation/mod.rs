@@ -44,7 +44,11 @@ fn whole_samples(
     let close = (ratio - whole).abs() <= 1e-9 * whole.abs();
     if !(seconds.is_finite() && (1.0..MOST).contains(&whole) && close) {
         let expected = format!("a positive whole number of samples of {sample_time} s");
-        return Err(ExcitationError::new(field, expected, format!("{seconds} s")));
+        return Err(ExcitationError::new(
+            field,
+            expected,
+            format!("{seconds} s"),
+        ));
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bounded above
     let n = whole as usize;

@@ -84,7 +84,10 @@ impl Multisine {
     pub fn phases(&self, seed: u64, run: u64) -> Vec<f64> {
         let mut rng = generator(seed, Purpose::Phases, run);
         let turn = std::f64::consts::TAU;
-        self.lines.iter().map(|_| rng.random::<f64>() * turn).collect()
+        self.lines
+            .iter()
+            .map(|_| rng.random::<f64>() * turn)
+            .collect()
     }
 
     /// One period with the given phases, scaled to the peak.

@@ -33,11 +33,19 @@ impl Square {
         }
         if 2 * smoothing + 1 > samples / 2 {
             let expected = format!("fewer than {} samples", samples / 4);
-            return Err(ExcitationError::new("square.smoothing", expected, smoothing));
+            return Err(ExcitationError::new(
+                "square.smoothing",
+                expected,
+                smoothing,
+            ));
         }
         if !amplitude.is_finite() || amplitude < 0.0 {
             let expected = "a number not below zero";
-            return Err(ExcitationError::new("square.amplitude_rad_s", expected, amplitude));
+            return Err(ExcitationError::new(
+                "square.amplitude_rad_s",
+                expected,
+                amplitude,
+            ));
         }
         Ok(Self {
             amplitude,

@@ -2,7 +2,7 @@
 
 use super::simulate::{Group, GroupPlant, Job, Model, Outcome};
 use super::spread::draw;
-use super::study::Study;
+use super::study::{Study, StudyError};
 use crate::ensemble::{Moments, QuantileSketch};
 use crate::frf::{Spectra, response};
 use crate::scalar::Lanes;
@@ -133,14 +133,14 @@ pub fn run_block(
         },
     };
     let s = &study.settings;
-    if s.model == Model::Linear && s.spread.is_empty() {
-        let plant = GroupPlant::new(s.model, s.robot.clone(), s.effects.clone(), &s.start);
+    if matches!(s.model, Model::Linear { .. }) && s.spread.is_empty() {
+        let plant = own_plant(study, seed, first);
         share_plant(study, seed, (first, end), plant, &mut sink, cancel)?;
     } else {
         for run in first..end {
             let outcomes = match own_plant(study, seed, run) {
-                Some(plant) => one_run(study, seed, run, &plant, cancel),
-                None => Err(invalid(run)),
+                Ok(plant) => one_run(study, seed, run, &plant, cancel),
+                Err(kind) => Err(unbuilt(run, kind)),
             };
             if cancel.load(Ordering::Relaxed) {
                 return Err(BlockError::Cancelled);
@@ -157,7 +157,7 @@ fn share_plant(
     study: &Study,
     seed: u64,
     (first, end): (u64, u64),
-    plant: Option<GroupPlant>,
+    plant: Result<GroupPlant, FailureKind>,
     sink: &mut Sink<'_>,
     cancel: &AtomicBool,
 ) -> Result<(), BlockError> {
@@ -165,9 +165,12 @@ fn share_plant(
     let jobs: Vec<Job> = (first..end)
         .flat_map(|run| (0..n).map(move |experiment| Job { run, experiment }))
         .collect();
-    let Some(plant) = plant else {
-        (first..end).for_each(|run| sink.finish(run, Err(invalid(run))));
-        return Ok(());
+    let plant = match plant {
+        Ok(plant) => plant,
+        Err(kind) => {
+            (first..end).for_each(|run| sink.finish(run, Err(unbuilt(run, kind))));
+            return Ok(());
+        }
     };
     let group = Group {
         study,
@@ -192,19 +195,24 @@ fn share_plant(
     Ok(())
 }
 
-fn invalid(run: u64) -> Failure {
+/// A run whose plant could not be built.
+fn unbuilt(run: u64, kind: FailureKind) -> Failure {
     Failure {
         run,
-        kind: FailureKind::InvalidParameters,
+        kind,
         experiment: 0,
         detail: 0,
     }
 }
 
-fn own_plant(study: &Study, seed: u64, run: u64) -> Option<GroupPlant> {
+fn own_plant(study: &Study, seed: u64, run: u64) -> Result<GroupPlant, FailureKind> {
     let s = &study.settings;
-    let (robot, effects) = draw(&s.robot, &s.effects, &s.spread, seed, run)?;
-    GroupPlant::new(s.model, robot, effects, &s.start)
+    let drawn = draw(&s.robot, &s.effects, &s.spread, seed, run);
+    let (robot, effects) = drawn.ok_or(FailureKind::InvalidParameters)?;
+    GroupPlant::new(s.model, &robot, &effects, &s.start).map_err(|error| match error {
+        StudyError::Equilibrium(_) => FailureKind::NoEquilibrium,
+        _ => FailureKind::InvalidParameters,
+    })
 }
 
 /// Lanes over the experiments of one run: adaptive steps are shared by the lanes, so runs
@@ -228,7 +236,10 @@ fn one_run(
         1 => group.run::<f64>(&jobs),
         2 => group.run::<Lanes<2>>(&jobs),
         3 | 4 => group.run::<Lanes<4>>(&jobs),
-        _ => jobs.chunks(8).flat_map(|c| group.run::<Lanes<8>>(c)).collect(),
+        _ => jobs
+            .chunks(8)
+            .flat_map(|c| group.run::<Lanes<8>>(c))
+            .collect(),
     };
     collect(run, jobs.into_iter().zip(outcomes).collect())
 }

@@ -1,28 +1,27 @@
 //! Simulation of a group of experiments; the one place that knows linear from nonlinear.
 
 use super::record::Recorder;
-use super::study::{Study, StudyError, StudySettings};
+use super::study::{Study, StudyError};
 use crate::frf::Spectra;
-use crate::robot::{EffectSetting, Plant, RobotDescription};
+use crate::robot::{EffectSetting, Plant, RobotDescription, equilibrium};
 use crate::scalar::Scalar;
 use crate::signal::DftScratch;
-use crate::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
+use crate::simulation::{
+    Drive, LinearPlant, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
+    simulate_linear,
+};
 use std::sync::atomic::AtomicBool;
 
 /// Which plant a study simulates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Model {
-    /// Linearized about the start; see [`crate::robot::linearize`].
-    Linear,
+    /// Linearized about the start, propagated exactly; see [`LinearPlant`].
+    Linear {
+        /// Steps per sample, for the ripple.
+        substeps: usize,
+    },
     /// Full equations of motion.
     Nonlinear(Method),
-}
-
-impl Model {
-    /// Whether the effects of the study suit the model.
-    pub(super) fn check(self, _settings: &StudySettings) -> Result<(), StudyError> {
-        Ok(())
-    }
 }
 
 /// One experiment of one run.
@@ -34,6 +33,10 @@ pub(super) struct Job {
 
 /// The plant of a group of experiments.
 pub(super) enum GroupPlant {
+    Linear {
+        plant: Box<LinearPlant>,
+        substeps: usize,
+    },
     Nonlinear {
         robot: RobotDescription,
         effects: Vec<EffectSetting<f64>>,
@@ -44,20 +47,23 @@ pub(super) enum GroupPlant {
 impl GroupPlant {
     pub(super) fn new(
         model: Model,
-        robot: RobotDescription,
-        effects: Vec<EffectSetting<f64>>,
-        _start: &[f64],
-    ) -> Option<Self> {
-        Plant::<f64>::new(&robot, &[], &effects).ok()?;
-        let method = match model {
-            Model::Linear => Method::DormandPrince { tolerance: 1e-9 },
-            Model::Nonlinear(method) => method,
-        };
-        Some(Self::Nonlinear {
-            robot,
-            effects,
-            method,
-        })
+        robot: &RobotDescription,
+        effects: &[EffectSetting<f64>],
+        start: &[f64],
+    ) -> Result<Self, StudyError> {
+        let plant = Plant::<f64>::new(robot, &[], effects)?;
+        equilibrium(&plant, start)?;
+        match model {
+            Model::Linear { substeps } => Ok(Self::Linear {
+                plant: Box::new(LinearPlant::new(robot, effects, start)?),
+                substeps,
+            }),
+            Model::Nonlinear(method) => Ok(Self::Nonlinear {
+                robot: robot.clone(),
+                effects: effects.to_vec(),
+                method,
+            }),
+        }
     }
 
     fn simulate<S: Scalar>(
@@ -65,20 +71,25 @@ impl GroupPlant {
         run: &Run<'_>,
         recorder: &mut Recorder<S>,
     ) -> Result<Status, SimulationError> {
+        let mut observe = |s: &Sample<'_, S>| recorder.observe(s);
         match self {
+            Self::Linear { plant, .. } => simulate_linear(plant, run, &mut observe),
             Self::Nonlinear { robot, effects, .. } => {
                 let lifted: Vec<_> = effects.iter().map(lift).collect();
                 let Ok(plant) = Plant::<S>::new(robot, &[], &lifted) else {
                     return Ok(Status::Diverged(0));
                 };
                 let mut stepper = Stepper::new(&plant);
-                simulate(&plant, run, &mut stepper, &mut |s| recorder.observe(s))
+                simulate(&plant, run, &mut stepper, &mut observe)
             }
         }
     }
 
     fn method(&self) -> Method {
         match self {
+            Self::Linear { substeps, .. } => Method::RungeKutta4 {
+                substeps: *substeps,
+            },
             Self::Nonlinear { method, .. } => *method,
         }
     }

@@ -98,7 +98,11 @@ impl Spread {
             Ok(())
         } else {
             let got = format!("{:?}", self.target);
-            Err(StudyError::field("spread.parameter", "a parameter of the study", got))
+            Err(StudyError::field(
+                "spread.parameter",
+                "a parameter of the study",
+                got,
+            ))
         }
     }
 

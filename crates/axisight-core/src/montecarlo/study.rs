@@ -1,14 +1,12 @@
 //! What a study simulates: robot, excitation, measurement, spread.
 
-use super::simulate::Model;
+use super::simulate::{GroupPlant, Model};
 use super::spread::Spread;
 use crate::excitation::{ExcitationError, Multisine, Square};
 use crate::frf::Output;
-use crate::robot::{
-    Controller, EffectSetting, EquilibriumError, Plant, PlantError, RobotDescription, equilibrium,
-};
+use crate::robot::{Controller, EffectSetting, EquilibriumError, PlantError, RobotDescription};
 use crate::signal::SmallSolver;
-use crate::simulation::measurement_noise;
+use crate::simulation::{LinearPlantError, measurement_noise};
 use nalgebra::Complex;
 
 /// Everything that defines a study; checked by [`Study::new`].
@@ -71,6 +69,9 @@ pub enum StudyError {
     /// The arm does not settle.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
+    /// The robot or its effects have no linear plant.
+    #[error(transparent)]
+    Linear(#[from] LinearPlantError),
 }
 
 impl StudyError {
@@ -124,9 +125,10 @@ impl Study {
         for spread in &settings.spread {
             spread.check(robot, &settings.effects)?;
         }
-        let plant = Plant::<f64>::new(robot, &[], &settings.effects)?;
-        equilibrium(&plant, &settings.start)?;
-        settings.model.check(&settings)?;
+        if settings.model == (Model::Linear { substeps: 0 }) {
+            return Err(StudyError::field("plant.substeps", "at least 1", 0));
+        }
+        GroupPlant::new(settings.model, robot, &settings.effects, &settings.start)?;
         Ok(Self {
             settings,
             square_period,

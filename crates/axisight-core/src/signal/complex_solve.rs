@@ -106,6 +106,8 @@ impl SmallSolver {
                 }
             }
         }
-        self.right.iter().all(|c| c.re.is_finite() && c.im.is_finite())
+        self.right
+            .iter()
+            .all(|c| c.re.is_finite() && c.im.is_finite())
     }
 }
