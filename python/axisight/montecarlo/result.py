@@ -1,0 +1,140 @@
+"""From stored blocks to the result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from axisight import _core
+from axisight.errors import StoreError
+from axisight.montecarlo.design import core_study
+from axisight.montecarlo.store import Store
+from axisight.montecarlo.study import Study
+
+_UNITS = {"position": "rad/Nm", "velocity": "rad/s/Nm", "acceleration": "rad/s^2/Nm"}
+_TITLES = {
+    "arithmetic_mean": "arithmetic mean",
+    "log_mean": "logarithmic mean: geometric mean magnitude, mean direction",
+    "harmonic_mean": "harmonic mean: inverse of the mean inverse matrix",
+    "variance_real": "sample variance of the real part",
+    "variance_imag": "sample variance of the imaginary part",
+    "covariance": "sample covariance of real and imaginary part",
+    "standard_error": "standard error of the arithmetic mean",
+    "log_standard_error": "standard error of the mean log magnitude",
+    "count": "responses counted",
+}
+_SQUARED = ("variance_real", "variance_imag", "covariance")
+
+
+def fold(store: Store, study: Study, design: str, tasks: list[tuple[int, int]]) -> xr.Dataset:
+    """Merge the stored blocks in order; one block is in memory at a time."""
+    core = core_study(design)
+    frequency = core.frequency_hz
+    ensemble = _core.MonteCarloEnsemble(
+        len(frequency), core.n_axes, study.statistics.relative_accuracy
+    )
+    failed = []
+    for first, count in tasks:
+        block = store.read(first, count)
+        if block is None:
+            raise StoreError(f"{store.path(first, count)}: damaged while the study ran; resume")
+        ensemble.merge(
+            block["count"],
+            block["moments"],
+            block["bucket_start"],
+            block["bucket"],
+            block["bucket_count"],
+        )
+        failed.append(block["failures"])
+    return _dataset(study, core, ensemble, np.concatenate(failed))
+
+
+def _dataset(
+    study: Study, core: _core.MonteCarloStudy, ensemble: _core.MonteCarloEnsemble, failed: Any
+) -> xr.Dataset:
+    dims = ("frequency_hz", "output", "input")
+    unit = _UNITS[study.measurement.output]
+    summary = ensemble.summary(study.statistics.quantiles)
+    variables: dict[str, Any] = {}
+    for name, title in _TITLES.items():
+        own = f"({unit})^2" if name in _SQUARED else unit
+        own = "1" if name in ("count", "log_standard_error") else own
+        variables[name] = (dims, summary[name], {"units": own, "long_name": title})
+    variables["magnitude_quantile"] = (
+        ("quantile", *dims),
+        summary["magnitude_quantile"],
+        {"units": unit, "relative_accuracy": study.statistics.relative_accuracy},
+    )
+    kinds = _core.failure_kinds()
+    flags = {"flag_values": list(range(len(kinds))), "flag_meanings": " ".join(kinds)}
+    variables["failed_run"] = ("failure", failed[:, 0])
+    variables["failed_kind"] = ("failure", failed[:, 1], flags)
+    variables["failed_experiment"] = ("failure", failed[:, 2] + np.uint64(1))
+    variables["failed_detail"] = (
+        "failure",
+        failed[:, 3],
+        {"long_name": "sample at which the run stopped, or number of singular lines"},
+    )
+    axes = list(range(1, core.n_axes + 1))
+    return xr.Dataset(
+        variables,
+        coords={
+            "frequency_hz": ("frequency_hz", core.frequency_hz, {"units": "Hz"}),
+            "output": axes,
+            "input": axes,
+            "quantile": list(study.statistics.quantiles),
+        },
+    )
+
+
+def failures(result: xr.Dataset) -> pd.DataFrame:
+    """Return the failed runs of a result, one row each: run, seed, experiment, kind, detail.
+
+    ``detail`` is the sample at which the run stopped, or the number of singular lines.
+    ``singular_lines`` marks a run whose other lines were counted.
+    """
+    kinds = str(result["failed_kind"].attrs["flag_meanings"]).split()
+    return pd.DataFrame(
+        {
+            "run": result["failed_run"].values,
+            "seed": result.attrs["seed"],
+            "experiment": result["failed_experiment"].values,
+            "kind": [kinds[int(k)] for k in result["failed_kind"].values],
+            "detail": result["failed_detail"].values,
+        }
+    )
+
+
+def responses(out: Path | str) -> xr.DataArray:
+    """Return every response of a study stored with ``keep_responses``.
+
+    Dims (run, frequency_hz, output, input), complex; NaN where a run failed. Raises
+    StoreError if the store holds none.
+    """
+    store = Store(Path(out))
+    provenance = store.provenance()
+    core = core_study(provenance["design"])
+    parts = []
+    runs: list[int] = []
+    for first, count in sorted(store.stored().items()):
+        block = store.read(first, count)
+        if block is None or "responses" not in block:
+            reason = "damaged; resume" if block is None else "stored without keep_responses"
+            raise StoreError(f"{store.path(first, count)}: {reason}")
+        parts.append(block["responses"])
+        runs += range(first, first + count)
+    if not parts:
+        raise StoreError(f"{store.root}: expected blocks of runs, got none")
+    axes = list(range(1, core.n_axes + 1))
+    output = json.loads(provenance["design"])["measurement"]["output"]
+    return xr.DataArray(
+        np.concatenate(parts),
+        dims=("run", "frequency_hz", "output", "input"),
+        coords={"run": runs, "frequency_hz": core.frequency_hz, "output": axes, "input": axes},
+        attrs={"units": _UNITS[output], "seed": provenance["seed"]},
+    )
