@@ -16,14 +16,14 @@ pub(super) struct Recorder<S> {
     /// Sums over the measured periods, row-major `(sample, axis)`.
     command: Vec<S>,
     position: Vec<S>,
-    /// Over the last quarter of the last two periods, per axis: sums of position, command
-    /// and squared command.
-    tails: [Vec<[S; 3]>; 2],
+    /// Over the last two periods, per axis: sums of position (last quarter of the period
+    /// only), command and squared command.
+    sums: [Vec<[S; 3]>; 2],
 }
 
 impl<S: Scalar> Recorder<S> {
     pub(super) fn new(n_axes: usize, period: usize, waiting: usize, periods: usize) -> Self {
-        let tail = vec![[S::zero(); 3]; n_axes];
+        let none = vec![[S::zero(); 3]; n_axes];
         Self {
             n_axes,
             period,
@@ -31,16 +31,8 @@ impl<S: Scalar> Recorder<S> {
             total: waiting + periods,
             command: vec![S::zero(); period * n_axes],
             position: vec![S::zero(); period * n_axes],
-            tails: [tail.clone(), tail],
+            sums: [none.clone(), none],
         }
-    }
-
-    /// Forget the last experiments.
-    pub(super) fn clear(&mut self) {
-        self.tails
-            .iter_mut()
-            .flatten()
-            .for_each(|t| *t = [S::zero(); 3]);
     }
 
     pub(super) fn observe(&mut self, sample: &Sample<'_, S>) {
@@ -55,11 +47,14 @@ impl<S: Scalar> Recorder<S> {
                 self.position[at + i] += sample.measured[i];
             }
         }
-        if k >= self.tail_start() && period + 2 >= self.total {
-            let tail = &mut self.tails[period + 2 - self.total];
-            for (i, sums) in tail.iter_mut().enumerate() {
+        if period + 2 >= self.total {
+            let late = k >= self.tail_start();
+            let sums = &mut self.sums[period + 2 - self.total];
+            for (i, sums) in sums.iter_mut().enumerate() {
                 let u = sample.command[i];
-                sums[0] += sample.measured[i];
+                if late {
+                    sums[0] += sample.measured[i];
+                }
                 sums[1] += u;
                 sums[2] = u.fma(u, sums[2]);
             }
@@ -70,18 +65,19 @@ impl<S: Scalar> Recorder<S> {
         self.period - (self.period / 4).max(1)
     }
 
-    /// Whether the commands of `lane` keep growing: their scatter more than doubles from
+    /// Whether the commands of `lane` keep growing: their scatter more than triples from
     /// one period to the next, which only an unstable loop does once excited steadily.
     pub(super) fn grows(&self, lane: usize) -> bool {
-        let count = (self.period - self.tail_start()) as f64;
+        let count = self.period as f64;
         (0..self.n_axes).any(|i| {
-            let scatter = |tail: &[[S; 3]]| {
-                let (mean, square) = (tail[i][1].lane(lane) / count, tail[i][2].lane(lane) / count);
+            let scatter = |period: usize| {
+                let [_, sum, squares] = self.sums[period][i];
+                let (mean, square) = (sum.lane(lane) / count, squares.lane(lane) / count);
                 (square - mean * mean, square)
             };
-            let ((before, _), (after, size)) = (scatter(&self.tails[0]), scatter(&self.tails[1]));
+            let ((before, _), (after, size)) = (scatter(0), scatter(1));
             // Rounding of a constant command is no scatter.
-            after > 4.0 * before && after > 1e-12 * size
+            after > 9.0 * before && after > 1e-12 * size
         })
     }
 
@@ -102,7 +98,7 @@ impl<S: Scalar> Recorder<S> {
         let measured = (self.total - self.waiting) as f64;
         let count = (self.period - self.tail_start()) as f64;
         for i in 0..n {
-            let tail = |t: usize| self.tails[t][i][0].lane(lane);
+            let tail = |t: usize| self.sums[t][i][0].lane(lane);
             // Drift per period, times the periods summed, per sample.
             let slope = (tail(1) - tail(0)) / count * measured / self.period as f64;
             let samples = (0..self.period).map(|k| {

@@ -144,7 +144,6 @@ fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>,
         settings.waiting_periods,
         settings.periods,
     );
-    recorder.clear();
     let run = Run {
         controller: &settings.robot.controller,
         sample_time: settings.robot.sample_time,
