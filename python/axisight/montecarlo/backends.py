@@ -12,10 +12,7 @@ from typing import Any
 
 from axisight import _core
 from axisight.errors import AxisightError, BackendError, InputError
-from axisight.montecarlo.design import Arrays, compute_block
-
-Task = tuple[int, int]
-"""First run and number of runs of a block."""
+from axisight.montecarlo.design import Arrays, Task, compute_block
 
 
 def available_threads() -> int:

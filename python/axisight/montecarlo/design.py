@@ -20,6 +20,9 @@ from axisight.robot import load_robot
 Arrays = dict[str, NDArray[Any]]
 """The accumulators of a block by name; see ``_core.MonteCarloStudy.block``."""
 
+Task = tuple[int, int]
+"""First run and number of runs of a block."""
+
 
 def freeze(study: Study) -> str:
     """Return the design as canonical JSON, self-contained: the robot's text is inside.

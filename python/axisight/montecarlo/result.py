@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.errors import StoreError
-from axisight.montecarlo.design import core_study
+from axisight.montecarlo.design import Arrays, Task, core_study
 from axisight.montecarlo.store import Store
 from axisight.montecarlo.study import Study
 
@@ -31,31 +33,48 @@ _TITLES = {
 _SQUARED = ("variance_real", "variance_imag", "covariance")
 
 
-def fold(store: Store, study: Study, design: str, tasks: list[tuple[int, int]]) -> xr.Dataset:
-    """Merge the stored blocks in order; one block is in memory at a time."""
-    core = core_study(design)
-    frequency = core.frequency_hz
-    ensemble = _core.MonteCarloEnsemble(
-        len(frequency), core.n_axes, study.statistics.relative_accuracy
-    )
-    failed = []
-    for first, count in tasks:
-        block = store.read(first, count)
-        if block is None:
-            raise StoreError(f"{store.path(first, count)}: damaged while the study ran; resume")
-        ensemble.merge(
-            block["count"],
-            block["moments"],
-            block["bucket_start"],
-            block["bucket"],
-            block["bucket_count"],
+class Fold:
+    """Merges blocks in the order of their runs; one block is in memory at a time.
+
+    Blocks may come in any order: those that come early wait.
+    """
+
+    def __init__(self, study: Study, design: str, tasks: list[Task]) -> None:
+        self._study = study
+        self._core = core_study(design)
+        self._ensemble = _core.MonteCarloEnsemble(
+            len(self._core.frequency_hz), self._core.n_axes, study.statistics.relative_accuracy
         )
-        failed.append(block["failures"])
-    return _dataset(study, core, ensemble, np.concatenate(failed))
+        self._order = deque(tasks)
+        self._early: dict[Task, Arrays] = {}
+        self._failed: list[NDArray[np.uint64]] = []
+
+    def add(self, task: Task, arrays: Arrays) -> None:
+        """Merge a block as soon as all before it are merged."""
+        self._early[task] = arrays
+        while self._order and self._order[0] in self._early:
+            block = self._early.pop(self._order.popleft())
+            self._ensemble.merge(
+                block["count"],
+                block["moments"],
+                block["bucket_start"],
+                block["bucket"],
+                block["bucket_count"],
+            )
+            if len(block["failures"]):
+                self._failed.append(block["failures"])
+
+    def result(self) -> xr.Dataset:
+        """Return the statistics."""
+        failed = np.concatenate([np.empty((0, 4), np.uint64), *self._failed])
+        return _dataset(self._study, self._core, self._ensemble, failed)
 
 
 def _dataset(
-    study: Study, core: _core.MonteCarloStudy, ensemble: _core.MonteCarloEnsemble, failed: Any
+    study: Study,
+    core: _core.MonteCarloStudy,
+    ensemble: _core.MonteCarloEnsemble,
+    failed: NDArray[np.uint64],
 ) -> xr.Dataset:
     dims = ("frequency_hz", "output", "input")
     unit = _UNITS[study.measurement.output]

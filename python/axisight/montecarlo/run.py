@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -12,15 +10,13 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from axisight.errors import InputError, StudyError
+from axisight.errors import InputError, StoreError, StudyError
 from axisight.montecarlo import backends
-from axisight.montecarlo.design import core_study, digest, freeze
+from axisight.montecarlo.design import Arrays, Task, core_study, digest, freeze
 from axisight.montecarlo.progress import Meter, Report
-from axisight.montecarlo.result import fold
+from axisight.montecarlo.result import Fold
 from axisight.montecarlo.store import FORMAT, Store, check_same, open_store
 from axisight.montecarlo.study import Study, read_study
-
-Task = tuple[int, int]
 
 
 def run(
@@ -75,36 +71,44 @@ def run(
         raise InputError(f"threads: expected at least 1, got {threads}")
     design = freeze(study)
     core_study(design)
-    with _folder(out) as folder, open_store(folder) as store:
-        _prepare(store, study, design, resume)
-        meter = Meter(study.runs, progress)
-        tasks = _tasks(study)
-        missing = _missing(store, tasks, meter)
+    tasks = _tasks(study)
+    meter = Meter(study.runs, progress)
+
+    def compute(missing: list[Task]) -> Iterator[tuple[Task, Arrays]]:
         if backend == "local":
             blocks = backends.local_blocks(missing, design, study.seed, threads)
         else:
             blocks = backends.dask_blocks(missing, design, study.seed, scheduler, patience_s)
-        for (first, count), arrays in blocks:
-            store.write(first, count, arrays)
-            meter.finished(count, len(np.unique(arrays["failures"][:, 0])))
-        result = fold(store, study, design, tasks)
-        result.attrs = {**_provenance(study, design), "runs": study.runs}
+        for task, arrays in blocks:
+            yield task, arrays
+            meter.finished(task[1], _n_failed(arrays))
+
+    fold = Fold(study, design, tasks)
+    if out is None:
+        for task, arrays in compute(tasks):
+            fold.add(task, arrays)
+        return fold.result().assign_attrs(_provenance(study, design), runs=study.runs)
+    with open_store(Path(out)) as store:
+        _prepare(store, study, design, resume)
+        for task, arrays in compute(_missing(store, tasks, meter)):
+            store.write(*task, arrays)
+        for task in tasks:
+            stored = store.read(*task)
+            if stored is None:
+                raise StoreError(f"{store.path(*task)}: damaged while the study ran; resume")
+            fold.add(task, stored)
+        result = fold.result().assign_attrs(_provenance(study, design), runs=study.runs)
         store.write_result(result)
     return result
+
+
+def _n_failed(arrays: Arrays) -> int:
+    return len(np.unique(arrays["failures"][:, 0]))
 
 
 def _with(study: Study, **changes: Any) -> Study:
     given = {name: value for name, value in changes.items() if value is not None}
     return Study(**{**study.model_dump(by_alias=True), **given}) if given else study
-
-
-@contextmanager
-def _folder(out: Path | str | None) -> Iterator[Path]:
-    if out is not None:
-        yield Path(out)
-        return
-    with tempfile.TemporaryDirectory(prefix="axisight-") as folder:
-        yield Path(folder)
 
 
 def _tasks(study: Study) -> list[Task]:
@@ -140,7 +144,7 @@ def _missing(store: Store, tasks: list[Task], meter: Meter) -> list[Task]:
             meter.report(f"{store.path(first, count)}: damaged, computed again")
             out.append((first, count))
         else:
-            meter.found(count, len(np.unique(block["failures"][:, 0])))
+            meter.found(count, _n_failed(block))
     return out
 
 

@@ -34,6 +34,10 @@ from axisight.montecarlo.design import Arrays, differences
 FORMAT: Final = "axisight.montecarlo.store/1"
 
 
+# One file per array instead of a tree of folders.
+_FLAT: Final[dict[str, Any]] = {"name": "default", "configuration": {"separator": "."}}
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turn what the disk refuses into a StoreError that names the path."""
@@ -104,7 +108,7 @@ class Store:
             group = zarr.create_group(store=str(new), zarr_format=3, attributes=attributes)
             for name, value in arrays.items():
                 chunks = tuple(max(1, n) for n in value.shape)
-                group.create_array(name, data=value, chunks=chunks)
+                group.create_array(name, data=value, chunks=chunks, chunk_key_encoding=_FLAT)
             shutil.rmtree(path, ignore_errors=True)
             new.rename(path)
             for other in self.blocks.glob(f"{first:08d}-*"):

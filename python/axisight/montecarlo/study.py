@@ -188,6 +188,11 @@ def _message(error: ValidationError) -> str:
     lines = []
     for fault in error.errors():
         where = ".".join(str(part) for part in fault["loc"])
+        inner = fault.get("ctx", {}).get("error")
+        if isinstance(inner, StudyError):
+            # A part of the study found its own faults; they go below this place.
+            lines += [f"{where}.{line}" for line in str(inner).split("; ")]
+            continue
         if fault["type"] == "extra_forbidden":
             lines.append(f"{where}: unknown key")
         elif fault["type"] == "missing":

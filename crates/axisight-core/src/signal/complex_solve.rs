@@ -4,6 +4,11 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
+/// Smallest pivot of a row scaled to one that counts as different from zero: what rounding
+/// leaves of a dependent row is near 1e-15, and simulated records add some hundred times
+/// that.
+const SMALLEST_PIVOT: f64 = 1e-12;
+
 /// Scratch for systems of one size.
 #[derive(Debug, Clone)]
 pub struct SmallSolver {
@@ -75,8 +80,6 @@ impl SmallSolver {
                 self.right[row * n + j] /= scale;
             }
         }
-        // Rounding leaves a few times n EPSILON of a pivot that should be zero.
-        let smallest = 8.0 * n as f64 * f64::EPSILON;
         for column in 0..n {
             let (mut pivot, mut size) = (column, 0.0);
             for row in column..n {
@@ -85,7 +88,7 @@ impl SmallSolver {
                     (pivot, size) = (row, norm);
                 }
             }
-            if size <= smallest {
+            if size <= SMALLEST_PIVOT {
                 return false;
             }
             for j in 0..n {
