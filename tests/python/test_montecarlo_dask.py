@@ -9,7 +9,7 @@ from axisight import BackendError, InputError
 from axisight import montecarlo as mc
 from montecarlo_data import blocks, kill, same_bits, small_study, start, until
 
-pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed")
 
 LONG = {"runs": 200, "block_runs": 4}
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -40,7 +40,7 @@ def cluster(tmp_path):
                 "--local-directory",
                 str(tmp_path / f"worker{i}"),
                 **QUIET,
-            )  # fmt: skip
+            )
             for i in range(2)
         ]
         processes += workers
@@ -51,9 +51,7 @@ def cluster(tmp_path):
 
 
 def present(address: str, count: int) -> None:
-    from distributed import Client
-
-    with Client(address, timeout=20, set_as_default=False) as client:
+    with distributed.Client(address, timeout=20, set_as_default=False) as client:
         client.wait_for_workers(count, timeout=30)
 
 

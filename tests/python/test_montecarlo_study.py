@@ -48,7 +48,7 @@ def changed(path: str, value) -> dict:
     at = data
     for part in parents:
         at = at[int(part)] if part.isdigit() else at[part]
-    at[last] = value
+    at[int(last) if last.isdigit() else last] = value
     return data
 
 

@@ -74,6 +74,7 @@ class _Cluster:
     def __init__(self, scheduler: str | None, patience_s: float) -> None:
         self._patience_s = patience_s
         self._last_seen = time.monotonic()
+        self._next_look = 0.0
         self._window = 2
         self._address = scheduler or "the current client"
         self._client, self._own = _connect(scheduler, min(patience_s, 10.0))
@@ -95,19 +96,25 @@ class _Cluster:
 
     def finished(self, futures: list[Any]) -> list[Any]:
         """Return the futures that are done, after a second at most."""
+        # Futures learn of their end by themselves; `distributed.wait` would need ours to be
+        # the default client of the process.
         self._look()
-        wait_for = _distributed().wait
-        try:
-            done = wait_for(futures, timeout=1.0, return_when="FIRST_COMPLETED").done
-        except TimeoutError:
-            return []
-        return list(done)
+        end = time.monotonic() + 1.0
+        done: list[Any] = []
+        while not done and time.monotonic() < end:
+            time.sleep(0.005)
+            done = [future for future in futures if future.done()]
+        return done
 
     def forget(self, futures: list[Any]) -> None:
         if futures and self._client.status == "running":
             self._client.cancel(futures, force=True)
 
     def _look(self) -> None:
+        """Ask for the workers, once a second."""
+        if time.monotonic() < self._next_look:
+            return
+        self._next_look = time.monotonic() + 1.0
         workers = {}
         if self._client.status == "running":
             try:
