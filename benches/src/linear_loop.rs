@@ -139,8 +139,8 @@ impl PlainLoop {
         let mut nodes = [0.0; 3 * M];
         nodes[..M].copy_from_slice(&start[..M]);
         let mut next = [0.0; N];
-        for i in 0..N {
-            next[i] = (0..N).map(|j| self.phi[i][j] * x[j]).sum();
+        for (next, row) in next.iter_mut().zip(&self.phi) {
+            *next = row.iter().zip(&*x).map(|(a, b)| a * b).sum();
         }
         for i in 0..M {
             let row = &self.middle[i];

@@ -40,7 +40,7 @@ pub struct Run<'a> {
     pub drive: Drive<'a>,
     /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
     pub noise: &'a [&'a [f64]],
-    /// Integrator.
+    /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
     pub method: Method,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,
@@ -325,7 +325,10 @@ pub(super) fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize,
                 let expected = format!("samples of {n_axes} axes");
                 return Err(shape(name, expected, format!("{} numbers", array.len())));
             }
-            if let Some(i) = array.iter().position(|v| !v.is_finite()) {
+            // The whole array first: without an early exit the scan is vector code.
+            let all_finite = array.iter().fold(true, |all, v| all & v.is_finite());
+            let bad = || array.iter().position(|v| !v.is_finite());
+            if let Some(i) = (!all_finite).then(bad).flatten() {
                 let got = format!("{} at sample {}", array[i], i / n_axes);
                 return Err(shape(name, "finite numbers".to_owned(), got));
             }

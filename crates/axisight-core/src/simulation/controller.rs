@@ -70,6 +70,7 @@ impl<S: Scalar> ControlLoop<S> {
         self.previous = Some(lag);
     }
 
+    #[inline(always)]
     fn feedback(&mut self, i: usize, speed_error: S, angle_error: S) -> S {
         match &self.kind {
             Controller::PiVelocity { kp, ki } => speed_error * kp[i] + angle_error * ki[i],

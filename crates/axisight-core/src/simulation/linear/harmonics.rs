@@ -7,6 +7,7 @@
 //! angle; the sine of the rounded product `n phi` is off by `1e-16 n phi`.
 
 use crate::scalar::Scalar;
+use std::collections::{BTreeMap, HashSet};
 
 /// `powers[next] = powers[left] * powers[right]`, the right one conjugated or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,13 +17,25 @@ struct Product {
     conjugate: bool,
 }
 
-/// One harmonic: the power it uses, `n`, and the amplitudes of cosine and sine.
+/// One harmonic: the power it uses, and what cosine and sine contribute.
 #[derive(Debug, Clone, Copy)]
 struct Term {
     power: usize,
-    order: f64,
-    cosine: f64,
-    sine: f64,
+    value: [f64; 2],
+    slope: [f64; 2],
+}
+
+impl Term {
+    /// `None` for an order of zero, which is no harmonic.
+    fn new(order: f64, cosine: f64, sine: f64, powers: &[f64]) -> Option<Self> {
+        #[allow(clippy::float_cmp)] // looked up, not computed
+        let power = powers.iter().position(|v| *v == order)?;
+        Some(Self {
+            power,
+            value: [cosine, sine],
+            slope: [order * sine, -order * cosine],
+        })
+    }
 }
 
 /// Value and slope over the motor angle of a sum of harmonics.
@@ -43,117 +56,152 @@ pub(super) struct Ripple<S> {
     pub(super) resolver: Wave<S>,
 }
 
-/// Ripple tables of one axis over one shared chain.
+/// Ripple parameters of one axis: triples `[n, c, s]`, `n` of zero for none.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RippleTable {
+    /// Torque ripple [Nm].
+    pub(super) constant: Vec<f64>,
+    /// Torque ripple per commanded torque [1].
+    pub(super) proportional: Vec<f64>,
+    /// Resolver ripple [rad].
+    pub(super) resolver: Vec<f64>,
+}
+
+impl RippleTable {
+    fn orders(&self) -> impl Iterator<Item = f64> {
+        let tables = [&self.constant, &self.proportional, &self.resolver];
+        let triples = tables.into_iter().flat_map(|t| t.chunks_exact(3));
+        triples.map(|t| t[0]).filter(|n| *n != 0.0)
+    }
+}
+
+/// Harmonics of one axis.
 #[derive(Debug, Clone)]
-pub(super) struct Waves {
-    chain: Vec<Product>,
-    /// Orders that are not whole, evaluated directly, stored after the chain.
-    direct: Vec<f64>,
+struct Terms {
     constant: Vec<Term>,
     proportional: Vec<Term>,
     resolver: Vec<Term>,
 }
 
+/// Ripple of all axes over one chain: axes mostly have the same orders, and going through
+/// the chain abreast hides the latency of its products.
+#[derive(Debug, Clone)]
+pub(super) struct Waves {
+    chain: Vec<Product>,
+    /// Orders that are not whole, evaluated directly, stored after the chain.
+    direct: Vec<f64>,
+    axes: Vec<Terms>,
+}
+
 impl Waves {
-    /// From triples `[n, c, s]` of torque ripple [Nm], of torque ripple per commanded
-    /// torque [1] and of resolver ripple [rad]; a term of order zero is switched off.
-    pub(super) fn new(constant: &[f64], proportional: &[f64], resolver: &[f64]) -> Self {
-        let tables = [constant, proportional, resolver];
-        let orders = || {
-            let triples = tables.iter().flat_map(|t| t.chunks_exact(3));
-            triples.filter(|t| is_on(t)).map(|t| t[0])
-        };
+    pub(super) fn new(tables: &[RippleTable]) -> Self {
+        let orders = || tables.iter().flat_map(RippleTable::orders);
         let whole: Vec<u32> = orders().filter_map(whole_order).collect();
         let (powers, chain) = addition_chain(&whole);
         let mut direct: Vec<f64> = Vec::new();
         for order in orders().filter(|n| whole_order(*n).is_none()) {
-            #[allow(clippy::float_cmp)] // the same number given twice
-            if !direct.iter().any(|d| *d == order) {
+            if !direct.contains(&order) {
                 direct.push(order);
             }
         }
         let mut values: Vec<f64> = powers.iter().map(|n| f64::from(*n)).collect();
         values.extend(&direct);
         let terms = |table: &[f64]| -> Vec<Term> {
-            let on = table.chunks_exact(3).filter(|t| is_on(t));
-            #[allow(clippy::float_cmp)] // looked up, not computed
-            let found = on.filter_map(|t| {
-                let power = values.iter().position(|v| *v == t[0])?;
-                Some(Term {
-                    power,
-                    order: t[0],
-                    cosine: t[1],
-                    sine: t[2],
-                })
-            });
-            found.collect()
+            let term = |t: &[f64]| Term::new(t[0], t[1], t[2], &values);
+            table.chunks_exact(3).filter_map(term).collect()
         };
+        let axes = tables.iter().map(|table| Terms {
+            constant: terms(&table.constant),
+            proportional: terms(&table.proportional),
+            resolver: terms(&table.resolver),
+        });
         Self {
-            constant: terms(constant),
-            proportional: terms(proportional),
-            resolver: terms(resolver),
+            axes: axes.collect(),
             chain,
             direct,
         }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.constant.is_empty() && self.proportional.is_empty() && self.resolver.is_empty()
+        !self.act_on_torque() && self.axes.iter().all(|a| a.resolver.is_empty())
     }
 
-    pub(super) fn acts_on_torque(&self) -> bool {
-        !(self.constant.is_empty() && self.proportional.is_empty())
+    pub(super) fn act_on_torque(&self) -> bool {
+        let acts = |a: &Terms| !(a.constant.is_empty() && a.proportional.is_empty());
+        self.axes.iter().any(acts)
     }
 
     /// Scratch numbers [`Waves::evaluate`] needs.
     pub(super) fn scratch(&self) -> usize {
-        1 + self.chain.len() + self.direct.len()
+        (1 + self.chain.len() + self.direct.len()) * self.axes.len()
     }
 
     /// Arithmetic operations of one evaluation: 33 per sine and cosine pair, 4 per
     /// product, 4 per term.
     pub(super) fn operations(&self) -> usize {
-        let terms = self.constant.len() + self.proportional.len() + self.resolver.len();
-        let pairs = if terms == 0 { 0 } else { 1 + self.direct.len() };
-        33 * pairs + 4 * self.chain.len() + 4 * terms
+        if self.is_empty() {
+            return 0;
+        }
+        let per_axis = 33 * (1 + self.direct.len()) + 4 * self.chain.len();
+        let terms = |a: &Terms| a.constant.len() + a.proportional.len() + a.resolver.len();
+        let all: usize = self.axes.iter().map(terms).sum();
+        self.axes.len() * per_axis + 4 * all
     }
 
-    /// All sums at `angle` [rad].
+    /// All sums at motor angles `angles` [rad], one per axis.
     #[inline(always)]
-    pub(super) fn evaluate<S: Scalar>(&self, angle: S, powers: &mut [[S; 2]]) -> Ripple<S> {
-        let (sine, cosine) = angle.sin_cos();
-        powers[0] = [cosine, sine];
-        for (i, product) in self.chain.iter().enumerate() {
-            let ([a, b], [c, d]) = (powers[product.left], powers[product.right]);
-            let (bd, bc) = (b * d, b * c);
-            powers[i + 1] = if product.conjugate {
-                [a.fma(c, bd), bc - a * d]
-            } else {
-                [a.fma(c, -bd), a.fma(d, bc)]
-            };
-        }
-        let direct = powers.iter_mut().skip(1 + self.chain.len());
-        for (power, order) in direct.zip(&self.direct) {
-            let (sine, cosine) = (angle * *order).sin_cos();
+    pub(super) fn evaluate<S: Scalar>(
+        &self,
+        angles: &[S],
+        powers: &mut [[S; 2]],
+        out: &mut [Ripple<S>],
+    ) {
+        let m = self.axes.len();
+        for (power, angle) in powers.iter_mut().zip(angles) {
+            let (sine, cosine) = angle.sin_cos();
             *power = [cosine, sine];
         }
-        Ripple {
-            constant: sum(&self.constant, powers),
-            proportional: sum(&self.proportional, powers),
-            resolver: sum(&self.resolver, powers),
+        for (i, product) in self.chain.iter().enumerate() {
+            let (done, next) = powers.split_at_mut((i + 1) * m);
+            let left = done[product.left * m..].iter();
+            let right = done[product.right * m..].iter();
+            let pairs = left.zip(right).zip(&mut next[..m]);
+            if product.conjugate {
+                for (([a, b], [c, d]), power) in pairs {
+                    *power = [a.fma(*c, *b * *d), b.fma(*c, -(*a * *d))];
+                }
+            } else {
+                for (([a, b], [c, d]), power) in pairs {
+                    *power = [a.fma(*c, -(*b * *d)), a.fma(*d, *b * *c)];
+                }
+            }
+        }
+        let direct = powers.chunks_exact_mut(m).skip(1 + self.chain.len());
+        for (row, order) in direct.zip(&self.direct) {
+            for (power, angle) in row.iter_mut().zip(angles) {
+                let (sine, cosine) = (*angle * *order).sin_cos();
+                *power = [cosine, sine];
+            }
+        }
+        for (axis, (terms, out)) in self.axes.iter().zip(out).enumerate() {
+            *out = Ripple {
+                constant: sum(&terms.constant, powers, m, axis),
+                proportional: sum(&terms.proportional, powers, m, axis),
+                resolver: sum(&terms.resolver, powers, m, axis),
+            };
         }
     }
 }
 
 #[inline(always)]
-fn sum<S: Scalar>(terms: &[Term], powers: &[[S; 2]]) -> Wave<S> {
+fn sum<S: Scalar>(terms: &[Term], powers: &[[S; 2]], m: usize, axis: usize) -> Wave<S> {
     let (mut value, mut slope) = (S::zero(), S::zero());
     for term in terms {
-        let [c, s] = powers[term.power];
-        value = c.fma(S::constant(term.cosine), value);
-        value = s.fma(S::constant(term.sine), value);
-        slope = c.fma(S::constant(term.order * term.sine), slope);
-        slope = s.fma(S::constant(-term.order * term.cosine), slope);
+        let [c, s] = powers[term.power * m + axis];
+        value = c.fma(S::constant(term.value[0]), value);
+        value = s.fma(S::constant(term.value[1]), value);
+        slope = c.fma(S::constant(term.slope[0]), slope);
+        slope = s.fma(S::constant(term.slope[1]), slope);
     }
     Wave { value, slope }
 }
@@ -170,6 +218,19 @@ impl<S: Scalar> Wave<S> {
 }
 
 impl<S: Scalar> Ripple<S> {
+    /// No ripple.
+    pub(super) fn zero() -> Self {
+        let none = Wave {
+            value: S::zero(),
+            slope: S::zero(),
+        };
+        Self {
+            constant: none,
+            proportional: none,
+            resolver: none,
+        }
+    }
+
     /// At an angle `by` further on [rad], to first order.
     #[inline(always)]
     pub(super) fn moved(self, by: S) -> Self {
@@ -188,10 +249,6 @@ impl<S: Scalar> Ripple<S> {
             slope: self.proportional.slope.fma(command, self.constant.slope),
         }
     }
-}
-
-fn is_on(triple: &[f64]) -> bool {
-    triple.first().is_some_and(|n| *n != 0.0)
 }
 
 /// `order` as a whole number, if it is one.
@@ -225,12 +282,13 @@ fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>)
             return (reached, products);
         };
         let candidates = one_product_away(&reached);
+        let is_reached: HashSet<u32> = reached.iter().copied().collect();
         let target = candidates.iter().find(|(n, _)| targets.contains(n));
+        // Targets that `n` and something reached would give.
+        let known = |n: u32| is_reached.contains(&n);
         let gain = |n: u32| {
-            let mut further = reached.clone();
-            further.push(n);
-            let next = one_product_away(&further);
-            open().filter(|t| next.iter().any(|(m, _)| m == t)).count()
+            let away = |t: u32| t == 2 * n || known(t.abs_diff(n)) || known(t + n);
+            open().filter(|t| away(*t)).count()
         };
         let chosen = target.or_else(|| {
             let side = |n: u32| {
@@ -240,9 +298,12 @@ fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>)
                     -i64::from(n)
                 }
             };
-            let useful = candidates.iter().filter(|(n, _)| gain(*n) > 0);
-            let best = useful.max_by_key(|(n, _)| (gain(*n), side(*n)));
-            best.or_else(|| candidates.iter().min_by_key(|(n, _)| n.abs_diff(nearest)))
+            let useful = candidates.iter().map(|c| (gain(*c.0), c));
+            let best = useful
+                .filter(|(gain, _)| *gain > 0)
+                .max_by_key(|(gain, c)| (*gain, side(*c.0)));
+            let nearer = || candidates.iter().min_by_key(|(n, _)| n.abs_diff(nearest));
+            best.map(|(_, c)| c).or_else(nearer)
         });
         let Some((n, product)) = chosen else {
             return (reached, products);
@@ -252,33 +313,29 @@ fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>)
     }
 }
 
-fn one_product_away(reached: &[u32]) -> Vec<(u32, Product)> {
-    let mut out = Vec::new();
+/// Exponents one product away, each once, in order.
+fn one_product_away(reached: &[u32]) -> BTreeMap<u32, Product> {
+    let mut out = BTreeMap::new();
     for (left, a) in reached.iter().enumerate() {
         for (right, b) in reached.iter().enumerate() {
+            let mut offer = |n: u32, conjugate: bool| {
+                out.entry(n).or_insert(Product {
+                    left,
+                    right,
+                    conjugate,
+                });
+            };
             if right <= left {
-                out.push((
-                    a + b,
-                    Product {
-                        left,
-                        right,
-                        conjugate: false,
-                    },
-                ));
+                offer(a + b, false);
             }
             if a > b {
-                out.push((
-                    a - b,
-                    Product {
-                        left,
-                        right,
-                        conjugate: true,
-                    },
-                ));
+                offer(a - b, true);
             }
         }
     }
-    out.retain(|(n, _)| !reached.contains(n));
+    for n in reached {
+        out.remove(n);
+    }
     out
 }
 
@@ -290,14 +347,11 @@ mod tests {
     /// Orders and triples of the thesis, Table 8.1.
     const TABLE: [u32; 8] = [2, 3, 10, 12, 18, 36, 48, 72];
 
-    fn triples(orders: &[f64]) -> Vec<f64> {
-        orders.iter().flat_map(|n| [*n, 0.3, -0.7]).collect()
-    }
-
     /// Each product must lead to its exponent, and every target must be reached.
     #[test]
     fn chains_reach_their_targets() {
-        let sets: [&[u32]; 5] = [&TABLE, &[1], &[499, 500], &[7, 131], &[]];
+        let many: Vec<u32> = (1..60).map(|i| i * i % 499 + 1).collect();
+        let sets: [&[u32]; 6] = [&TABLE, &[1], &[499, 500], &[7, 131], &[], &many];
         for targets in sets {
             let (reached, products) = addition_chain(targets);
             assert_eq!(reached.len(), products.len() + 1);
@@ -313,42 +367,51 @@ mod tests {
         assert!(addition_chain(&TABLE).1.len() <= 9);
     }
 
+    /// Ripple of the second of two axes.
+    fn wave_at<S: Scalar>(waves: &Waves, angle: S) -> Ripple<S> {
+        let mut powers = vec![[S::zero(); 2]; waves.scratch()];
+        let mut out = [Ripple::zero(); 2];
+        waves.evaluate(&[S::zero(), angle], &mut powers, &mut out);
+        out[1]
+    }
+
     /// `n * 5e-16` is 3.6e-14 for 72; the reference adds the rounding of `n phi`, 2.5e-14.
     #[test]
     fn powers_match_the_standard_library() {
         for order in TABLE {
             let n = f64::from(order);
-            let all: Vec<f64> = TABLE.iter().map(|n| f64::from(*n)).collect();
-            let mut table = triples(&all);
-            for t in table.chunks_exact_mut(3) {
-                if t[0] != n {
-                    (t[1], t[2]) = (0.0, 0.0);
-                }
+            // All orders are in the chain, one has an amplitude.
+            let one = |m: &u32| [f64::from(*m), 0.3, -0.7].map(|v| v * f64::from(*m == order));
+            let mut constant: Vec<f64> = TABLE.iter().flat_map(one).collect();
+            for (triple, m) in constant.chunks_exact_mut(3).zip(TABLE) {
+                triple[0] = f64::from(m);
             }
-            let waves = Waves::new(&table, &[], &[]);
-            let mut powers = vec![[0.0; 2]; waves.scratch()];
-            for i in -3000..3000 {
-                let angle = f64::from(i) * std::f64::consts::PI / 3000.0;
-                let got = waves.evaluate(angle, &mut powers).constant;
+            let table = RippleTable {
+                constant,
+                ..RippleTable::default()
+            };
+            let waves = Waves::new(&[RippleTable::default(), table]);
+            for i in -1000..1000 {
+                let angle = f64::from(i) * std::f64::consts::PI / 1000.0;
+                let got = wave_at(&waves, angle).constant;
                 let (s, c) = (n * angle).sin_cos();
-                assert!(
-                    (got.value - (0.3 * c - 0.7 * s)).abs() < 1e-13,
-                    "{n} {angle}"
-                );
-                assert!(
-                    (got.slope / n - (-0.3 * s - 0.7 * c)).abs() < 1e-13,
-                    "{n} {angle}"
-                );
+                let (value, slope) = (0.3 * c - 0.7 * s, -0.3 * s - 0.7 * c);
+                assert!((got.value - value).abs() < 1e-13, "{n} {angle}");
+                assert!((got.slope / n - slope).abs() < 1e-13, "{n} {angle}");
             }
         }
     }
 
     #[test]
     fn fractional_and_absent_orders() {
-        let waves = Waves::new(&[2.5, 0.3, -0.7, 0.0, 9.0, 9.0], &[], &triples(&[3.0, 2.5]));
+        let table = RippleTable {
+            constant: vec![2.5, 0.3, -0.7, 0.0, 9.0, 9.0],
+            proportional: Vec::new(),
+            resolver: vec![3.0, 0.3, -0.7, 2.5, 0.3, -0.7],
+        };
         let angle = Lanes([0.4, -1.3, 2.0, 17.0]);
-        let mut powers = vec![[Lanes([0.0; 4]); 2]; waves.scratch()];
-        let got = waves.evaluate(angle, &mut powers);
+        let waves = Waves::new(&[RippleTable::default(), table]);
+        let got = wave_at(&waves, angle);
         for lane in 0..4 {
             let wave = |n: f64| {
                 let (s, c) = (n * angle.0[lane]).sin_cos();
@@ -359,7 +422,6 @@ mod tests {
             assert!((got.resolver.value.0[lane] - resolver).abs() < 1e-14);
             assert!(got.proportional.value.0[lane].abs() <= 0.0);
         }
-        assert!(waves.acts_on_torque() && !waves.is_empty());
-        assert!(Waves::new(&[], &[], &[]).is_empty());
+        assert!(Waves::new(&[RippleTable::default()]).is_empty());
     }
 }

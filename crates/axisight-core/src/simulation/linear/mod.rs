@@ -3,7 +3,7 @@
 //! Between samples the deviation from rest obeys `x' = A x + B (tau + v)`, with the torque
 //! `tau` of the drive and the torque ripple `v(phi, u)`. What is linear is propagated by the
 //! matrix exponential, exactly; only the ripple is approximated, with global order 4 in
-//! the step (see [`propagator`]).
+//! the step.
 //!
 //! | effect | treatment |
 //! |---|---|
@@ -19,5 +19,5 @@ mod propagator;
 mod sampled;
 mod tiles;
 
-pub use plant::{LinearPlant, LinearPlantError};
+pub use plant::{LinearPlant, LinearPlantError, Operations};
 pub use sampled::simulate_linear;

@@ -1,6 +1,6 @@
 //! What the linear loop needs to know of a robot, computed once.
 
-use super::harmonics::Waves;
+use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
 use crate::effects::{self, Acts, EffectError, Kernel, Role};
 use crate::robot::{
@@ -60,8 +60,6 @@ pub(super) struct LinearAxis {
     pub(super) viscous: f64,
     /// Effects on the commanded torque.
     path: Vec<EffectSetting<f64>>,
-    /// Torque and resolver ripple.
-    pub(super) waves: Waves,
 }
 
 /// A robot linearized about rest, with its ripple and torque path, ready for
@@ -74,6 +72,8 @@ pub struct LinearPlant {
     /// State at rest, `[phi, q, phi', q']`.
     pub(super) rest: Vec<f64>,
     pub(super) axes: Vec<LinearAxis>,
+    /// Torque and resolver ripple of all axes.
+    pub(super) waves: Waves,
     /// Propagation over one sample of the robot.
     pub(super) propagator: Propagator,
 }
@@ -108,6 +108,7 @@ impl LinearPlant {
             start: start.to_vec(),
             rest: whole.state_at_rest(&at.motor_angle, &at.joint_angle),
             propagator: Propagator::new(&linear.a, &linear.b, robot.sample_time),
+            waves: Waves::new(&ripple_tables(settings, axes.len())),
             linear,
             axes,
         })
@@ -131,19 +132,10 @@ impl LinearPlant {
     /// Multiplications and additions of one step of one run, by part; an `a * b + c` counts
     /// once. For statements of efficiency.
     pub fn operations(&self) -> Operations {
-        let ripple = self.has_torque_ripple();
         Operations {
-            propagation: self.propagator.operations(ripple),
-            harmonics: self.axes.iter().map(|a| a.waves.operations()).sum(),
+            propagation: self.propagator.operations(self.waves.act_on_torque()),
+            harmonics: self.waves.operations(),
         }
-    }
-
-    pub(super) fn has_torque_ripple(&self) -> bool {
-        self.axes.iter().any(|a| a.waves.acts_on_torque())
-    }
-
-    pub(super) fn has_waves(&self) -> bool {
-        self.axes.iter().any(|a| !a.waves.is_empty())
     }
 }
 
@@ -187,6 +179,28 @@ fn treatment(setting: &EffectSetting<f64>) -> Result<Treatment, LinearPlantError
     })
 }
 
+/// Ripple parameters by axis.
+fn ripple_tables(settings: &[EffectSetting<f64>], n_axes: usize) -> Vec<RippleTable> {
+    let mut tables = vec![RippleTable::default(); n_axes];
+    for setting in settings {
+        let Some(table) = setting.axis.and_then(|i| tables.get_mut(i)) else {
+            continue;
+        };
+        let parameters = &setting.parameters;
+        match setting.name.as_str() {
+            "torque_ripple" => {
+                // Three harmonics of constant size, then one in proportion to the command.
+                let (constant, proportional) = parameters.split_at(parameters.len().min(9));
+                table.constant.extend_from_slice(constant);
+                table.proportional.extend_from_slice(proportional);
+            }
+            "resolver_ripple" => table.resolver.extend_from_slice(parameters),
+            _ => {}
+        }
+    }
+    tables
+}
+
 impl LinearAxis {
     fn new(
         index: usize,
@@ -198,16 +212,6 @@ impl LinearAxis {
         let path: Vec<_> = mine()
             .filter(|s| effects::info(&s.name).is_ok_and(|i| i.acts == Acts::TorquePath))
             .cloned()
-            .collect();
-        let (mut constant, mut proportional) = (Vec::new(), Vec::new());
-        for setting in named("torque_ripple") {
-            // Three harmonics of constant size, then one in proportion to the command.
-            let (c, p) = setting.parameters.split_at(setting.parameters.len().min(9));
-            constant.extend_from_slice(c);
-            proportional.extend_from_slice(p);
-        }
-        let resolver: Vec<f64> = named("resolver_ripple")
-            .flat_map(|s| s.parameters.iter().copied())
             .collect();
         let no_angle = LinearPlantError::NoMotorAngle { axis: index + 1 };
         let (slot, scale) = (0..linear.c.ncols())
@@ -225,7 +229,6 @@ impl LinearAxis {
                 .filter_map(|s| s.parameters.first())
                 .sum(),
             path,
-            waves: Waves::new(&constant, &proportional, &resolver),
         };
         let kernels = axis
             .path_kernels::<f64>()

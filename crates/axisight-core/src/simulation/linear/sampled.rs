@@ -82,6 +82,8 @@ struct LinearLoop<'a, S> {
     /// Ripple at the present motor angles.
     ripple: Vec<Ripple<S>>,
     powers: Vec<[S; 2]>,
+    /// Predicted motor angles [rad].
+    angles: Vec<S>,
     /// `[t_0, d_0, x]`: torque and its change over the step, deviation of the state; padded.
     input: Vec<S>,
     /// Predicted deviation at the end of the step, padded.
@@ -117,19 +119,15 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 run.sample_time,
             ));
         }
-        let scratch = plant.axes.iter().map(|a| a.waves.scratch()).max();
-        let mut powers = vec![[S::zero(); 2]; scratch.unwrap_or(1)];
-        let ripple = plant
-            .axes
-            .iter()
-            .map(|axis| axis.waves.evaluate(S::constant(axis.angle), &mut powers))
-            .collect();
+        let mut powers = vec![[S::zero(); 2]; plant.waves.scratch()];
+        let mut ripple = vec![Ripple::zero(); m];
+        plant.waves.evaluate(&angle, &mut powers, &mut ripple);
         let padded = Tiles::padded(n);
         Ok(Self {
             plant,
             propagator,
             substeps,
-            torque_ripple: plant.has_torque_ripple(),
+            torque_ripple: plant.waves.act_on_torque(),
             controller: ControlLoop::new(run.controller, run.sample_time, &angle, &torque),
             paths,
             signals: Signals::new(m),
@@ -137,6 +135,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             lines: vec![Vec::with_capacity(substeps); m],
             ripple,
             powers,
+            angles: angle,
             input: vec![S::zero(); 2 * m + padded],
             predicted: vec![S::zero(); padded],
             missed: vec![S::zero(); 2 * m],
@@ -197,13 +196,20 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             self.correct();
         } else {
             self.input[2 * m..].copy_from_slice(&self.predicted);
-            if self.plant.has_waves() {
-                for (i, axis) in self.plant.axes.iter().enumerate() {
-                    let angle = self.predicted[axis.slot] * axis.scale + axis.angle;
-                    self.ripple[i] = axis.waves.evaluate(angle, &mut self.powers);
-                }
+            if !self.plant.waves.is_empty() {
+                self.ripple_at_prediction();
             }
         }
+    }
+
+    /// Evaluate the ripple at the predicted motor angles.
+    #[inline(always)]
+    fn ripple_at_prediction(&mut self) {
+        for (angle, axis) in self.angles.iter_mut().zip(&self.plant.axes) {
+            *angle = self.predicted[axis.slot] * axis.scale + axis.angle;
+        }
+        let waves = &self.plant.waves;
+        waves.evaluate(&self.angles, &mut self.powers, &mut self.ripple);
     }
 
     /// Correct the prediction for the ripple at its end.
@@ -211,10 +217,9 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
     fn correct(&mut self) {
         let (n, m) = (self.plant.n_states(), self.plant.n_axes());
         let step = self.propagator.step;
+        self.ripple_at_prediction();
         for (i, axis) in self.plant.axes.iter().enumerate() {
-            let angle = self.predicted[axis.slot] * axis.scale + axis.angle;
             let speed = self.predicted[axis.slot + n / 2] * (axis.scale * step);
-            self.ripple[i] = axis.waves.evaluate(angle, &mut self.powers);
             let ripple = self.ripple[i].torque(self.signals.command[i]);
             self.missed[i] += ripple.value;
             self.missed[m + i] = ripple.slope.fma(speed, self.missed[m + i]);

@@ -4,7 +4,8 @@ use crate::scalar::Scalar;
 use nalgebra::DMatrix;
 
 /// Rows computed together. Eight independent sums of two-register lanes cover the latency
-/// of a fused multiply-add, and fit the register file with the broadcast entries.
+/// of a fused multiply-add, and fit the register file with the broadcast entries. (Registers
+/// of 512 bits did not pay: the chain of harmonics waits for latency, not for width.)
 const ROWS: usize = 4;
 
 /// A matrix in tiles of [`ROWS`] rows, each stored column by column; rows are padded
