@@ -125,7 +125,7 @@ def test_t2_and_hadamard_directions():
     ]
     assert relative(means[1], means[0]) < 1e-8
     assert np.array_equal(means[1], means[2])
-    with pytest.raises(StudyError, match="directions.*power of two"):
+    with pytest.raises(StudyError, match=r"directions.*power of two"):
         mc.run(
             small_study(excitation=mc.Excitation(multisine=multisine, directions="hadamard")),
             runs=1,

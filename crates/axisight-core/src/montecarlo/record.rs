@@ -13,7 +13,7 @@ pub(super) struct Recorder<S> {
     period: usize,
     waiting: usize,
     total: usize,
-    /// Sums over the measured periods, row-major `(sample, axis)`.
+    /// Sums over the measured periods, `(axis, sample)`: each axis is transformed by itself.
     command: Vec<S>,
     position: Vec<S>,
     /// Over the last two periods, per axis: sums of position (last quarter of the period
@@ -37,14 +37,15 @@ impl<S: Scalar> Recorder<S> {
 
     pub(super) fn observe(&mut self, sample: &Sample<'_, S>) {
         let (period, k) = (sample.index / self.period, sample.index % self.period);
-        let at = k * self.n_axes;
-        if period == self.waiting {
-            self.command[at..at + self.n_axes].copy_from_slice(sample.command);
-            self.position[at..at + self.n_axes].copy_from_slice(sample.measured);
-        } else if period > self.waiting {
-            for i in 0..self.n_axes {
-                self.command[at + i] += sample.command[i];
-                self.position[at + i] += sample.measured[i];
+        for i in 0..self.n_axes {
+            let at = i * self.period + k;
+            let (u, y) = (sample.command[i], sample.measured[i]);
+            if period == self.waiting {
+                self.command[at] = u;
+                self.position[at] = y;
+            } else if period > self.waiting {
+                self.command[at] += u;
+                self.position[at] += y;
             }
         }
         if period + 2 >= self.total {
@@ -101,14 +102,13 @@ impl<S: Scalar> Recorder<S> {
             let tail = |t: usize| self.sums[t][i][0].lane(lane);
             // Drift per period, times the periods summed, per sample.
             let slope = (tail(1) - tail(0)) / count * measured / self.period as f64;
-            let samples = (0..self.period).map(|k| {
-                let at = k * n + i;
-                let drift = slope * k as f64;
-                (
-                    self.command[at].lane(lane),
-                    self.position[at].lane(lane) - drift,
-                )
-            });
+            let own = i * self.period..(i + 1) * self.period;
+            let (command, position) = (&self.command[own.clone()], &self.position[own]);
+            let samples = command
+                .iter()
+                .zip(position)
+                .enumerate()
+                .map(|(k, (u, y))| (u.lane(lane), y.lane(lane) - slope * k as f64));
             dft.pair(samples, lines, scratch, |line, u, y| {
                 out.input[line * n + i] = u / measured;
                 out.output[line * n + i] = y / measured;
