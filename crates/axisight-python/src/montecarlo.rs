@@ -272,7 +272,7 @@ impl MonteCarloEnsemble {
         bucket_count: PyReadonlyArray1<'_, u64>,
     ) -> PyResult<()> {
         let counts: Vec<u64> = count.as_array().iter().copied().collect();
-        if counts.len() % 2 != 0 {
+        if !counts.len().is_multiple_of(2) {
             return Err(input_error("count: expected shape (2, n)"));
         }
         let (count, inverse_count) = counts.split_at(counts.len() / 2);

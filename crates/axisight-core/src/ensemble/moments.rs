@@ -2,7 +2,7 @@
 //!
 //! Per element: arithmetic mean and covariance of (re, im), mean and variance of the
 //! log magnitude, mean direction, and mean of the inverse matrix's element. One value at
-//! a time by Welford (1962), two accumulators by Chan, Golub, LeVeque (1983). Merging is
+//! a time by Welford (1962), two accumulators by Chan, Golub, `LeVeque` (1983). Merging is
 //! associative to rounding; whoever needs the same bits merges in one fixed order.
 
 use super::MergeError;

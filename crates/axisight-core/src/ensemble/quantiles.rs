@@ -2,7 +2,7 @@
 //!
 //! Bucket `i` holds `(g^(i-1), g^i]` with `g = (1 + a) / (1 - a)`, so its midpoint
 //! `2 g^i / (g + 1)` is within a factor `1 ± a` of everything in it. Masson, Rim, Lee
-//! (2019), "DDSketch", PVLDB 12(12). Counts are integers: merging is exactly associative
+//! (2019), `DDSketch`, PVLDB 12(12). Counts are integers: merging is exactly associative
 //! and commutative. Buckets are kept sparse and never collapsed; a magnitude range of
 //! 10^6 at one per cent accuracy fills 691 of them at most.
 

@@ -22,7 +22,7 @@ pub fn directions(name: &str, n: usize) -> Result<Vec<f64>, ExcitationError> {
         "t2" => Err(wrong("three axes")),
         "hadamard" if n.is_power_of_two() => Ok((0..n * n)
             .map(|i| {
-                let odd = (i / n & i % n).count_ones() % 2 == 1;
+                let odd = ((i / n) & (i % n)).count_ones() % 2 == 1;
                 if odd { -1.0 } else { 1.0 }
             })
             .collect()),

@@ -21,7 +21,9 @@ pub struct ExcitationError {
 }
 
 impl ExcitationError {
-    fn new(field: &'static str, expected: impl Into<String>, got: impl ToString) -> Self {
+    // Callers hand over numbers and fresh strings alike.
+    #[allow(clippy::needless_pass_by_value)]
+    fn new(field: &'static str, expected: impl Into<String>, got: impl std::fmt::Display) -> Self {
         Self {
             field,
             expected: expected.into(),

@@ -99,7 +99,9 @@ impl Multisine {
         let mut x = self.dft.sum_of_sines(&self.lines, &flat, phases);
         let largest = x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let scale = self.peak / largest;
-        x.iter_mut().for_each(|v| *v *= scale);
+        for v in &mut x {
+            *v *= scale;
+        }
         x
     }
 }

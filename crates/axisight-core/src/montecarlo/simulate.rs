@@ -38,7 +38,7 @@ pub(super) enum GroupPlant {
         substeps: usize,
     },
     Nonlinear {
-        robot: RobotDescription,
+        robot: Box<RobotDescription>,
         effects: Vec<EffectSetting<f64>>,
         method: Method,
     },
@@ -59,7 +59,7 @@ impl GroupPlant {
                 substeps,
             }),
             Model::Nonlinear(method) => Ok(Self::Nonlinear {
-                robot: robot.clone(),
+                robot: Box::new(robot.clone()),
                 effects: effects.to_vec(),
                 method,
             }),

@@ -75,7 +75,9 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    pub(super) fn field(field: &'static str, expected: &str, got: impl ToString) -> Self {
+    // Callers hand over numbers and fresh strings alike.
+    #[allow(clippy::needless_pass_by_value)]
+    pub(super) fn field(field: &'static str, expected: &str, got: impl std::fmt::Display) -> Self {
         Self::Field {
             field,
             expected: expected.to_owned(),
