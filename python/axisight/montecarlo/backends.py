@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any
@@ -13,6 +13,10 @@ from typing import Any
 from axisight import _core
 from axisight.errors import AxisightError, BackendError, InputError
 from axisight.montecarlo.design import Arrays, Task, compute_block
+
+_FETCH_S = 10.0
+"""Longest time to fetch one block from a worker [s]; it is asked for again after that."""
+_MOST_MISSES = 20
 
 
 def available_threads() -> int:
@@ -57,13 +61,20 @@ def dask_blocks(
     with _Cluster(scheduler, patience_s) as cluster:
         waiting = deque(tasks)
         active: dict[Any, Task] = {}
+        misses: Counter[Task] = Counter()
         try:
             while waiting or active:
                 while waiting and len(active) < cluster.window():
                     task = waiting.popleft()
                     active[cluster.submit(design, seed, *task)] = task
                 for future in cluster.finished(list(active)):
-                    yield active.pop(future), _outcome(future)
+                    arrays = _outcome(future)
+                    if arrays is not None:
+                        yield active.pop(future), arrays
+                        continue
+                    misses[active[future]] += 1
+                    if misses[active[future]] > _MOST_MISSES:
+                        raise BackendError(f"runs from {active[future][0]}: cannot be fetched")
         finally:
             cluster.forget(list(active))
 
@@ -103,7 +114,8 @@ class _Cluster:
         done: list[Any] = []
         while not done and time.monotonic() < end:
             time.sleep(0.005)
-            done = [future for future in futures if future.done()]
+            # A result that died with its worker is "lost" until another computes it again.
+            done = [f for f in futures if f.done() and f.status != "lost"]
         return done
 
     def forget(self, futures: list[Any]) -> None:
@@ -159,10 +171,19 @@ def _connect(scheduler: str | None, timeout_s: float) -> tuple[Any, bool]:
     return client, True
 
 
-def _outcome(future: Any) -> Arrays:
+def _outcome(future: Any) -> Arrays | None:
+    """Return a finished block, or None if its worker died before it was fetched."""
     if future.status == "finished":
-        arrays: Arrays = future.result()
-        return arrays
+        try:
+            arrays: Arrays = future.result(timeout=_FETCH_S)
+            return arrays
+        except TimeoutError:
+            return None
+        except Exception:
+            if future.status in ("finished", "lost", "pending"):
+                return None
+    if future.status in ("lost", "pending"):
+        return None
     error = future.exception() if future.status == "error" else None
     if isinstance(error, AxisightError):
         raise error
