@@ -1,13 +1,17 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
+from axisight import montecarlo
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
+    BackendError,
     CaseError,
     ConvergenceError,
     InputError,
     LogError,
     RobotError,
+    StoreError,
+    StudyError,
 )
 from axisight.fitting import (
     FitOptions,
@@ -27,6 +31,7 @@ from axisight.simulation import simulate, simulate_batch
 
 __all__ = [
     "AxisightError",
+    "BackendError",
     "Case",
     "CaseError",
     "ConvergenceError",
@@ -42,6 +47,8 @@ __all__ = [
     "Robot",
     "RobotError",
     "Settings",
+    "StoreError",
+    "StudyError",
     "Weighting",
     "check_log",
     "diagnose",
@@ -50,6 +57,7 @@ __all__ = [
     "effect_table",
     "fit",
     "load_robot",
+    "montecarlo",
     "plot_gap_map",
     "plot_log",
     "plot_overlay",

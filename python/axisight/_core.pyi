@@ -11,7 +11,7 @@ simulation returns early with status "cancelled" and a fit raises KeyboardInterr
 """
 
 from collections.abc import Sequence
-from typing import Literal, Protocol, TypeAlias, TypedDict, final, type_check_only
+from typing import Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 __all__ = [
     "CancelToken",
     "FitResult",
+    "MonteCarloEnsemble",
+    "MonteCarloStudy",
     "Robot",
     "__version__",
     "effect_table",
+    "failure_kinds",
     "fit_inverse_dynamics",
     "fit_simulation",
     "measurement_noise",
@@ -480,3 +483,92 @@ def fit_inverse_dynamics(
     shape (n_samples, n_axes), motor side, one per log. ``weighting`` has one entry per axis.
     ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
     """
+
+@type_check_only
+class MonteCarloBlock(TypedDict):
+    """Accumulators of a block of runs; elements run over (line, output, input)."""
+
+    # (2, n): responses counted, inverse responses counted.
+    count: NDArray[np.uint64]
+    # (11, n): statistics in the order of the core's `STATISTICS`.
+    moments: NDArray[np.float64]
+    # Magnitude histograms: first bucket of each element (n + 1), buckets, counts.
+    bucket_start: NDArray[np.uint64]
+    bucket: NDArray[np.int32]
+    bucket_count: NDArray[np.uint64]
+    # (n_failures, 4): run, code in `failure_kinds`, experiment from 0, detail.
+    failures: NDArray[np.uint64]
+    # (run, line, output, input), NaN where a run failed; when asked for.
+    responses: NotRequired[NDArray[np.complex128]]
+
+@final
+class MonteCarloStudy:
+    """A checked Monte Carlo study; immutable, so threads may share it.
+
+    ``square``: amplitude [rad/s], period [s], smoothing samples. ``direction_matrix``:
+    (axis, experiment), row-major, in the place of the named ``directions``. ``spread``:
+    parameter, distribution, relative and absolute scale.
+    """
+
+    def __new__(
+        cls,
+        robot: Robot,
+        effects: _Effects,
+        *,
+        model: str,
+        method: str,
+        substeps: int,
+        tolerance: float,
+        start: Sequence[float] | None,
+        period_s: float,
+        band_hz: tuple[float, float],
+        grid: str,
+        peak_rad_s: float,
+        square: tuple[float, float, int] | None,
+        directions: str,
+        direction_matrix: Sequence[float] | None,
+        waiting_periods: int,
+        periods: int,
+        noise: bool,
+        noise_cutoff_hz: float | None,
+        resolution: float,
+        output: str,
+        spread: Sequence[tuple[str, str, float, float]],
+        relative_accuracy: float,
+    ) -> MonteCarloStudy: ...
+    @property
+    def n_axes(self) -> int: ...
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]: ...
+    def reference(self, seed: int, run: int, experiment: int) -> NDArray[np.float64]:
+        """Return the velocity references of one experiment, (n_samples, n_axes) [rad/s]."""
+    def block(
+        self,
+        seed: int,
+        first: int,
+        count: int,
+        *,
+        keep_responses: bool = False,
+        cancel: CancelToken | None = None,
+    ) -> MonteCarloBlock | None:
+        """Return the accumulators of runs first to first + count - 1; None when cancelled."""
+
+def failure_kinds() -> list[str]:
+    """Return the names of the failure codes."""
+
+@final
+class MonteCarloEnsemble:
+    """Accumulators of a study, merged block by block."""
+
+    def __new__(cls, lines: int, n_axes: int, relative_accuracy: float) -> MonteCarloEnsemble: ...
+    def merge(
+        self,
+        count: NDArray[np.uint64],
+        moments: NDArray[np.float64],
+        bucket_start: NDArray[np.uint64],
+        bucket: NDArray[np.int32],
+        bucket_count: NDArray[np.uint64],
+    ) -> None:
+        """Add the accumulators of a block."""
+    def summary(self, quantiles: Sequence[float]) -> dict[str, NDArray[Any]]:
+        """Return statistics, arrays (line, output, input); quantiles lead."""

@@ -1,4 +1,4 @@
-"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``effects``, ``demo``."""
+"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``effects``, ``montecarlo``, ``demo``."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from axisight.cli_common import ERR as _err
+from axisight.cli_common import OUT as _out
+from axisight.cli_common import errors as _errors
+from axisight.cli_montecarlo import montecarlo_command
 from axisight.demo import write_demo_case
 from axisight.effects import effect_table
-from axisight.errors import AxisightError, InputError
+from axisight.errors import InputError
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import read_inputs
 from axisight.gap.result import write_bytes
@@ -33,23 +36,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-_out = Console()
-_err = Console(stderr=True)
+app.command("montecarlo")(montecarlo_command)
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
-
-
-@contextmanager
-def _errors() -> Iterator[None]:
-    """Turn our errors into a message and exit status 2, Ctrl-C into status 130."""
-    try:
-        yield
-    except AxisightError as error:
-        _err.print(f"[red]error:[/] {error}", highlight=False, markup=True, soft_wrap=True)
-        raise typer.Exit(2) from None
-    except KeyboardInterrupt:
-        _err.print("stopped; nothing was written")
-        raise typer.Exit(130) from None
 
 
 @contextmanager

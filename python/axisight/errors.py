@@ -23,3 +23,15 @@ class RobotError(InputError):
 
 class ConvergenceError(AxisightError, RuntimeError):
     """An iteration that the caller demanded to converge did not."""
+
+
+class StudyError(InputError):
+    """A Monte Carlo study cannot be used, or is not the one a store was made with."""
+
+
+class StoreError(AxisightError):
+    """A store of results cannot be written or read; what was finished before is kept."""
+
+
+class BackendError(AxisightError):
+    """Workers or their scheduler are out of reach; what was finished before is kept."""

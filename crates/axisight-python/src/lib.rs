@@ -7,6 +7,7 @@ mod convert;
 mod effects;
 mod entry;
 mod fit;
+mod montecarlo;
 mod robot;
 mod simulation;
 
@@ -36,5 +37,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
+    module.add_class::<montecarlo::MonteCarloStudy>()?;
+    module.add_class::<montecarlo::MonteCarloEnsemble>()?;
+    module.add_function(wrap_pyfunction!(montecarlo::failure_kinds, module)?)?;
     Ok(())
 }

@@ -1,5 +1,10 @@
-//! Signals: weighting of residuals over frequency.
+//! Signals: weighting of residuals over frequency, the Fourier transform of periodic
+//! records, small complex systems.
 
+mod complex_solve;
+mod dft;
 mod weighting;
 
+pub use complex_solve::SmallSolver;
+pub use dft::{Dft, DftScratch};
 pub use weighting::{Weighting, WeightingError};

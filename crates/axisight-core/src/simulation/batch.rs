@@ -218,7 +218,7 @@ impl Group<'_> {
             None => {
                 let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
                 let stepper = if batch.method.may_be_implicit() {
-                    Stepper::with_jacobian(&plant, batch.robot, &[], batch.settings)?
+                    Stepper::with_jacobian(&plant, batch.robot, batch.settings)?
                 } else {
                     Stepper::new(&plant)
                 };

@@ -26,6 +26,14 @@ impl<S: Scalar> Line<S> {
         self.mean + self.slope * (s - 0.5)
     }
 
+    /// The line of the first lane in plain numbers.
+    pub(super) fn first_lane(&self) -> Line<f64> {
+        Line {
+            mean: self.mean.lane(0),
+            slope: self.slope.lane(0),
+        }
+    }
+
     /// Change of the torque over the sub-step.
     #[inline(always)]
     pub(super) fn rise(&self) -> S {

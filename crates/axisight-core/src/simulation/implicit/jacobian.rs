@@ -1,8 +1,6 @@
 //! Exact Jacobian of the plant by dual numbers.
 
-use crate::robot::{
-    DynamicsScratch, EffectSetting, Parameter, Plant, PlantError, RobotDescription,
-};
+use crate::robot::{DynamicsScratch, EffectSetting, Plant, PlantError, RobotDescription};
 use crate::scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 
@@ -23,15 +21,10 @@ pub(super) struct JacobianPlant {
 impl JacobianPlant {
     pub(super) fn new(
         robot: &RobotDescription,
-        overrides: &[(Parameter, f64)],
         settings: &[EffectSetting<f64>],
     ) -> Result<Self, PlantError> {
-        let overrides: Vec<_> = overrides
-            .iter()
-            .map(|(p, v)| (*p, D::constant(*v)))
-            .collect();
         let settings: Vec<_> = settings.iter().map(EffectSetting::lifted).collect();
-        let plant = Plant::<D>::new(robot, &overrides, &settings)?;
+        let plant = Plant::<D>::new(robot, &[], &settings)?;
         Ok(Self {
             scratch: plant.scratch(),
             x: vec![D::zero(); plant.n_states()],

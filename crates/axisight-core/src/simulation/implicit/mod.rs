@@ -7,7 +7,7 @@ mod rosenbrock;
 
 use super::method::{Effort, Interval, MAX_SUBSTEPS, Method, Stepper};
 use super::torque_path::{Line, SampleTorque};
-use crate::robot::{EffectSetting, Parameter, Plant, PlantError, RobotDescription};
+use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
 use crate::scalar::Scalar;
 use jacobian::JacobianPlant;
 use nalgebra::DMatrix;
@@ -27,42 +27,44 @@ pub(super) trait Implicit<S: Scalar>: Send {
     ) -> bool;
 }
 
-impl Stepper<f64> {
-    /// Scratch for the plant of `robot` with `overrides` and `settings`, any method.
+impl<S: Scalar> Stepper<S> {
+    /// Scratch for `plant`, which is that of `robot` with `settings`, for any method.
+    ///
+    /// Implicit methods take one run at a time and carry no derivatives; for other scalars
+    /// this is [`Stepper::new`].
     ///
     /// # Errors
     /// [`PlantError`] as for the plant itself.
     pub fn with_jacobian(
-        plant: &Plant<f64>,
+        plant: &Plant<S>,
         robot: &RobotDescription,
-        overrides: &[(Parameter, f64)],
         settings: &[EffectSetting<f64>],
     ) -> Result<Self, PlantError> {
         let mut stepper = Self::new(plant);
-        stepper.implicit = Some(Box::new(Solver {
-            slopes: Slopes::new(plant, JacobianPlant::new(robot, overrides, settings)?),
-            radau: RadauIia::new(plant.n_states()),
-            rosenbrock: Rosenbrock::new(plant.n_states()),
-            fraction: 1.0,
-        }));
+        if S::LANES == 1 && S::PARTIALS == 0 {
+            stepper.implicit = Some(Box::new(Solver::new(robot, settings)?));
+        }
         Ok(stepper)
     }
 }
 
 /// Right-hand side and Jacobian of one plant along a step.
 struct Slopes {
+    plant: Plant<f64>,
     jacobian: JacobianPlant,
     scratch: crate::robot::DynamicsScratch<f64>,
     applied: Vec<f64>,
 }
 
 impl Slopes {
-    fn new(plant: &Plant<f64>, jacobian: JacobianPlant) -> Self {
-        Self {
-            jacobian,
+    fn new(robot: &RobotDescription, settings: &[EffectSetting<f64>]) -> Result<Self, PlantError> {
+        let plant = Plant::new(robot, &[], settings)?;
+        Ok(Self {
+            jacobian: JacobianPlant::new(robot, settings)?,
             scratch: plant.scratch(),
             applied: vec![0.0; plant.axes.len()],
-        }
+            plant,
+        })
     }
 
     /// `df/dx` at the start of the step, and the change of `f` with the torque over the step.
@@ -75,9 +77,8 @@ impl Slopes {
     ) {
         let start: Vec<f64> = step.lines.iter().map(|l| l.at(0.0)).collect();
         let rise: Vec<f64> = step.lines.iter().map(Line::rise).collect();
-        let command = step.interval.command;
         self.jacobian
-            .evaluate(x, &start, &rise, command, jacobian, along);
+            .evaluate(x, &start, &rise, step.command, jacobian, along);
     }
 
     /// `dx = f(x)` at fraction `at` of the step.
@@ -85,19 +86,14 @@ impl Slopes {
         for (a, line) in self.applied.iter_mut().zip(step.lines) {
             *a = line.at(at);
         }
-        step.interval.plant.derivative(
-            x,
-            &self.applied,
-            step.interval.command,
-            &mut self.scratch,
-            dx,
-        );
+        self.plant
+            .derivative(x, &self.applied, step.command, &mut self.scratch, dx);
     }
 }
 
-/// A step to try: the sample's data, its length [s] and the torque over it.
+/// A step to try: its length [s], the command of the sample and the torque over the step.
 struct Step<'a> {
-    interval: &'a Interval<'a, f64>,
+    command: &'a [f64],
     length: f64,
     lines: &'a [Line<f64>],
     /// Bound on the local error, relative to each state.
@@ -139,97 +135,141 @@ struct Solver {
     slopes: Slopes,
     radau: RadauIia,
     rosenbrock: Rosenbrock,
-    /// Proposed step as a share of the sample, kept from sample to sample.
-    fraction: f64,
+    steps: StepSize,
 }
 
-impl Implicit<f64> for Solver {
+/// What the choice of steps needs from sample to sample.
+struct StepSize {
+    /// Proposed step as a share of the sample.
+    fraction: f64,
+    x: Vec<f64>,
+    command: Vec<f64>,
+    lines: Vec<Line<f64>>,
+}
+
+impl Solver {
+    fn new(robot: &RobotDescription, settings: &[EffectSetting<f64>]) -> Result<Self, PlantError> {
+        let slopes = Slopes::new(robot, settings)?;
+        let n = slopes.plant.n_states();
+        Ok(Self {
+            slopes,
+            radau: RadauIia::new(n),
+            rosenbrock: Rosenbrock::new(n),
+            steps: StepSize {
+                fraction: 1.0,
+                x: vec![0.0; n],
+                command: Vec::new(),
+                lines: Vec::new(),
+            },
+        })
+    }
+}
+
+impl<S: Scalar> Implicit<S> for Solver {
     fn advance(
         &mut self,
         method: Method,
-        interval: &Interval<'_, f64>,
-        x: &mut [f64],
-        torque: &mut SampleTorque<'_, f64>,
+        interval: &Interval<'_, S>,
+        x: &mut [S],
+        torque: &mut SampleTorque<'_, S>,
         effort: &mut Effort,
     ) -> bool {
         let Self {
             slopes,
             radau,
             rosenbrock,
-            fraction,
+            steps,
         } = self;
-        match method {
+        for (own, x) in steps.x.iter_mut().zip(&*x) {
+            *own = x.lane(0);
+        }
+        let met = match method {
             Method::RadauIia { tolerance } => {
-                cover(radau, tolerance, slopes, interval, x, torque, effort, fraction)
+                steps.cover(radau, tolerance, slopes, interval, torque, effort)
             }
             Method::Rosenbrock { tolerance } => {
-                cover(rosenbrock, tolerance, slopes, interval, x, torque, effort, fraction)
+                steps.cover(rosenbrock, tolerance, slopes, interval, torque, effort)
             }
             _ => false,
+        };
+        for (x, own) in x.iter_mut().zip(&steps.x) {
+            *x = S::constant(*own);
         }
+        met
     }
 }
 
-/// Cover one sample with steps whose local error stays below `tolerance`.
-#[allow(clippy::too_many_arguments)] // the parts of one solver, borrowed apart
-fn cover<M: OneStep>(
-    method: &mut M,
-    tolerance: f64,
-    slopes: &mut Slopes,
-    interval: &Interval<'_, f64>,
-    x: &mut [f64],
-    torque: &mut SampleTorque<'_, f64>,
-    effort: &mut Effort,
-    fraction: &mut f64,
-) -> bool {
-    let smallest = 1.0 / MAX_SUBSTEPS as f64;
-    let mut from: f64 = 0.0;
-    while from < 1.0 {
-        // A last step much shorter than the others would need a factorization of its own.
-        let left = ((1.0 - from) / *fraction).ceil().max(1.0);
-        let to = if left <= 1.0 {
+impl StepSize {
+    /// Cover one sample with steps whose local error stays below `tolerance`.
+    fn cover<S: Scalar, M: OneStep>(
+        &mut self,
+        method: &mut M,
+        tolerance: f64,
+        slopes: &mut Slopes,
+        interval: &Interval<'_, S>,
+        torque: &mut SampleTorque<'_, S>,
+        effort: &mut Effort,
+    ) -> bool {
+        let smallest = 1.0 / MAX_SUBSTEPS as f64;
+        self.command.clear();
+        self.command
+            .extend(interval.command.iter().map(|u| u.lane(0)));
+        let mut from: f64 = 0.0;
+        while from < 1.0 {
+            let to = self.end(from);
+            self.lines.clear();
+            self.lines
+                .extend(torque.span(from, to).iter().map(Line::first_lane));
+            let step = Step {
+                command: &self.command,
+                length: (to - from) * interval.sample_time,
+                lines: &self.lines,
+                tolerance,
+                iteration_tolerance: ITERATION_SHARE * tolerance,
+            };
+            match method.attempt(&step, slopes, &mut self.x, effort) {
+                Trial::Error(error) if error <= 1.0 => {
+                    effort.steps += 1;
+                    torque.accept();
+                    let grown = 0.9 * error.max(1e-9).powf(-1.0 / M::ORDER);
+                    // Small changes are not worth a factorization.
+                    if grown > 1.5 {
+                        self.fraction = ((to - from) * grown.min(5.0)).min(1.0);
+                    }
+                    from = to;
+                }
+                Trial::Error(error) if error.is_finite() => {
+                    effort.rejections += 1;
+                    let shrunk = 0.9 * error.powf(-1.0 / M::ORDER);
+                    self.fraction = (to - from) * shrunk.clamp(0.1, 0.8);
+                    method.refresh();
+                }
+                Trial::Error(_) => return false,
+                Trial::NoConvergence => {
+                    effort.rejections += 1;
+                    if method.is_fresh() {
+                        self.fraction = 0.5 * (to - from);
+                    }
+                    method.refresh();
+                }
+            }
+            if self.fraction < smallest {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// End of the step that starts at `from`. What is left of the sample is cut in equal
+    /// parts: a short last step would need a factorization of its own.
+    fn end(&self, from: f64) -> f64 {
+        let parts = ((1.0 - from) / self.fraction).ceil();
+        if parts <= 1.0 {
             1.0
         } else {
-            from + (1.0 - from) / left
-        };
-        let step = Step {
-            interval,
-            length: (to - from) * interval.sample_time,
-            lines: torque.span(from, to),
-            tolerance,
-            iteration_tolerance: ITERATION_SHARE * tolerance,
-        };
-        match method.attempt(&step, slopes, x, effort) {
-            Trial::Error(error) if error <= 1.0 => {
-                effort.steps += 1;
-                torque.accept();
-                let grown = 0.9 * error.max(1e-9).powf(-1.0 / M::ORDER);
-                // Small changes are not worth a factorization.
-                if grown > 1.5 {
-                    *fraction = ((to - from) * grown.min(5.0)).min(1.0);
-                }
-                from = to;
-            }
-            Trial::Error(error) if error.is_finite() => {
-                effort.rejections += 1;
-                let shrunk = 0.9 * error.powf(-1.0 / M::ORDER);
-                *fraction = (to - from) * shrunk.clamp(0.1, 0.8);
-                method.refresh();
-            }
-            Trial::Error(_) => return false,
-            Trial::NoConvergence => {
-                effort.rejections += 1;
-                if method.is_fresh() {
-                    *fraction = 0.5 * (to - from);
-                }
-                method.refresh();
-            }
-        }
-        if *fraction < smallest {
-            return false;
+            from + (1.0 - from) / parts
         }
     }
-    true
 }
 
 #[cfg(test)]
@@ -252,27 +292,22 @@ mod tests {
         let rest = equilibrium(&plant, &robot.operating_point).expect("rest");
         let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
         let command = [0.0; 3];
-        let interval = Interval {
-            plant: &plant,
-            command: &command,
-            sample_time: 0.02,
-        };
-        let dual = JacobianPlant::new(&robot, &[], &settings).expect("dual plant");
-        let mut slopes = Slopes::new(&plant, dual);
+        let duration = 0.02;
+        let mut slopes = Slopes::new(&robot, &settings).expect("plant");
         let mut method = make(x.len());
         let mut effort = Effort::default();
         let mut paths: Vec<_> = plant
             .axes
             .iter()
             .zip(&rest.motor_torque)
-            .map(|(axis, u)| TorquePath::new(axis, *u, interval.sample_time))
+            .map(|(axis, u)| TorquePath::new(axis, *u, duration))
             .collect();
         let mut buffers = TorqueBuffers::new(3);
         let mut torque = SampleTorque::new(&mut paths, &command, &mut buffers);
         for i in 0..n {
             let step = Step {
-                interval: &interval,
-                length: interval.sample_time / n as f64,
+                command: &command,
+                length: duration / n as f64,
                 lines: torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64),
                 tolerance: 1e9,
                 iteration_tolerance: 1e-13,

@@ -1,0 +1,58 @@
+//! Excitation: velocity references whose spectrum is known.
+
+mod directions;
+mod multisine;
+mod square;
+
+pub use directions::directions;
+pub use multisine::{Grid, Multisine};
+pub use square::Square;
+
+/// An excitation that cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field}: expected {expected}, got {got}")]
+pub struct ExcitationError {
+    /// Field.
+    pub field: &'static str,
+    /// What it should be.
+    pub expected: String,
+    /// What came.
+    pub got: String,
+}
+
+impl ExcitationError {
+    // Callers hand over numbers and fresh strings alike.
+    #[allow(clippy::needless_pass_by_value)]
+    fn new(field: &'static str, expected: impl Into<String>, got: impl std::fmt::Display) -> Self {
+        Self {
+            field,
+            expected: expected.into(),
+            got: got.to_string(),
+        }
+    }
+}
+
+/// `seconds / sample_time` if it is a whole number of samples, at least one.
+fn whole_samples(
+    field: &'static str,
+    seconds: f64,
+    sample_time: f64,
+) -> Result<usize, ExcitationError> {
+    /// More than a day at 10 kHz does not fit in memory anyway.
+    const MOST: f64 = 1e9;
+    let ratio = seconds / sample_time;
+    let whole = ratio.round();
+    // Decimal fractions such as 10.0 / 5e-4 come out a few units in the last place off.
+    let close = (ratio - whole).abs() <= 1e-9 * whole.abs();
+    if !(seconds.is_finite() && (1.0..MOST).contains(&whole) && close) {
+        let expected = format!("a positive whole number of samples of {sample_time} s");
+        return Err(ExcitationError::new(
+            field,
+            expected,
+            format!("{seconds} s"),
+        ));
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bounded above
+    let n = whole as usize;
+    Ok(n)
+}

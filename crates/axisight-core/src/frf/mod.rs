@@ -1,0 +1,5 @@
+//! Frequency responses from periodic records.
+
+mod periodic;
+
+pub use periodic::{Output, Spectra, response};

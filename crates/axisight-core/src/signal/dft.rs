@@ -1,0 +1,87 @@
+//! The discrete Fourier transform of periodic records: the one place for its sign and scale.
+//!
+//! `X_k = 1/sqrt(N) sum_{n=0}^{N-1} x_n exp(-2 pi i k n / N)`, line `k` at frequency
+//! `k / (N T)`. Ljung (1999), section 2.2; Wernholt (2004), (3.16), which counts samples
+//! from one: a common phase that cancels in every response.
+
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+use std::sync::Arc;
+
+/// Plans for records of one length; cheap to clone, shared between threads.
+#[derive(Clone)]
+pub struct Dft {
+    forward: Arc<dyn Fft<f64>>,
+    inverse: Arc<dyn Fft<f64>>,
+}
+
+/// Work space of one thread.
+#[derive(Debug, Clone, Default)]
+pub struct DftScratch {
+    data: Vec<Complex<f64>>,
+    work: Vec<Complex<f64>>,
+}
+
+impl std::fmt::Debug for Dft {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Dft({})", self.len())
+    }
+}
+
+impl Dft {
+    /// For records of `n` samples.
+    pub fn new(n: usize) -> Self {
+        let mut planner = FftPlanner::new();
+        Self {
+            forward: planner.plan_fft_forward(n),
+            inverse: planner.plan_fft_inverse(n),
+        }
+    }
+
+    /// Samples per record.
+    pub fn len(&self) -> usize {
+        self.forward.len()
+    }
+
+    /// Whether the record length is zero.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Lines `1 <= k <= N/2` of two real records at once: sample `n` is `(a_n, b_n)`.
+    ///
+    /// Both go through one complex transform of `a + i b` and are told apart by symmetry.
+    pub fn pair(
+        &self,
+        samples: impl Iterator<Item = (f64, f64)>,
+        lines: &[usize],
+        scratch: &mut DftScratch,
+        mut out: impl FnMut(usize, Complex<f64>, Complex<f64>),
+    ) {
+        let n = self.len();
+        let DftScratch { data, work } = scratch;
+        data.clear();
+        data.extend(samples.take(n).map(|(a, b)| Complex::new(a, b)));
+        data.resize(n, Complex::default());
+        work.resize(self.forward.get_inplace_scratch_len(), Complex::default());
+        self.forward.process_with_scratch(data, work);
+        let half = 0.5 / (n as f64).sqrt();
+        for (i, k) in lines.iter().enumerate() {
+            let (here, mirror) = (data[k % n], data[(n - k % n) % n].conj());
+            let (sum, difference) = (here + mirror, here - mirror);
+            let b = Complex::new(difference.im, -difference.re);
+            out(i, sum * half, b * half);
+        }
+    }
+
+    /// The record `x_n = sum_k amplitude_k sin(2 pi k n / N + phase_k)`.
+    pub fn sum_of_sines(&self, lines: &[usize], amplitude: &[f64], phase: &[f64]) -> Vec<f64> {
+        let n = self.len();
+        let mut data = vec![Complex::default(); n];
+        for ((k, a), p) in lines.iter().zip(amplitude).zip(phase) {
+            data[k % n] += Complex::from_polar(*a, *p);
+        }
+        self.inverse.process(&mut data);
+        data.iter().map(|c| c.im).collect()
+    }
+}

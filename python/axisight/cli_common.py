@@ -1,0 +1,28 @@
+"""What all commands share: consoles, and errors as messages with an exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from axisight.errors import AxisightError
+
+OUT = Console()
+ERR = Console(stderr=True)
+
+
+@contextmanager
+def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
+    """Turn our errors into a message and exit status 2, Ctrl-C into ``stopped`` and status 130."""
+    try:
+        yield
+    except AxisightError as error:
+        ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
+        raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        ERR.print(stopped, highlight=False, soft_wrap=True)
+        raise typer.Exit(130) from None

@@ -1,0 +1,127 @@
+"""A study with everything it refers to, as plain text: what workers get and stores remember."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import lru_cache
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.errors import InputError, StudyError
+from axisight.montecarlo.study import Study
+from axisight.robot import load_robot
+
+Arrays = dict[str, NDArray[Any]]
+"""The accumulators of a block by name; see ``_core.MonteCarloStudy.block``."""
+
+Task = tuple[int, int]
+"""First run and number of runs of a block."""
+
+
+def freeze(study: Study) -> str:
+    """Return the design as canonical JSON, self-contained: the robot's text is inside.
+
+    The seed, the number of runs and what is only read off the result (name, quantiles) are
+    not part of it.
+    """
+    robot = load_robot(study.robot)
+    design = study.model_dump(by_alias=True, mode="json", exclude={"seed", "runs", "name", "robot"})
+    design["statistics"].pop("quantiles")
+    design["robot"] = {
+        "toml": robot.core.toml,
+        "effects": [[e.name, e.axis, e.values()] for e in robot.effects],
+    }
+    design["axisight_version"] = version("axisight")
+    return json.dumps(design, sort_keys=True)
+
+
+def digest(design: str) -> str:
+    """Return the SHA-256 of a design."""
+    return hashlib.sha256(design.encode()).hexdigest()
+
+
+@lru_cache(maxsize=8)
+def core_study(design: str) -> _core.MonteCarloStudy:
+    """Return the checked study of a design; raises StudyError naming the field."""
+    d = json.loads(design)
+    multisine, square = d["excitation"]["multisine"], d["excitation"]["square"]
+    directions = d["excitation"]["directions"]
+    named = isinstance(directions, str)
+    plant, measurement = d["plant"], d["measurement"]
+    try:
+        robot = _core.Robot.from_toml(d["robot"]["toml"])
+        if d["robot_parameters"]:
+            robot = robot.with_parameters(list(d["robot_parameters"].items()))
+        effects = [(name, axis, values) for name, axis, values in d["robot"]["effects"]]
+        effects += core_effects(Effect(**e) for e in d["effect"])
+        return _core.MonteCarloStudy(
+            robot,
+            effects,
+            model=plant["model"],
+            method=plant["method"],
+            substeps=plant["substeps"],
+            tolerance=plant["tolerance"],
+            start=plant["start_rad"],
+            period_s=multisine["period_s"],
+            band_hz=tuple(multisine["band_hz"]),
+            grid=multisine["grid"],
+            peak_rad_s=multisine["peak_rad_s"],
+            square=None
+            if square is None
+            else (square["amplitude_rad_s"], square["period_s"], square["smoothing_samples"]),
+            directions=directions if named else "",
+            direction_matrix=None if named else [float(v) for row in directions for v in row],
+            waiting_periods=measurement["waiting_periods"],
+            periods=measurement["periods"],
+            noise=measurement["noise"],
+            noise_cutoff_hz=measurement["noise_cutoff_hz"],
+            resolution=measurement["position_resolution_rad"],
+            output=measurement["output"],
+            spread=[
+                (s["parameter"], s["distribution"], s["relative"], s["absolute"])
+                for s in d["spread"]
+            ],
+            relative_accuracy=d["statistics"]["relative_accuracy"],
+        )
+    except StudyError:
+        raise
+    except InputError as error:
+        raise StudyError(str(error)) from None
+
+
+def compute_block(
+    design: str, seed: int, first: int, count: int, cancel: _core.CancelToken | None = None
+) -> Arrays | None:
+    """Return the accumulators of runs ``first`` to ``first + count - 1``; None when cancelled.
+
+    A pure function of its arguments: it runs here, in a thread, or on a worker elsewhere.
+    """
+    settings = json.loads(design)
+    here = version("axisight")
+    if settings["axisight_version"] != here:
+        expected = settings["axisight_version"]
+        raise StudyError(f"axisight_version: expected {expected}, got {here} on a worker")
+    keep = settings["statistics"]["keep_responses"]
+    out = core_study(design).block(seed, first, count, keep_responses=keep, cancel=cancel)
+    return None if out is None else {name: np.asarray(value) for name, value in out.items()}
+
+
+def differences(stored: object, wanted: object, where: str = "") -> list[str]:
+    """Return where two designs differ, as ``field: expected A (as stored), got B``."""
+    if isinstance(stored, dict) and isinstance(wanted, dict):
+        out = []
+        for key in sorted(stored.keys() | wanted.keys()):
+            path = f"{where}.{key}" if where else key
+            out += differences(stored.get(key), wanted.get(key), path)
+        return out
+    if stored == wanted:
+        return []
+    if isinstance(stored, str) and "\n" in stored:
+        return [f"{where}: expected the text stored, got another"]
+    return [f"{where}: expected {stored!r} (as stored), got {wanted!r}"]

@@ -1,0 +1,164 @@
+"""Results on disk: one Zarr group per block of runs, written whole or not at all.
+
+Layout of the folder of a study::
+
+    study.toml             the study, for people
+    study.zarr/            Zarr v3; provenance in the attributes of the root group
+        blocks/00000032-32/    accumulators of runs 32 to 63, their SHA-256 in the attributes
+        result/                the finished result, an xarray Dataset
+
+A block is written beside the store and moved in by one rename, so a killed process leaves
+either all of it or nothing. Blocks that fail their checksum are computed again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+import zarr
+from numpy.typing import NDArray
+
+from axisight.errors import StoreError, StudyError
+from axisight.montecarlo.design import Arrays, differences
+
+FORMAT: Final = "axisight.montecarlo.store/1"
+
+
+# One file per array instead of a tree of folders.
+_FLAT: Final[dict[str, Any]] = {"name": "default", "configuration": {"separator": "."}}
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what the disk refuses into a StoreError that names the path."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise StoreError(
+            f"{path}: cannot be written: {reason}; finished blocks are kept, resume to go on"
+        ) from error
+
+
+def checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 over names, types, shapes and bytes."""
+    sha = hashlib.sha256()
+    for name in sorted(arrays):
+        value = np.ascontiguousarray(arrays[name])
+        sha.update(f"{name} {value.dtype.str} {value.shape}\n".encode())
+        sha.update(value.tobytes())
+    return sha.hexdigest()
+
+
+class Store:
+    """The blocks of one study on disk; open it with :func:`open_store`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.root = folder / "study.zarr"
+        self.blocks = self.root / "blocks"
+
+    def create(self, study_toml: str, provenance: Mapping[str, Any]) -> None:
+        """Start a store; the folder is new or empty."""
+        with writing(self.folder):
+            new = self.folder / ".tmp-root"
+            shutil.rmtree(new, ignore_errors=True)
+            root = zarr.create_group(store=str(new), zarr_format=3, attributes=dict(provenance))
+            root.create_group("blocks")
+            (self.folder / "study.toml").write_text(study_toml, "utf-8")
+            new.rename(self.root)
+
+    def provenance(self) -> dict[str, Any]:
+        """Return what the store was made with."""
+        try:
+            return dict(zarr.open_group(store=str(self.root), mode="r").attrs)
+        except (OSError, ValueError, KeyError) as error:
+            raise StoreError(f"{self.root}: expected a store of a study: {error}") from error
+
+    def path(self, first: int, count: int) -> Path:
+        """Return where a block is kept."""
+        return self.blocks / f"{first:08d}-{count}"
+
+    def stored(self) -> dict[int, int]:
+        """Return the blocks present, first run to number of runs; complete, but unchecked."""
+        out: dict[int, int] = {}
+        for path in self.blocks.iterdir():
+            first, _, count = path.name.partition("-")
+            if first.isdigit() and count.isdigit():
+                out[int(first)] = max(int(count), out.get(int(first), 0))
+        return out
+
+    def write(self, first: int, count: int, arrays: Arrays) -> None:
+        """Keep a block, and drop the shorter ones it replaces."""
+        path = self.path(first, count)
+        with writing(path):
+            new = self.folder / f".tmp-{path.name}"
+            shutil.rmtree(new, ignore_errors=True)
+            attributes = {"first_run": first, "runs": count, "sha256": checksum(arrays)}
+            group = zarr.create_group(store=str(new), zarr_format=3, attributes=attributes)
+            for name, value in arrays.items():
+                chunks = tuple(max(1, n) for n in value.shape)
+                group.create_array(name, data=value, chunks=chunks, chunk_key_encoding=_FLAT)
+            shutil.rmtree(path, ignore_errors=True)
+            new.rename(path)
+            for other in self.blocks.glob(f"{first:08d}-*"):
+                if other != path:
+                    shutil.rmtree(other)
+
+    def read(self, first: int, count: int) -> Arrays | None:
+        """Return a block, or None if it is damaged."""
+        # Damage shows as anything from a missing file to a codec's own exception.
+        try:
+            group = zarr.open_group(store=str(self.path(first, count)), mode="r")
+            arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
+            return arrays if group.attrs["sha256"] == checksum(arrays) else None
+        except Exception:
+            return None
+
+    def write_result(self, result: xr.Dataset) -> None:
+        """Keep the finished result beside the blocks."""
+        target, new = self.root / "result", self.folder / ".tmp-result"
+        with writing(target):
+            shutil.rmtree(new, ignore_errors=True)
+            result.to_zarr(str(new), zarr_format=3, consolidated=False)
+            shutil.rmtree(target, ignore_errors=True)
+            new.rename(target)
+
+
+def check_same(store: Store, design: str, seed: int) -> None:
+    """Raise StudyError naming the fields that differ from what the store was made with."""
+    stored = store.provenance()
+    if stored.get("format") != FORMAT:
+        raise StudyError(f"{store.root}: format: expected {FORMAT}, got {stored.get('format')!r}")
+    found = differences(json.loads(stored["design"]), json.loads(design))
+    found += differences(stored["seed"], seed, "seed")
+    if found:
+        raise StudyError(f"{store.folder}: cannot resume: {'; '.join(found)}")
+
+
+@contextmanager
+def open_store(folder: Path) -> Iterator[Store]:
+    """Own the folder of a study: no other process writes there meanwhile."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StoreError(f"{folder}: another process is writing this study") from None
+        for left in folder.glob(".tmp-*"):
+            shutil.rmtree(left, ignore_errors=True)
+        yield Store(folder)
+    finally:
+        os.close(lock)

@@ -1,0 +1,205 @@
+"""What a study is, in Python and in TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from axisight.errors import StudyError
+from axisight.presets import PRESETS
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+AtLeastOne = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**64)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise StudyError(_message(error)) from None
+
+
+class Plant(_Model):
+    """The simulated plant.
+
+    ``model`` is ``"linear"`` (linearized about the start, propagated exactly; ``substeps``
+    per sample for the ripple) or ``"nonlinear"`` (``method``, ``tolerance``, ``substeps``
+    as in :func:`axisight.simulate`). ``start_rad`` (n_axes,) are the driven joint angles
+    at rest; default the operating point of the robot.
+    """
+
+    model: Literal["linear", "nonlinear"] = "linear"
+    method: Literal["dopri5", "rk4", "radau5", "rodas4", "auto"] = "dopri5"
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-7
+    substeps: AtLeastOne = 1
+    start_rad: list[float] | None = None
+
+
+class Multisine(_Model):
+    """Random-phase multisine, Wernholt (2004), (7.5): flat spectrum over ``band_hz``.
+
+    ``grid``: all multiples of ``1 / period_s`` in the band, or the odd ones. Every run has
+    its own phases, scaled to the largest sample ``peak_rad_s`` (motor side).
+    """
+
+    period_s: Positive
+    band_hz: tuple[Positive, Positive]
+    peak_rad_s: Positive
+    grid: Literal["all", "odd"] = "all"
+
+
+class Square(_Model):
+    """Square wave on all axes, smoothed by a triangular window, Wernholt (2004), (7.3)."""
+
+    amplitude_rad_s: NotNegative
+    period_s: Positive
+    smoothing_samples: Count = 40
+
+
+class Excitation(_Model):
+    """Velocity references ``T r_ms(t) + r_sq(t)``, one experiment per axis.
+
+    ``directions`` is T: ``"identity"`` (T1), ``"t2"``, ``"hadamard"``, or rows over axes and
+    columns over experiments.
+    """
+
+    multisine: Multisine
+    square: Square | None = None
+    directions: Literal["identity", "t2", "hadamard"] | list[list[float]] = "identity"
+
+
+class Measurement(_Model):
+    """What is measured: periods waited, periods averaged, sensor noise, and which response.
+
+    The noise is white, or of first order with corner ``noise_cutoff_hz``; positions come in
+    steps of ``position_resolution_rad`` (motor side) unless that is zero. The response leads from commanded torque to motor ``output``.
+    """
+
+    waiting_periods: Count = 1
+    periods: AtLeastOne = 1
+    noise: bool = True
+    noise_cutoff_hz: Positive | None = None
+    position_resolution_rad: NotNegative = 0.0
+    output: Literal["position", "velocity", "acceleration"] = "acceleration"
+
+
+class EffectEntry(_Model):
+    """An effect at work, as :class:`axisight.Effect`."""
+
+    name: str
+    axis: AtLeastOne | None = None
+    parameters: dict[str, float] = {}
+
+
+class Spread(_Model):
+    """A parameter that varies from run to run: ``value (1 + relative z) + absolute z``.
+
+    ``parameter``: ``axis2.stiffness`` of the robot, ``payload.mass_kg`` or
+    ``torque_ripple@1.cosine_1_nm`` of an effect of the study. ``z`` is standard normal, or
+    uniform between -1 and 1. A run whose draw is impossible (a negative stiffness) is
+    recorded as failed.
+    """
+
+    parameter: str
+    distribution: Literal["normal", "uniform"] = "normal"
+    relative: NotNegative = 0.0
+    absolute: NotNegative = 0.0
+
+
+class Statistics(_Model):
+    """What is accumulated.
+
+    ``quantiles`` of the magnitude are good to ``relative_accuracy``; ``keep_responses``
+    also stores every response.
+    """
+
+    quantiles: list[Fraction] = [0.05, 0.25, 0.5, 0.75, 0.95]
+    relative_accuracy: Annotated[float, Field(ge=1e-5, le=0.5)] = 0.01
+    keep_responses: bool = False
+
+
+class Study(_Model):
+    """A Monte Carlo study.
+
+    Parameters
+    ----------
+    robot : file in the format ``axisight.robot/1``, or preset.
+    robot_parameters : values that replace those of the robot, e.g. ``{"axis1.damping": 2e3}``.
+    seed : rules phases, noise and spread, together with the number of the run.
+    runs : number of realizations.
+    block_runs : runs accumulated together; part of the design, because the order of
+        additions follows from it. A resumed study loses at most what was in progress.
+    effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``.
+
+    Raises StudyError naming the field; unknown keys are refused.
+
+    """
+
+    schema_: Annotated[Literal["axisight.montecarlo/1"], Field(alias="schema")] = (
+        "axisight.montecarlo/1"
+    )
+    name: str = "study"
+    robot: str
+    seed: Seed = 0
+    runs: AtLeastOne = 250
+    block_runs: AtLeastOne = 32
+    robot_parameters: dict[str, float] = {}
+    plant: Plant = Plant()
+    excitation: Excitation
+    measurement: Measurement = Measurement()
+    statistics: Statistics = Statistics()
+    effect: list[EffectEntry] = []
+    spread: list[Spread] = []
+
+    def to_toml(self) -> str:
+        """Return the study as TOML; :func:`read_study` gives the same study back."""
+        return tomli_w.dumps(self.model_dump(by_alias=True, exclude_none=True, mode="json"))
+
+
+def read_study(source: Path | str) -> Study:
+    """Return the study in a TOML file.
+
+    A robot file is looked for next to the study file. Raises StudyError naming file and
+    field.
+    """
+    path = Path(source)
+    try:
+        data = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"{path}: expected a study in TOML: {error}") from None
+    robot = data.get("robot")
+    if isinstance(robot, str) and robot not in PRESETS:
+        data["robot"] = str((path.parent / robot).resolve())
+    try:
+        return Study(**data)
+    except StudyError as error:
+        raise StudyError(f"{path}: {error}") from None
+
+
+def _message(error: ValidationError) -> str:
+    lines = []
+    for fault in error.errors():
+        where = ".".join(str(part) for part in fault["loc"])
+        inner = fault.get("ctx", {}).get("error")
+        if isinstance(inner, StudyError):
+            # A part of the study found its own faults; they go below this place.
+            lines += [f"{where}.{line}" for line in str(inner).split("; ")]
+            continue
+        if fault["type"] == "extra_forbidden":
+            lines.append(f"{where}: unknown key")
+        elif fault["type"] == "missing":
+            lines.append(f"{where}: expected a value, got none")
+        else:
+            lines.append(f"{where}: {fault['msg'].lower()}, got {fault['input']!r}")
+    return "; ".join(lines)

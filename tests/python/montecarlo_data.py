@@ -1,0 +1,89 @@
+"""Small studies and helpers for the tests of Monte Carlo studies."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from axisight import load_robot
+from axisight import montecarlo as mc
+
+ROBOT = "irb6600_like"
+RIPPLE = mc.EffectEntry(
+    name="torque_ripple",
+    axis=1,
+    parameters={"order_1": 3.0, "sine_1_nm": 0.06, "order_u": 18.0, "sine_u": 0.04},
+)
+
+
+def small_study(**changes) -> mc.Study:
+    """Half-second periods at 2 kHz, 19 lines, blocks of 8 runs: about 5 ms per run."""
+    fields = {
+        "robot": ROBOT,
+        "runs": 40,
+        "seed": 7,
+        "block_runs": 8,
+        "excitation": mc.Excitation(
+            multisine=mc.Multisine(period_s=0.5, band_hz=(4, 40), peak_rad_s=8),
+            square=mc.Square(amplitude_rad_s=9.6, period_s=0.5),
+        ),
+        "effect": [RIPPLE],
+    }
+    return mc.Study(**{**fields, **changes})
+
+
+def robot_file(folder: Path, old: str, new: str) -> str:
+    """The preset robot with a piece of its text replaced, as a file."""
+    text = load_robot(ROBOT).core.toml
+    assert old in text
+    path = folder / "robot.toml"
+    path.write_text(text.replace(old, new))
+    return str(path)
+
+
+def same_bits(a: xr.Dataset, b: xr.Dataset) -> None:
+    """Every variable of both has the same bytes."""
+    assert set(a.variables) == set(b.variables)
+    for name in a.variables:
+        assert a[name].dtype == b[name].dtype, name
+        assert a[name].values.tobytes() == b[name].values.tobytes(), name
+
+
+def blocks(out: Path) -> list[Path]:
+    """Finished blocks of a store."""
+    return sorted((out / "study.zarr" / "blocks").glob("*-*"))
+
+
+def start(*command: str, **options) -> subprocess.Popen:
+    """A Python process in a group of its own."""
+    return subprocess.Popen(
+        [sys.executable, *command],
+        start_new_session=True,
+        env={**os.environ, "PYTHONWARNINGS": "default"},
+        **options,
+    )
+
+
+def kill(process: subprocess.Popen) -> None:
+    """SIGKILL, as nothing else stops a process without a chance to tidy up."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGKILL)
+    process.wait(timeout=10)
+
+
+def until(condition, seconds: float = 30.0) -> None:
+    """Wait for a condition, or fail."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "timed out"
+        time.sleep(0.01)
+
+
+def relative(got, want) -> float:
+    """Largest difference over the largest value."""
+    return float(np.max(np.abs(got - want)) / np.max(np.abs(want)))
