@@ -86,7 +86,9 @@ class Effect:
     parameters: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown names early."""
+        """Refuse unknown names and impossible axes early."""
+        if self.axis is not None and self.axis < 1:
+            raise InputError(f"effect {self.name!r}: axis: expected 1 or more, got {self.axis}")
         known = [p.name for p in effect_info(self.name).parameters]
         for name in self.parameters or {}:
             if name not in known:

@@ -72,7 +72,9 @@ def simulate(
 
     """
     data, reference = _input(robot, velocity_ref_rad_s, torque_nm, dims=2)
-    error = None if noise is None else np.ascontiguousarray(np.asarray(noise, dtype=np.float64))
+    if substeps < 1:
+        raise InputError(f"substeps: expected at least 1, got {substeps}")
+    error = _noise(robot, noise, data.shape, noise_seed, noise_cutoff_hz)
     if noise_seed is not None:
         error = sensor_noise(robot, noise_seed, run, len(data), noise_cutoff_hz)
     out = _core.simulate(
@@ -81,7 +83,7 @@ def simulate(
         data,
         reference=reference,
         noise=error,
-        start=None if start_rad is None else [float(a) for a in start_rad],
+        start=_start(robot, start_rad),
         method=method,
         substeps=substeps,
         tolerance=tolerance,
@@ -89,14 +91,7 @@ def simulate(
         resolution=position_resolution_rad,
     )
     attrs = {
-        "status": out["status"],
-        "stopped_at": -1 if out["stopped_at"] is None else out["stopped_at"],
-        "right_hand_sides": out["evaluations"],
-        "steps": out["steps"],
-        "rejected_steps": out["rejections"],
-        "jacobians": out["jacobians"],
-        "factorizations": out["factorizations"],
-        "implicit_samples": out["implicit_samples"],
+        **_ending(out),
         "noise_seed": -1 if noise_seed is None else noise_seed,
         "run": run,
         "model": model,
@@ -140,7 +135,9 @@ def simulate_batch(
 
     """
     data, reference = _input(robot, velocity_ref_rad_s, torque_nm, dims=3)
-    error = None if noise is None else np.ascontiguousarray(np.asarray(noise, dtype=np.float64))
+    if substeps < 1:
+        raise InputError(f"substeps: expected at least 1, got {substeps}")
+    error = _noise(robot, noise, data.shape, noise_seed, noise_cutoff_hz)
     runs = np.arange(first_run, first_run + len(data))
     if noise_seed is not None:
         n = data.shape[1]
@@ -155,7 +152,7 @@ def simulate_batch(
         data,
         reference=reference,
         noise=error,
-        start=None if start_rad is None else [float(a) for a in start_rad],
+        start=_start(robot, start_rad),
         method=method,
         substeps=substeps,
         tolerance=tolerance,
@@ -181,22 +178,92 @@ def _input(
     robot: Robot, velocity_ref: ArrayLike | None, torque: ArrayLike | None, *, dims: int
 ) -> tuple[Array, bool]:
     """Return the one input given, and whether it is a reference."""
-    if (velocity_ref is None) == (torque is None):
-        raise InputError("velocity_ref_rad_s, torque_nm: expected exactly one of them")
-    reference = velocity_ref is not None
-    source = velocity_ref if reference else torque
-    data = np.ascontiguousarray(np.asarray(source, dtype=np.float64))
+    if velocity_ref is not None and torque is None:
+        return _array(robot, "velocity_ref_rad_s", velocity_ref, dims), True
+    if torque is not None and velocity_ref is None:
+        return _array(robot, "torque_nm", torque, dims), False
+    raise InputError("velocity_ref_rad_s, torque_nm: expected exactly one of them")
+
+
+def _array(robot: Robot, field: str, value: ArrayLike, dims: int) -> Array:
+    """Return real numbers of ``dims`` dimensions, the last one of axes, none of them empty."""
+    runs = "" if dims == 2 else "n_runs, "
+    expected = f"{field}: expected real numbers of shape ({runs}n, {robot.n_axes})"
+    try:
+        data = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{expected}, got rows of different lengths") from None
+    if data.dtype.kind not in "biuf":
+        raise InputError(f"{expected}, got {data.dtype}")
+    data = np.ascontiguousarray(data, dtype=np.float64)
     if data.ndim == dims - 1 and robot.n_axes == 1:
         data = data[..., None]
-    if data.ndim != dims or data.shape[-1] != robot.n_axes or data.size == 0:
-        field = "velocity_ref_rad_s" if reference else "torque_nm"
-        shape = f"(n, {robot.n_axes})" if dims == 2 else f"(n_runs, n, {robot.n_axes})"
-        raise InputError(f"{field}: expected shape {shape}, got {data.shape}")
-    return data, reference
+    if data.ndim != dims or data.shape[-1] != robot.n_axes:
+        raise InputError(f"{expected}, got {data.shape}")
+    if data.size == 0:
+        raise InputError(f"{expected}, at least one sample of one run, got {data.shape}")
+    return data
+
+
+def _noise(
+    robot: Robot,
+    noise: ArrayLike | None,
+    shape: tuple[int, ...],
+    seed: int | None,
+    cutoff_hz: float | None,
+) -> Array | None:
+    """Return the noise given, in the shape of the input."""
+    if cutoff_hz is not None and seed is None:
+        raise InputError(f"noise_cutoff_hz: expected a noise_seed with it, got {cutoff_hz} alone")
+    if noise is None:
+        return None
+    if seed is not None:
+        raise InputError("noise, noise_seed: expected at most one of them")
+    data = _array(robot, "noise", noise, len(shape))
+    if data.shape != shape:
+        raise InputError(f"noise: expected the shape of the input, {shape}, got {data.shape}")
+    return data
+
+
+def _start(robot: Robot, start_rad: Sequence[float] | None) -> list[float] | None:
+    if start_rad is None:
+        return None
+    start = np.asarray(start_rad)
+    numbers = start.dtype.kind in "biuf" and np.isfinite(start).all()
+    if start.shape != (robot.n_axes,) or not numbers:
+        raise InputError(f"start_rad: expected {robot.n_axes} finite angles, got {start_rad}")
+    return [float(a) for a in start]
+
+
+# Generator and stream of the core's noise; a stream has 16 bits for the axis.
+_SEEDS, _RUNS = 1 << 64, 1 << 48
+
+
+def _check_stream(seed: int, run: int) -> None:
+    """Refuse numbers that the core cannot tell apart."""
+    for field, value, count in (("seed", seed, _SEEDS), ("run", run, _RUNS)):
+        if not 0 <= value < count:
+            bits = count.bit_length() - 1
+            raise InputError(f"{field}: expected 0 to 2^{bits} - 1, got {value}")
+
+
+def _ending(out: _core.SimulationOutput) -> dict[str, Any]:
+    """Return how a run ended and what it cost, as attributes."""
+    return {
+        "status": out["status"],
+        "stopped_at": -1 if out["stopped_at"] is None else out["stopped_at"],
+        "right_hand_sides": out["evaluations"],
+        "steps": out["steps"],
+        "rejected_steps": out["rejections"],
+        "jacobians": out["jacobians"],
+        "factorizations": out["factorizations"],
+        "implicit_samples": out["implicit_samples"],
+    }
 
 
 def white_noise(seed: int, run: int, n_samples: int, n_axes: int) -> Array:
     """Return unit white Gaussian noise (n_samples, n_axes) as a function of (seed, run)."""
+    _check_stream(seed, run)
     return _core.measurement_noise(seed, run, n_samples, n_axes, 1.0)
 
 
@@ -211,6 +278,7 @@ def sensor_noise(
     std = robot.core.position_noise_std
     if cutoff_hz is None:
         return white_noise(seed, run, n_samples, robot.n_axes) * std
+    _check_stream(seed, run)
     step = robot.sample_time_s
     return _core.measurement_noise(
         seed, run, n_samples, robot.n_axes, std, cutoff_hz=cutoff_hz, sample_time=step

@@ -119,8 +119,21 @@ def _columns(frame: pd.DataFrame, prefix: str, count: int) -> Array:
     return np.ascontiguousarray(frame[[f"{prefix}_{i}" for i in range(1, count + 1)]].to_numpy())
 
 
+# Integrators with sub-steps and tolerance.
+METHODS = [
+    ("dopri5", 1, 1e-7),
+    ("rk4", 4, 1e-7),
+    ("radau5", 1, 1e-7),
+    ("rodas4", 1, 1e-7),
+    ("auto", 1, 1e-7),
+    ("dopri5", 1, 1e-5),
+    ("radau5", 1, 1e-5),
+    ("rodas4", 1, 1e-5),
+]
+
+
 @pytest.mark.parametrize("name", TRAJECTORIES)
-@pytest.mark.parametrize("method", [("dopri5", 1, 1e-7), ("rk4", 4, 1e-7)], ids=lambda m: m[0])
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: f"{m[0]}-{m[2]:.0e}")
 def test_trajectory(robot: Any, folder: Path, name: str, method: tuple[str, int, float]) -> None:
     frame = pd.read_parquet(folder / f"trajectory_{name}.parquet")
     kind, substeps, tolerance = method
