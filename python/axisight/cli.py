@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-import pandas as pd
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -19,16 +17,14 @@ from axisight.cli_common import ERR as _err
 from axisight.cli_common import OUT as _out
 from axisight.cli_common import errors as _errors
 from axisight.cli_montecarlo import montecarlo_command
+from axisight.cli_simulate import simulate_command
 from axisight.demo import write_demo_case
 from axisight.effects import effect_table
 from axisight.errors import InputError
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import read_inputs
-from axisight.gap.result import write_bytes
-from axisight.logs import check_log, read_log, render
+from axisight.logs import check_log, render
 from axisight.report import save_report
-from axisight.robot import load_robot
-from axisight.simulation import simulate
 
 app = typer.Typer(
     help="Identify industrial robots, simulate them, and explain the sim-to-real gap.",
@@ -37,6 +33,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.command("montecarlo")(montecarlo_command)
+app.command("simulate")(simulate_command)
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
 
@@ -148,32 +145,6 @@ def check(
         found = check_log(log, columns)
         _out.print(render(found))
         if not found.ok:
-            raise typer.Exit(1)
-
-
-@app.command("simulate")
-def simulate_command(
-    robot: Annotated[str, typer.Argument(help="robot.toml or a preset.")],
-    reference: Annotated[Path, typer.Argument(help="Log whose velocity references drive the run.")],
-    out: Annotated[Path, typer.Option(help="Parquet log to write.")],
-    columns: Columns = None,
-    noise_seed: Annotated[int | None, typer.Option(min=0, help="Add sensor noise.")] = None,
-) -> None:
-    """Simulate a robot along the references of a log and write the result as a log."""
-    with _errors():
-        machine = load_robot(robot)
-        source = read_log(reference, columns, n_axes=machine.n_axes)
-        if source.velocity_ref_rad_s is None:
-            raise InputError(f"{reference}: expected velocity references")
-        run = simulate(machine, source.velocity_ref_rad_s, noise_seed=noise_seed)
-        data = {"time_s": np.asarray(run["time"].values)}
-        for i in range(machine.n_axes):
-            data[f"velocity_ref_{i + 1}"] = source.velocity_ref_rad_s[: run.sizes["time"], i]
-            data[f"torque_cmd_{i + 1}"] = run["torque_cmd_nm"].values[:, i]
-            data[f"position_{i + 1}"] = run["position_rad"].values[:, i]
-        write_bytes(out, pd.DataFrame(data).to_parquet(index=False))
-        _out.print(f"{run.attrs['status']}: {out}", soft_wrap=True)
-        if run.attrs["status"] != "completed":
             raise typer.Exit(1)
 
 

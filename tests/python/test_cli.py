@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from axisight import Effect, load_robot, simulate
 from axisight.cli import app
 from axisight.demo import write_demo_case
 
@@ -140,6 +141,150 @@ def test_simulate_writes_a_log_that_reads(case, tmp_path):
     result = CliRunner().invoke(app, ["simulate", "irb6600_like", source, "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert len(pd.read_parquet(out)) == len(pd.read_parquet(source))
+
+
+def simulated(case: Path, *more: str, robot: str = "irb6600_like") -> pd.DataFrame:
+    """The log that ``axisight simulate`` writes along the moves of the case."""
+    out = case.parent / "run.parquet"
+    source = str(case / "logs" / "moves.parquet")
+    result = CliRunner().invoke(app, ["simulate", robot, source, "--out", str(out), *more])
+    assert result.exit_code == 0, result.output
+    return pd.read_parquet(out)
+
+
+def columns(frame: pd.DataFrame, name: str) -> np.ndarray:
+    return frame[[f"{name}_{i}" for i in (1, 2, 3)]].to_numpy()
+
+
+def short(case: Path) -> Path:
+    """The case with logs of a second, the least that is read."""
+    edit(case / "logs" / "moves.parquet", lambda f: f.iloc[:2100])
+    return case
+
+
+OPTIONS = {
+    "nothing": ([], {}),
+    "linear": (["--model", "linear"], {"model": "linear"}),
+    "rk4": (["--method", "rk4", "--substeps", "3"], {"method": "rk4", "substeps": 3}),
+    "rodas4": (
+        ["--method", "rodas4", "--tolerance", "1e-3"],
+        {"method": "rodas4", "tolerance": 1e-3},
+    ),
+    "start": (["--start", "-0.1,0.2,0"], {"start_rad": [-0.1, 0.2, 0.0]}),
+    "resolution": (["--resolution", "1e-4"], {"position_resolution_rad": 1e-4}),
+    "white noise": (["--noise-seed", "3"], {"noise_seed": 3}),
+    "coloured noise": (
+        ["--noise-seed", "3", "--run", "7", "--noise-cutoff-hz", "50"],
+        {"noise_seed": 3, "run": 7, "noise_cutoff_hz": 50.0},
+    ),
+    "effects": (
+        [
+            "--effect",
+            "coulomb_friction@2:coulomb_nm=0.5,smoothing_rad_s=0.2",
+            "--effect",
+            "payload:mass_kg=30",
+            "--effect",
+            "backlash@1",
+        ],
+        {
+            "effects": [
+                Effect("coulomb_friction", 2, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.2}),
+                Effect("payload", None, {"mass_kg": 30.0}),
+                Effect("backlash", 1),
+            ]
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("torque", [False, True], ids=["reference", "torque"])
+@pytest.mark.parametrize("name", OPTIONS)
+def test_simulate_does_what_the_library_does(case, name, torque):
+    arguments, options = OPTIONS[name]
+    got = simulated(short(case), *arguments, *(["--torque"] if torque else []))
+    source = pd.read_parquet(case / "logs" / "moves.parquet")
+    driven = "torque_nm" if torque else "velocity_ref_rad_s"
+    inputs = columns(source, "torque_cmd" if torque else "velocity_ref")
+    want = simulate(load_robot("irb6600_like"), **{driven: inputs}, **options)
+    assert np.array_equal(columns(got, "torque_cmd"), want["torque_cmd_nm"])
+    assert np.array_equal(columns(got, "position"), want["position_rad"])
+    assert ("velocity_ref_1" in got) == (not torque)
+    if name != "nothing":
+        plain = simulated(case, *(["--torque"] if torque else []))
+        assert not np.array_equal(columns(got, "position"), columns(plain, "position"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--effect", "wobble@1"], ["wobble", "backlash"]),
+        (["--effect", "backlash@one"], ["axis number", "'one'"]),
+        (["--effect", "backlash@-1"], ["axis number", "'-1'"]),
+        (["--effect", "backlash@1:half_width_rad"], ["PARAM=VALUE", "half_width_rad"]),
+        (["--effect", "backlash@1:half_width_rad=wide"], ["half_width_rad", "numbers", "wide"]),
+        (["--effect", "backlash@1:width=1"], ["width", "half_width_rad"]),
+        (["--effect", "backlash@1:half_width_rad=1e-4,half_width_rad=2e-4"], ["twice"]),
+        (["--effect", "backlash@4:half_width_rad=1e-4"], ["from 1 to 3", "4"]),
+        (["--effect", "backlash"], ["backlash", "no axis"]),
+        (["--effect", "payload@1:mass_kg=3"], ["payload"]),
+        (["--start", "0,zero,0"], ["--start", "numbers", "0,zero,0"]),
+        (["--start", "0,0"], ["start_rad", "3"]),
+        (["--method", "euler"], ["method", "rodas4", "euler"]),
+        (["--model", "affine"], ["model", "linear", "affine"]),
+        (["--tolerance", "2"], ["tolerance", "2"]),
+        (["--substeps", "0"], ["substeps", "0"]),
+        (["--resolution", "-1"], ["resolution", "-1"]),
+        (["--noise-seed", "-1"], ["seed", "-1"]),
+        (["--noise-cutoff-hz", "5"], ["noise_cutoff_hz", "noise_seed"]),
+        (["--model", "linear", "--effect", "backlash@1:half_width_rad=1e-4"], ["nonlinear"]),
+    ],
+)
+def test_simulate_refuses_by_name(case, arguments, words):
+    out = case.parent / "run.parquet"
+    source = str(case / "logs" / "moves.parquet")
+    result = CliRunner().invoke(
+        app, ["simulate", "irb6600_like", source, "--out", str(out), *arguments]
+    )
+    assert result.exit_code == 2, result.output
+    assert not out.exists()
+    message = " ".join(result.output.split())
+    for word in words:
+        assert word in message
+
+
+def test_simulate_needs_what_drives_it(case):
+    edit(
+        case / "logs" / "moves.parquet",
+        lambda f: f.drop(columns=[f"velocity_ref_{i}" for i in (1, 2, 3)]),
+    )
+    out = case.parent / "run.parquet"
+    source = str(case / "logs" / "moves.parquet")
+    result = CliRunner().invoke(app, ["simulate", "irb6600_like", source, "--out", str(out)])
+    assert result.exit_code == 2
+    assert "--torque" in result.output
+    assert len(simulated(case, "--torque")) > 2000
+
+
+def test_simulate_needs_the_rate_of_the_robot(case):
+    edit(case / "logs" / "moves.parquet", lambda f: f.assign(time_s=f.time_s * 2))
+    out = case.parent / "run.parquet"
+    source = str(case / "logs" / "moves.parquet")
+    result = CliRunner().invoke(app, ["simulate", "irb6600_like", source, "--out", str(out)])
+    assert result.exit_code == 2
+    assert "0.0005 s, got 0.001 s" in " ".join(result.output.split())
+
+
+def test_simulate_writes_what_there_is_of_a_failed_run(case):
+    robot = case / "robot.toml"
+    text = robot.read_text()
+    assert "kp = [7.039" in text
+    robot.write_text(text.replace("kp = [7.039", "kp = [-7.039"))
+    out = case.parent / "run.parquet"
+    source = str(case / "logs" / "moves.parquet")
+    result = CliRunner().invoke(app, ["simulate", str(robot), source, "--out", str(out)])
+    assert result.exit_code == 1
+    assert "step_size_collapsed" in result.output
+    assert 1 < len(pd.read_parquet(out)) < 2000
 
 
 def test_effects_are_listed():
