@@ -122,6 +122,7 @@ pub fn simulate<S: Scalar>(
         return Err(SimulationError::NoJacobian(run.method));
     }
     let rest = equilibrium(plant, run.start)?;
+    stepper.begin();
     let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
     let mut controller = ControlLoop::new(
         run.controller,
