@@ -329,7 +329,10 @@ impl Batch<'_> {
             runs.iter().copied().filter(|r| *r < all.len()).collect()
         };
         let inputs: Vec<&[f64]> = runs.iter().map(|r| &self.input.runs()[*r][..]).collect();
-        let noise: Vec<&[f64]> = pick(self.noise).iter().map(|r| &self.noise[*r][..]).collect();
+        let noise: Vec<&[f64]> = pick(self.noise)
+            .iter()
+            .map(|r| &self.noise[*r][..])
+            .collect();
         simulate(&Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,
