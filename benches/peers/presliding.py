@@ -41,7 +41,7 @@ from common.scan import RTOL, Row, fixed, loosest, peer, print_rows
 from common.timing import cpu, timed
 
 import axisight
-from axisight.effects import Effect, effect_table
+from axisight.effects import Effect
 
 SMOOTH_STIFFNESS = 50.0
 FACTOR = 1e5
