@@ -162,13 +162,10 @@ def batch(s: setting.Setting, torque: Array, repeats: int, runs: int = 64) -> li
     states = np.tile(state, (runs, 1))
     per = 1e6 / (runs * len(torque))
     out = []
-    if hasattr(axisight, "simulate_batch"):
-        own = lambda: axisight.simulate_batch(  # noqa: E731
-            s.robot, torque_nm=many, method="rk4", substeps=1, threads=1
-        )
-        out.append((f"axisight, batch of {runs}", timed(own, repeats)[0] * per))
-    else:
-        print("batch: not in this version of the package")
+    own = lambda: axisight.simulate_batch(  # noqa: E731
+        s.robot, torque_nm=many, method="rk4", substeps=1, threads=1
+    )
+    out.append((f"axisight, batch of {runs}", timed(own, repeats)[0] * per))
     run = lambda: rollout.rollout(model, data, states, many)  # noqa: E731
     out.append((f"MuJoCo rollout, batch of {runs}", timed(run, repeats)[0] * per))
     return out

@@ -115,9 +115,6 @@ def smooth_rows(s: setting.Setting, args: argparse.Namespace) -> tuple[list[Row]
 
 def batch_row(s: setting.Setting, best: Row) -> None:
     """Time per run in a batch of 64 against a single run, one thread."""
-    if not hasattr(axisight, "simulate_batch"):
-        print("\nbatch: not in this version of the package")
-        return
     runs = 64
     # Runs of different amplitude: no run may profit from being another's copy.
     scale = np.linspace(0.5, 1.0, runs)[:, None, None]

@@ -120,12 +120,20 @@ def simulate_batch(
 ) -> xr.Dataset:
     """Simulate many runs of one robot: eight in lock-step per thread.
 
-    Arguments are those of :func:`simulate` with a leading dimension of runs,
-    (n_runs, n, n_axes); the noise of run ``i`` is that of ``run=first_run + i``.
-    ``threads`` 0 takes every core. The result does not depend on the number of threads.
     With ``method="rk4"`` and with the linear model a run has the bits it has alone; with
     an error-controlled method the eight take the shortest step any of them needs, so a run
-    differs from itself alone by what the tolerance allows.
+    differs from itself alone by what the tolerance allows. Implicit methods run one by one.
+
+    Parameters
+    ----------
+    robot : the robot; effects its preset models take part.
+    velocity_ref_rad_s : (n_runs, n, n_axes), motor-side references; or
+    torque_nm : (n_runs, n, n_axes), commanded motor torques. Give exactly one.
+    noise_seed, first_run : the noise of run ``i`` is that of ``run=first_run + i``.
+    noise : (n_runs, n, n_axes) position noise [rad] instead of a seeded one.
+    threads : 0 takes every core. The result does not depend on it.
+    effects, noise_cutoff_hz, position_resolution_rad, start_rad, model, method, tolerance,
+    substeps : as in :func:`simulate`, the same for all runs.
 
     Returns
     -------

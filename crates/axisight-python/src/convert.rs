@@ -1,7 +1,9 @@
 //! Between `NumPy` arrays and plain vectors.
 
 use crate::entry::InputError;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
+};
 use pyo3::prelude::*;
 
 /// Row-major copy of a two-dimensional array with `columns` columns.

@@ -210,8 +210,9 @@ fn run(
         .num_threads(options.threads)
         .build()
         .map_err(input_error)?;
-    let done: Result<(Traces, Vec<Outcome>), BatchError> =
-        detached(py, &cancel, || pool.install(|| simulation::simulate_batch(&batch)))?;
+    let done: Result<(Traces, Vec<Outcome>), BatchError> = detached(py, &cancel, || {
+        pool.install(|| simulation::simulate_batch(&batch))
+    })?;
     done.map_err(input_error)
 }
 

@@ -13,10 +13,8 @@ either all of it or nothing. Blocks that fail their checksum are computed again.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +24,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 import zarr
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from axisight.errors import StoreError, StudyError
@@ -149,16 +148,17 @@ def check_same(store: Store, design: str, seed: int) -> None:
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
     """Own the folder of a study: no other process writes there meanwhile."""
+    # The system lets go of the lock when the process ends, however it ends.
+    lock = FileLock(folder / ".lock", blocking=False)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    try:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            lock.acquire()
+        except Timeout:
             raise StoreError(f"{folder}: another process is writing this study") from None
+    try:
         for left in folder.glob(".tmp-*"):
             shutil.rmtree(left, ignore_errors=True)
         yield Store(folder)
     finally:
-        os.close(lock)
+        lock.release()

@@ -83,7 +83,8 @@ class Measurement(_Model):
     """What is measured: periods waited, periods averaged, sensor noise, and which response.
 
     The noise is white, or of first order with corner ``noise_cutoff_hz``; positions come in
-    steps of ``position_resolution_rad`` (motor side) unless that is zero. The response leads from commanded torque to motor ``output``.
+    steps of ``position_resolution_rad`` (motor side) unless that is zero. The response
+    leads from commanded torque to motor ``output``.
     """
 
     waiting_periods: Count = 1

@@ -154,7 +154,6 @@ pub fn trace<S: Scalar>(
     robot: &RobotDescription,
     drive: Drive<'_>,
     noise: &[&[f64]],
-    resolution: 0.0,
     method: Method,
 ) -> Trace<S> {
     let run = Run {

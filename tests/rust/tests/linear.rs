@@ -56,7 +56,6 @@ fn linear_trace<S: Scalar>(
     settings: &[EffectSetting<f64>],
     drive: Drive<'_>,
     noise: &[&[f64]],
-    resolution: 0.0,
     method: Method,
 ) -> Trace<S> {
     let run = Run {

@@ -189,6 +189,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn motor_torque(&self, _motor: &Motor<'_, S>) -> S {
         S::zero()
     }
+    /// Whether [`Kernel::motor_torque`] depends on the command.
+    fn uses_command(&self) -> bool {
+        false
+    }
     /// Number of states the effect has of its own; they start at zero.
     fn n_internal(&self) -> usize {
         0

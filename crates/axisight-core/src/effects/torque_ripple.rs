@@ -34,6 +34,10 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Ripple<S> {
+    fn uses_command(&self) -> bool {
+        true
+    }
+
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let constant = self.constant.evaluate(motor.angle);
         self.proportional

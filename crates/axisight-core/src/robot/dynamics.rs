@@ -437,7 +437,9 @@ impl<S: Scalar> Frame<S> {
     fn slide(&mut self, rate: S, axis: &[f64; 3], q: S, screw: &mut Screw<S>) {
         let axis = self.apply_constant(axis);
         self.carry(&axis.scale(q));
-        self.linear_acc = self.angular.cross_add(&axis.scale(rate * 2.0), &self.linear_acc);
+        self.linear_acc = self
+            .angular
+            .cross_add(&axis.scale(rate * 2.0), &self.linear_acc);
         screw.angular = Vec3::zero();
         screw.linear = axis;
     }
@@ -464,7 +466,8 @@ impl<S: Scalar> Frame<S> {
     #[inline(always)]
     fn matrix(&self) -> Mat3<S> {
         let [x, y, z] = &self.columns;
-        Mat3(from_fn(|i| [x.0[i], y.0[i], z.0[i]]))
+        let row = |i: usize| [x.0[i], y.0[i], z.0[i]];
+        Mat3([row(0), row(1), row(2)])
     }
 
     /// Wrench of a link for zero joint accelerations, and its moments.

@@ -48,8 +48,7 @@ mod tests {
             }
         }
         let x = [1.0, -2.0, 0.5, 3.0];
-        let mut b: [f64; 4] =
-            std::array::from_fn(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
+        let mut b: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
         solve_symmetric(&mut a, &mut b);
         for (got, want) in b.iter().zip(x) {
             assert!((got - want).abs() < 1e-12, "{got} {want}");

@@ -299,6 +299,27 @@ impl<S: Scalar> Plant<S> {
         );
     }
 
+    /// Whether the torques of the drives enter the motors' accelerations only, and as they are:
+    /// then [`Plant::change_torque`] replaces an evaluation.
+    pub fn torque_acts_on_motors_alone(&self) -> bool {
+        self.axes.iter().all(|axis| {
+            let plain = |on: &OnMotor<S>| !on.kernel.uses_command();
+            axis.gear.is_some() && axis.on_motor.iter().all(plain)
+        })
+    }
+
+    /// Turn a derivative under torques `from` into that under `to` in the same state, where
+    /// [`Plant::torque_acts_on_motors_alone`].
+    #[inline]
+    pub fn change_torque(&self, from: &[S], to: &[S], dx: &mut [S]) {
+        let first = self.n_motors + self.chain.len();
+        for (axis, (from, to)) in self.axes.iter().zip(from.iter().zip(to)) {
+            if let Some(gear) = &axis.gear {
+                dx[first + gear.slot] += (*to - *from) * axis.inverse_motor_inertia;
+            }
+        }
+    }
+
     /// Scratch for [`Plant::derivative`].
     pub fn scratch(&self) -> DynamicsScratch<S> {
         self.dynamics.scratch()

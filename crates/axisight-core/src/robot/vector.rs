@@ -57,25 +57,29 @@ impl<S: Scalar> Vec3<S> {
     #[inline(always)]
     #[must_use]
     pub fn scale(&self, s: S) -> Self {
-        Self(from_fn(|i| self.0[i] * s))
+        let [x, y, z] = self.0;
+        Self([x * s, y * s, z * s])
     }
     /// `s * self + sum`.
     #[inline(always)]
     #[must_use]
     pub fn scale_add(&self, s: S, sum: &Self) -> Self {
-        Self(from_fn(|i| self.0[i].fma(s, sum.0[i])))
+        let ([x, y, z], c) = (self.0, &sum.0);
+        Self([x.fma(s, c[0]), y.fma(s, c[1]), z.fma(s, c[2])])
     }
     /// `sum - s * self`.
     #[inline(always)]
     #[must_use]
     pub fn scale_sub(&self, s: S, sum: &Self) -> Self {
-        Self(from_fn(|i| (-self.0[i]).fma(s, sum.0[i])))
+        let ([x, y, z], c) = (self.0, &sum.0);
+        Self([(-x).fma(s, c[0]), (-y).fma(s, c[1]), (-z).fma(s, c[2])])
     }
     /// The opposite vector.
     #[inline(always)]
     #[must_use]
     pub fn negate(&self) -> Self {
-        Self(from_fn(|i| -self.0[i]))
+        let [x, y, z] = self.0;
+        Self([-x, -y, -z])
     }
 }
 
@@ -83,7 +87,8 @@ impl<S: Scalar> Add for Vec3<S> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] + other.0[i]))
+        let (a, b) = (self.0, other.0);
+        Self([a[0] + b[0], a[1] + b[1], a[2] + b[2]])
     }
 }
 impl<S: Scalar> AddAssign for Vec3<S> {
@@ -96,7 +101,8 @@ impl<S: Scalar> Sub for Vec3<S> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(from_fn(|i| self.0[i] - other.0[i]))
+        let (a, b) = (self.0, other.0);
+        Self([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
     }
 }
 
@@ -119,7 +125,8 @@ impl<S: Scalar> Mat3<S> {
     /// Matrix times vector.
     #[inline(always)]
     pub fn apply(&self, v: &Vec3<S>) -> Vec3<S> {
-        Vec3(from_fn(|i| Vec3(self.0[i]).dot(v)))
+        let [x, y, z] = self.0;
+        Vec3([Vec3(x).dot(v), Vec3(y).dot(v), Vec3(z).dot(v)])
     }
     /// Product of two matrices.
     #[must_use]
@@ -160,7 +167,8 @@ pub fn rotation<S: Scalar>(axis: &[f64; 3], s: S, c: S) -> [[S; 3]; 3] {
 pub fn rotate_inertia<S: Scalar>(r: &Mat3<S>, inertia: &[S; 6]) -> [S; 6] {
     let m = Mat3::symmetric(inertia);
     // Rows of R I.
-    let ri: [Vec3<S>; 3] = from_fn(|i| m.apply(&Vec3(r.0[i])));
+    let [x, y, z] = r.0;
+    let ri = [m.apply(&Vec3(x)), m.apply(&Vec3(y)), m.apply(&Vec3(z))];
     let entry = |i: usize, j: usize| ri[i].dot(&Vec3(r.0[j]));
     [
         entry(0, 0),
@@ -177,8 +185,9 @@ pub fn rotate_inertia<S: Scalar>(r: &Mat3<S>, inertia: &[S; 6]) -> [S; 6] {
 #[inline(always)]
 pub fn shift_inertia<S: Scalar>(second: &mut [S; 6], d: &Vec3<S>, first: &Vec3<S>, mass: S) {
     // With h = first + m d / 2 the second moment grows by 2 (d.h) 1 - (d h^T + h d^T).
-    let h = Vec3(from_fn(|i| d.0[i].fma(mass * 0.5, first.0[i])));
-    let [xx, yy, zz] = from_fn(|i| d.0[i] * h.0[i] * 2.0);
+    let h = d.scale_add(mass * 0.5, first);
+    let twice = |i: usize| d.0[i] * h.0[i] * 2.0;
+    let (xx, yy, zz) = (twice(0), twice(1), twice(2));
     second[0] += yy + zz;
     second[1] += xx + zz;
     second[2] += xx + yy;

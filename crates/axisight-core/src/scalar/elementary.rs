@@ -124,7 +124,10 @@ pub(super) fn exp<R: Real>(x: R) -> R {
     let below = (x - limit).if_positive(limit, x);
     let clamped = (-limit - below).if_positive(-limit, below);
     let n = (clamped * std::f64::consts::LOG2_E).round();
-    let r = n.fma(R::constant(-LN2_LOW), n.fma(R::constant(-LN2_HIGH), clamped));
+    let r = n.fma(
+        R::constant(-LN2_LOW),
+        n.fma(R::constant(-LN2_HIGH), clamped),
+    );
     let y = horner(r, &EXPONENTIAL) * n.two_to_the();
     (-limit - x).if_positive(R::zero(), y)
 }
@@ -140,7 +143,6 @@ pub(super) fn tanh<R: Real>(x: R) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-
 
     fn sweep(limit: f64) -> impl Iterator<Item = f64> {
         (0..200_001).map(move |i| (f64::from(i) / 100_000.0 - 1.0) * limit)

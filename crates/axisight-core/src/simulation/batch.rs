@@ -191,13 +191,12 @@ impl Group<'_> {
     ) -> Result<Vec<Outcome>, BatchError> {
         let lanes: Vec<usize> = (0..self.runs.len()).collect();
         if lanes.len() > 1 {
-            let outcome = match linear {
-                Some(plant) => self.linear::<Lanes<LANES>>(batch, plant, &lanes)?,
-                None => {
-                    let lifted: Vec<_> = batch.settings.iter().map(EffectSetting::lifted).collect();
-                    let plant = Plant::<Lanes<LANES>>::new(batch.robot, &[], &lifted)?;
-                    self.nonlinear(batch, &plant, Stepper::new(&plant), &lanes)?
-                }
+            let outcome = if let Some(plant) = linear {
+                self.linear::<Lanes<LANES>>(batch, plant, &lanes)?
+            } else {
+                let lifted: Vec<_> = batch.settings.iter().map(EffectSetting::lifted).collect();
+                let plant = Plant::<Lanes<LANES>>::new(batch.robot, &[], &lifted)?;
+                self.nonlinear(batch, &plant, Stepper::new(&plant), &lanes)?
             };
             if matches!(outcome.status, Status::Completed | Status::Cancelled(_)) {
                 return Ok(vec![outcome; lanes.len()]);
@@ -213,17 +212,16 @@ impl Group<'_> {
         linear: Option<&LinearPlant>,
         lane: usize,
     ) -> Result<Outcome, BatchError> {
-        let outcome = match linear {
-            Some(plant) => self.linear::<f64>(batch, plant, &[lane])?,
-            None => {
-                let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
-                let stepper = if batch.method.may_be_implicit() {
-                    Stepper::with_jacobian(&plant, batch.robot, batch.settings)?
-                } else {
-                    Stepper::new(&plant)
-                };
-                self.nonlinear(batch, &plant, stepper, &[lane])?
-            }
+        let outcome = if let Some(plant) = linear {
+            self.linear::<f64>(batch, plant, &[lane])?
+        } else {
+            let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
+            let stepper = if batch.method.may_be_implicit() {
+                Stepper::with_jacobian(&plant, batch.robot, batch.settings)?
+            } else {
+                Stepper::new(&plant)
+            };
+            self.nonlinear(batch, &plant, stepper, &[lane])?
         };
         if let Status::Diverged(k) | Status::StepSizeCollapsed(k) | Status::Cancelled(k) =
             outcome.status
@@ -329,7 +327,10 @@ impl Batch<'_> {
             runs.iter().copied().filter(|r| *r < all.len()).collect()
         };
         let inputs: Vec<&[f64]> = runs.iter().map(|r| &self.input.runs()[*r][..]).collect();
-        let noise: Vec<&[f64]> = pick(self.noise).iter().map(|r| &self.noise[*r][..]).collect();
+        let noise: Vec<&[f64]> = pick(self.noise)
+            .iter()
+            .map(|r| &self.noise[*r][..])
+            .collect();
         simulate(&Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,

@@ -96,7 +96,9 @@ pub enum SimulationError {
         got: String,
     },
     /// An implicit method without the Jacobian of [`Stepper::with_jacobian`].
-    #[error("method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}")]
+    #[error(
+        "method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}"
+    )]
     NoJacobian(Method),
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
@@ -122,6 +124,7 @@ pub fn simulate<S: Scalar>(
         return Err(SimulationError::NoJacobian(run.method));
     }
     let rest = equilibrium(plant, run.start)?;
+    stepper.begin();
     let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
     let mut controller = ControlLoop::new(
         run.controller,

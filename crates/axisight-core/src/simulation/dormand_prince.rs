@@ -61,13 +61,16 @@ pub(super) fn step<S: Scalar>(
     stepper: &mut Stepper<S>,
 ) -> f64 {
     stepper.effort.steps += 1;
-    for stage in 0..STAGES {
+    let first = usize::from(reuse_last_stage(interval, lines, stepper));
+    for stage in first..STAGES {
         stepper.probe.copy_from_slice(x);
         for (weight, k) in WEIGHT[stage][..stage.min(6)].iter().zip(&stepper.stages) {
             add(&mut stepper.probe, *weight * h, k);
         }
         stepper.stage(interval.plant, stage, NODE[stage], lines, interval.command);
     }
+    stepper.reusable.clear();
+    stepper.reusable.extend_from_slice(&stepper.applied);
     // The last probe is the fifth-order solution; its own memory now takes the error.
     x.copy_from_slice(&stepper.probe);
     stepper.probe.fill(S::zero());
@@ -75,6 +78,28 @@ pub(super) fn step<S: Scalar>(
         add(&mut stepper.probe, *weight * h, k);
     }
     largest_relative(&stepper.probe, x)
+}
+
+/// Make the last stage of the step before the first of this one, if only motor torques have
+/// changed since.
+#[inline(always)]
+fn reuse_last_stage<S: Scalar>(
+    interval: &Interval<'_, S>,
+    lines: &[Line<S>],
+    stepper: &mut Stepper<S>,
+) -> bool {
+    if stepper.reusable.is_empty() || !interval.plant.torque_acts_on_motors_alone() {
+        return false;
+    }
+    for (a, line) in stepper.applied.iter_mut().zip(lines) {
+        *a = line.at(0.0);
+    }
+    stepper.stages.swap(0, STAGES - 1);
+    let slope = &mut stepper.stages[0];
+    interval
+        .plant
+        .change_torque(&stepper.reusable, &stepper.applied, slope);
+    true
 }
 
 /// `sum += weight * k`.

@@ -80,6 +80,9 @@ pub struct Stepper<S> {
     pub(super) stages: Vec<Vec<S>>,
     pub(super) probe: Vec<S>,
     pub(super) applied: Vec<S>,
+    /// Torques of the last Dormand-Prince stage, which is the first of the next step but for
+    /// the torques; empty when there is none to reuse.
+    pub(super) reusable: Vec<S>,
     pub(super) start: Vec<S>,
     pub(super) implicit: Option<Box<dyn Implicit<S>>>,
     /// Sub-steps per sample of the error-controlled explicit method.
@@ -103,12 +106,20 @@ impl<S: Scalar> Stepper<S> {
             stages: vec![zeros.clone(); dormand_prince::STAGES],
             probe: zeros.clone(),
             applied: vec![S::zero(); plant.axes.len()],
+            reusable: Vec::new(),
             start: zeros,
             implicit: None,
             substeps: 1,
             stiff_score: 0,
             effort: Effort::default(),
         }
+    }
+
+    /// Forget the last run.
+    pub(super) fn begin(&mut self) {
+        self.reusable.clear();
+        self.substeps = 1;
+        self.stiff_score = 0;
     }
 
     /// Whether implicit methods can be used.
@@ -232,6 +243,7 @@ impl<S: Scalar> Interval<'_, S> {
                     return false;
                 }
                 None => {
+                    stepper.reusable.clear();
                     stepper.substeps *= 2;
                     x.copy_from_slice(&stepper.start);
                     torque.rewind();

@@ -19,14 +19,34 @@ const NODE: [f64; 3] = [(4.0 - ROOT_6) / 10.0, (4.0 + ROOT_6) / 10.0, 1.0];
 const REAL: f64 = 3.637_834_252_744_495_7;
 const COMPLEX: Complex<f64> = Complex::new(2.681_082_873_627_752, -3.050_430_199_247_410_6);
 const FROM_MODES: [[f64; 3]; 3] = [
-    [0.094_438_762_488_975_24, -0.141_255_295_020_954_2, 0.030_029_194_105_147_424],
-    [0.250_213_122_965_333_3, 0.204_129_352_293_799_93, -0.382_942_112_757_261_94],
+    [
+        0.094_438_762_488_975_24,
+        -0.141_255_295_020_954_2,
+        0.030_029_194_105_147_424,
+    ],
+    [
+        0.250_213_122_965_333_3,
+        0.204_129_352_293_799_93,
+        -0.382_942_112_757_261_94,
+    ],
     [1.0, 1.0, 0.0],
 ];
 const TO_MODES: [[f64; 3]; 3] = [
-    [4.178_718_591_551_905, 0.327_682_820_761_062_4, 0.523_376_445_499_449_5],
-    [-4.178_718_591_551_905, -0.327_682_820_761_062_4, 0.476_623_554_500_550_5],
-    [0.502_872_634_945_786_9, -2.571_926_949_855_605, 0.596_039_204_828_224_9],
+    [
+        4.178_718_591_551_905,
+        0.327_682_820_761_062_4,
+        0.523_376_445_499_449_5,
+    ],
+    [
+        -4.178_718_591_551_905,
+        -0.327_682_820_761_062_4,
+        0.476_623_554_500_550_5,
+    ],
+    [
+        0.502_872_634_945_786_9,
+        -2.571_926_949_855_605,
+        0.596_039_204_828_224_9,
+    ],
 ];
 
 /// Weights of the embedded error estimate of order 3.
@@ -162,7 +182,11 @@ impl RadauIia {
                 let z: f64 = (0..3).map(|m| FROM_MODES[k][m] * self.modes[m][i]).sum();
                 let scale = step.iteration_tolerance * x[i].abs().max(SMALLEST_STATE);
                 let change = (z - self.stages[k][i]).abs() / scale;
-                size = if change.is_nan() { change } else { size.max(change) };
+                size = if change.is_nan() {
+                    change
+                } else {
+                    size.max(change)
+                };
                 self.stages[k][i] = z;
                 if size.is_nan() {
                     return Some(size);
@@ -174,7 +198,13 @@ impl RadauIia {
 
     /// Local error in units of the tolerance, filtered through the real system so that it stays
     /// bounded for stiff parts.
-    fn error(&mut self, step: &Step<'_>, slopes: &mut Slopes, x: &[f64], effort: &mut Effort) -> f64 {
+    fn error(
+        &mut self,
+        step: &Step<'_>,
+        slopes: &mut Slopes,
+        x: &[f64],
+        effort: &mut Effort,
+    ) -> f64 {
         let rate = 1.0 / step.length;
         let Some(factors) = &self.factors else {
             return f64::NAN;

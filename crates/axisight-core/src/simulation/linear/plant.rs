@@ -1,6 +1,5 @@
 //! What the linear loop needs to know of a robot, computed once.
 
-use std::ops::Range;
 use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
 use crate::effects::{self, Acts, EffectError, Kernel, Role};
@@ -9,6 +8,7 @@ use crate::robot::{
     linearize,
 };
 use crate::scalar::Scalar;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Effects whose slope at rest describes them in motion too.

@@ -38,7 +38,7 @@ pub fn simulate_linear<S: Scalar>(
             got: format!("{:?}", run.start),
         });
     }
-    let mut state = LinearLoop::<S>::new(plant, run)?;
+    let mut state = LinearLoop::<S>::new(plant, run);
     let mut paths = torque_paths(plant, run)?;
     Ok(samples(&mut state, &mut paths, run, n_samples, observe))
 }
@@ -112,7 +112,7 @@ struct LinearLoop<'a, S> {
 }
 
 impl<'a, S: Scalar> LinearLoop<'a, S> {
-    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Result<Self, SimulationError> {
+    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Self {
         let (n, m) = (plant.n_states(), plant.n_axes());
         let substeps = match run.method {
             Method::RungeKutta4 { substeps } => substeps.max(1),
@@ -132,7 +132,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         let mut ripple = vec![Ripple::zero(); m];
         plant.waves.evaluate(&angle, &mut powers, &mut ripple);
         let padded = Tiles::padded(n);
-        Ok(Self {
+        Self {
             plant,
             propagator,
             substeps,
@@ -146,7 +146,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             predicted: vec![S::zero(); padded],
             missed: vec![S::zero(); 2 * m],
             absolute: lift(&plant.rest),
-        })
+        }
     }
 
     /// Measure, command, and note what acts on the motors.
