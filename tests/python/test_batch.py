@@ -129,7 +129,11 @@ def test_error_control_keeps_a_run_within_the_tolerance(
 @pytest.mark.parametrize("method", ["radau5", "rodas4", "auto"])
 def test_implicit_methods_take_runs_one_by_one(method: str) -> None:
     effects = [
-        Effect("presliding_friction", 1, {"coulomb_nm": 0.5, "presliding_rad": 1e-5}),
+        Effect(
+            "presliding_friction",
+            1,
+            {"coulomb_nm": 0.5, "presliding_rad": 1e-5, "bristle_time_s": 1e-5},
+        ),
         *RIPPLE,
     ]
     options = {"effects": effects, "method": method, "tolerance": 1e-5, "noise_seed": 2}
