@@ -290,11 +290,7 @@ def test_automatic_method_switches_on_the_stiff_plant_only(
     assert np.array_equal(smooth[0]["torque_cmd_nm"], smooth[1]["torque_cmd_nm"])
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="implicit steps are not shorter than 1/4096 sample, too long for a reversal on "
-    "stiff bristles; see test_presliding_friction_as_by_scipy for what it should give",
-)
+# A reversal of stiff bristles takes a millionth of a sample.
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_stiff_friction_at_the_default_tolerance(method: str) -> None:
     run = axisight.simulate(TWO_MASSES, TURNING, effects=friction(STIFF), method=method)

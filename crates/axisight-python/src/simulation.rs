@@ -30,11 +30,12 @@ pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
             )));
         }
     };
-    if tolerance > 0.0 && tolerance < 1.0 {
+    // Below this the states cannot even be written down.
+    if (1e-14..1.0).contains(&tolerance) {
         Ok(controlled)
     } else {
         Err(input_error(format!(
-            "tolerance: expected between 0 and 1, got {tolerance}"
+            "tolerance: expected between 1e-14 and 1, got {tolerance}"
         )))
     }
 }

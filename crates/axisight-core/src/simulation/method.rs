@@ -94,7 +94,7 @@ pub struct Stepper<S> {
 }
 
 /// Sub-step budget of one sample before a run is given up.
-pub(super) const MAX_SUBSTEPS: usize = 4096;
+const MAX_SUBSTEPS: usize = 4096;
 
 impl<S: Scalar> Stepper<S> {
     /// Scratch for `plant`; explicit methods only.

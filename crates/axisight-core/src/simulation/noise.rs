@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// White Gaussian position noise of standard deviation `std` [rad], row-major
 /// `(n_samples, n_axes)`. Each axis has its own stream, so the noise of one
-/// axis does not depend on how many others there are.
+/// axis does not depend on how many others there are. Runs below 2^48 have different noise.
 pub fn measurement_noise(
     seed: u64,
     run: u64,

@@ -5,7 +5,7 @@ mod linear;
 mod radau_iia;
 mod rosenbrock;
 
-use super::method::{Effort, Interval, MAX_SUBSTEPS, Method, Stepper};
+use super::method::{Effort, Interval, Method, Stepper};
 use super::torque_path::{Line, SampleTorque};
 use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
 use crate::scalar::Scalar;
@@ -104,6 +104,12 @@ struct Step<'a> {
 
 /// Share of the tolerance that an inner iteration may leave.
 const ITERATION_SHARE: f64 = 1e-2;
+/// What no iteration gets below, relative to the state.
+const ROUNDING: f64 = 1e-13;
+/// Steps and attempts in one sample before a run is given up.
+const MOST_STEPS: u64 = 20_000;
+/// Shortest step as a share of the sample; a reversal of stiff bristles takes 1e-6 of it.
+const SHORTEST: f64 = 1e-12;
 
 /// What became of a step.
 enum Trial {
@@ -210,7 +216,7 @@ impl StepSize {
         torque: &mut SampleTorque<'_, S>,
         effort: &mut Effort,
     ) -> bool {
-        let smallest = 1.0 / MAX_SUBSTEPS as f64;
+        let budget = effort.steps + effort.rejections + MOST_STEPS;
         self.command.clear();
         self.command
             .extend(interval.command.iter().map(|u| u.lane(0)));
@@ -225,7 +231,7 @@ impl StepSize {
                 length: (to - from) * interval.sample_time,
                 lines: &self.lines,
                 tolerance,
-                iteration_tolerance: ITERATION_SHARE * tolerance,
+                iteration_tolerance: (ITERATION_SHARE * tolerance).max(ROUNDING),
             };
             match method.attempt(&step, slopes, &mut self.x, effort) {
                 Trial::Error(error) if error <= 1.0 => {
@@ -238,13 +244,13 @@ impl StepSize {
                     }
                     from = to;
                 }
-                Trial::Error(error) if error.is_finite() => {
+                Trial::Error(error) => {
                     effort.rejections += 1;
+                    // An error that is not a number shrinks the step most.
                     let shrunk = 0.9 * error.powf(-1.0 / M::ORDER);
-                    self.fraction = (to - from) * shrunk.clamp(0.1, 0.8);
+                    self.fraction = (to - from) * shrunk.max(0.1).min(0.8);
                     method.refresh();
                 }
-                Trial::Error(_) => return false,
                 Trial::NoConvergence => {
                     effort.rejections += 1;
                     if method.is_fresh() {
@@ -253,7 +259,8 @@ impl StepSize {
                     method.refresh();
                 }
             }
-            if self.fraction < smallest {
+            let spent = effort.steps + effort.rejections >= budget;
+            if spent || self.fraction < SHORTEST {
                 return false;
             }
         }

@@ -56,7 +56,7 @@ const ERROR: [f64; 3] = [
     -1.0 / 3.0,
 ];
 
-const MOST_ITERATIONS: usize = 10;
+const MOST_ITERATIONS: usize = 8;
 
 /// Factorized systems for one step length.
 struct Factors {
@@ -69,6 +69,8 @@ pub(super) struct RadauIia {
     n: usize,
     jacobian: Option<DMatrix<f64>>,
     fresh: bool,
+    /// What is left after an iteration, as a multiple of its change; from the last step.
+    convergence: f64,
     factors: Option<Factors>,
     /// Departures of the stages from the start of the step, and their mode coordinates.
     stages: [Vec<f64>; 3],
@@ -87,6 +89,7 @@ impl RadauIia {
             n,
             jacobian: None,
             fresh: false,
+            convergence: 1.0,
             factors: None,
             stages: zeros(),
             modes: zeros(),
@@ -131,7 +134,9 @@ impl RadauIia {
             z.fill(0.0);
         }
         let mut last: Option<f64> = None;
-        for _ in 0..MOST_ITERATIONS {
+        // How much longer the iteration would be from the last step's experience.
+        let mut factor = self.convergence.max(f64::EPSILON).powf(0.8);
+        for iteration in 0..MOST_ITERATIONS {
             for k in 0..3 {
                 for i in 0..self.n {
                     self.probe[i] = x[i] + self.stages[k][i];
@@ -142,13 +147,23 @@ impl RadauIia {
             let Some(change) = self.newton_step(step, x) else {
                 return false;
             };
-            let rate = last.map(|l| change / l);
-            if rate.is_some_and(|r| r >= 1.0 || r.is_nan()) || !change.is_finite() {
+            if !change.is_finite() {
                 return false;
             }
-            // What is left after this iteration if it goes on converging at this rate.
-            let left = rate.map_or(change, |r| r / (1.0 - r) * change);
-            if change <= 1e-3 || (rate.is_some() && left <= 1.0) {
+            if let Some(last) = last {
+                let rate = change / last;
+                if rate >= 1.0 {
+                    return false;
+                }
+                factor = rate / (1.0 - rate);
+                // Hopeless within the iterations that are left.
+                let left = i32::try_from(MOST_ITERATIONS - 1 - iteration).unwrap_or(0);
+                if factor * change * rate.powi(left) > 1.0 {
+                    return false;
+                }
+            }
+            if factor * change <= 1.0 {
+                self.convergence = factor;
                 return true;
             }
             last = Some(change);
@@ -267,6 +282,7 @@ impl OneStep for RadauIia {
         if !self.fresh {
             self.jacobian = None;
             self.factors = None;
+            self.convergence = 1.0;
         }
     }
 

@@ -91,6 +91,8 @@ pub(super) struct Waves {
     /// Orders that are not whole, evaluated directly, stored after the chain.
     direct: Vec<f64>,
     axes: Vec<Terms>,
+    /// Highest order.
+    pub(super) highest: f64,
 }
 
 impl Waves {
@@ -117,6 +119,7 @@ impl Waves {
         });
         Self {
             axes: axes.collect(),
+            highest: orders().fold(0.0, f64::max),
             chain,
             direct,
         }

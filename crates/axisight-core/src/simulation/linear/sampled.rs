@@ -69,6 +69,9 @@ fn samples<S: Scalar>(
         if !state.settle() {
             return Status::Diverged(k);
         }
+        if (0..S::LANES).any(|lane| state.coarse.lane(lane) > 0.0) {
+            return Status::StepSizeCollapsed(k);
+        }
     }
     Status::Completed
 }
@@ -109,7 +112,13 @@ struct LinearLoop<'a, S> {
     missed: Vec<S>,
     /// `[phi, q, phi', q']`.
     absolute: Vec<S>,
+    /// One in lanes whose ripple is too steep for the step.
+    coarse: S,
 }
+
+/// Farthest that a correction may move the angle of the highest harmonic [rad]: the ripple
+/// is then moved to first order only. Steeper ripple needs more sub-steps.
+const FARTHEST_MOVE: f64 = 0.1;
 
 impl<'a, S: Scalar> LinearLoop<'a, S> {
     fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Self {
@@ -146,6 +155,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             predicted: vec![S::zero(); padded],
             missed: vec![S::zero(); 2 * m],
             absolute: lift(&plant.rest),
+            coarse: S::zero(),
         }
     }
 
@@ -227,6 +237,8 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         for (i, axis) in self.plant.axes.iter().enumerate() {
             let by = (deviation[axis.slot] - self.predicted[axis.slot]) * axis.scale;
             self.ripple[i] = self.ripple[i].moved(by);
+            let far = by.abs() * self.plant.waves.highest - FARTHEST_MOVE;
+            self.coarse = far.if_positive(S::one(), self.coarse);
         }
     }
 
