@@ -246,9 +246,10 @@ impl StepSize {
                 }
                 Trial::Error(error) => {
                     effort.rejections += 1;
+                    let wanted = 0.9 * error.powf(-1.0 / M::ORDER);
                     // An error that is not a number shrinks the step most.
-                    let shrunk = 0.9 * error.powf(-1.0 / M::ORDER);
-                    self.fraction = (to - from) * shrunk.max(0.1).min(0.8);
+                    let shrunk = if wanted > 0.1 { wanted.min(0.8) } else { 0.1 };
+                    self.fraction = (to - from) * shrunk;
                     method.refresh();
                 }
                 Trial::NoConvergence => {
