@@ -115,17 +115,22 @@ fn add<S: Scalar>(sum: &mut [S], weight: f64, k: &[S]) {
 
 /// Largest error in units of its state, over all lanes; NaN if any is.
 pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
-    let mut worst: f64 = 0.0;
+    let floor = S::constant(SMALLEST_STATE);
+    let (mut worst, mut nan) = (S::zero(), S::zero());
     for (e, x) in error.iter().zip(x) {
-        for lane in 0..S::LANES {
-            let relative = e.lane(lane).abs() / x.lane(lane).abs().max(SMALLEST_STATE);
-            if relative.is_nan() {
-                return f64::NAN;
-            }
-            worst = worst.max(relative);
-        }
+        let size = x.abs();
+        let relative = e.abs() / (size - floor).if_positive(size, floor);
+        worst = (relative - worst).if_positive(relative, worst);
+        // A comparison lets NaN pass; a sum does not. Infinity times zero is NaN as well.
+        nan = relative.fma(S::zero(), nan);
     }
-    worst
+    (0..S::LANES).fold(0.0, |largest: f64, lane| {
+        if largest.is_nan() || nan.lane(lane).is_nan() {
+            f64::NAN
+        } else {
+            largest.max(worst.lane(lane))
+        }
+    })
 }
 
 /// Boundary of the stability region on the negative real axis.

@@ -23,7 +23,9 @@ use std::sync::atomic::Ordering;
 /// added to the state at rest. `run.start` must be where `plant` was linearized.
 ///
 /// # Errors
-/// [`SimulationError`] for misuse; trouble during the run is a [`Status`].
+/// [`SimulationError`] for misuse; trouble during the run is a [`Status`]. Ripple too steep
+/// for its step is [`Status::StepSizeCollapsed`] at the first such sample; what was observed
+/// after it is void.
 pub fn simulate_linear<S: Scalar>(
     plant: &LinearPlant,
     run: &Run<'_>,
@@ -53,6 +55,7 @@ fn samples<S: Scalar>(
 ) -> Status {
     let mut buffers = TorqueBuffers::new(paths.len());
     let width = 1.0 / state.substeps as f64;
+    let mut collapsed = None;
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Status::Cancelled(k);
@@ -69,11 +72,13 @@ fn samples<S: Scalar>(
         if !state.settle() {
             return Status::Diverged(k);
         }
-        if (0..S::LANES).any(|lane| state.coarse.lane(lane) > 0.0) {
-            return Status::StepSizeCollapsed(k);
+        // An unstable loop also makes ripple steep: go on to see whether it is one.
+        let steep = (0..S::LANES).any(|lane| state.coarse.lane(lane) > 0.0);
+        if steep && collapsed.is_none() {
+            collapsed = Some(k);
         }
     }
-    Status::Completed
+    collapsed.map_or(Status::Completed, Status::StepSizeCollapsed)
 }
 
 /// From command to delivered torque of every axis, settled at rest.
