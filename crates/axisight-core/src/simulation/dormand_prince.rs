@@ -137,8 +137,11 @@ pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
 const STABLE: f64 = 3.25;
 /// A sample of so many explicit sub-steps costs more than an implicit one.
 const DEAR: usize = 8;
-/// Samples in a row that must point to stiffness.
+/// Samples that must point to stiffness, those that do not deducted.
 const PATIENCE: u32 = 15;
+/// Share of the stable step that counts as held down by stability: the number of sub-steps is
+/// a power of two and may be twice what is needed; accuracy alone keeps steps far below.
+const NEAR: f64 = 0.25;
 
 /// After an accepted sample with sub-steps `h`: is the step held down by stability?
 ///
@@ -146,7 +149,7 @@ const PATIENCE: u32 = 15;
 /// dominating eigenvalue (Hairer, Wanner 1996, section IV.2).
 pub(super) fn watch_stiffness<S: Scalar>(stepper: &mut Stepper<S>, h: f64) {
     if stepper.substeps < DEAR {
-        stepper.stiff_score = 0;
+        stepper.stiff_score = stepper.stiff_score.saturating_sub(1);
         return;
     }
     let (mut slope, mut distance) = (0.0, 0.0);
@@ -160,8 +163,12 @@ pub(super) fn watch_stiffness<S: Scalar>(stepper: &mut Stepper<S>, h: f64) {
         slope += (0..S::LANES).map(|l| change.lane(l).powi(2)).sum::<f64>();
         distance += (0..S::LANES).map(|l| apart.lane(l).powi(2)).sum::<f64>();
     }
-    let stiff = h * h * slope > (0.5 * STABLE).powi(2) * distance;
-    stepper.stiff_score = if stiff { stepper.stiff_score + 1 } else { 0 };
+    let stiff = h * h * slope > (NEAR * STABLE).powi(2) * distance;
+    stepper.stiff_score = if stiff {
+        stepper.stiff_score + 1
+    } else {
+        stepper.stiff_score.saturating_sub(1)
+    };
 }
 
 pub(super) fn is_stiff<S: Scalar>(stepper: &Stepper<S>) -> bool {

@@ -87,7 +87,7 @@ pub struct Stepper<S> {
     pub(super) implicit: Option<Box<dyn Implicit<S>>>,
     /// Sub-steps per sample of the error-controlled explicit method.
     pub(super) substeps: usize,
-    /// Samples in a row whose explicit step was held down by stability.
+    /// Samples whose explicit step was held down by stability, less those that were not.
     pub(super) stiff_score: u32,
     /// What the run cost so far.
     pub effort: Effort,

@@ -70,7 +70,7 @@ fn samples<S: Scalar>(
         }
         torque.finish();
         if !state.settle() {
-            return Status::Diverged(k);
+            return Status::Diverged(collapsed.unwrap_or(k));
         }
         // An unstable loop also makes ripple steep: go on to see whether it is one.
         let steep = (0..S::LANES).any(|lane| state.coarse.lane(lane) > 0.0);
