@@ -69,8 +69,6 @@ pub(super) struct RadauIia {
     n: usize,
     jacobian: Option<DMatrix<f64>>,
     fresh: bool,
-    /// What is left after an iteration, as a multiple of its change; from the last step.
-    convergence: f64,
     factors: Option<Factors>,
     /// Departures of the stages from the start of the step, and their mode coordinates.
     stages: [Vec<f64>; 3],
@@ -89,7 +87,6 @@ impl RadauIia {
             n,
             jacobian: None,
             fresh: false,
-            convergence: 1.0,
             factors: None,
             stages: zeros(),
             modes: zeros(),
@@ -134,8 +131,6 @@ impl RadauIia {
             z.fill(0.0);
         }
         let mut last: Option<f64> = None;
-        // How much longer the iteration would be from the last step's experience.
-        let mut factor = self.convergence.max(f64::EPSILON).powf(0.8);
         for iteration in 0..MOST_ITERATIONS {
             for k in 0..3 {
                 for i in 0..self.n {
@@ -150,20 +145,24 @@ impl RadauIia {
             if !change.is_finite() {
                 return false;
             }
+            // The rate is this step's own: behind a corner of the plant the last step's says
+            // nothing, and one iteration with the old Jacobian may be far off.
             if let Some(last) = last {
                 let rate = change / last;
                 if rate >= 1.0 {
                     return false;
                 }
-                factor = rate / (1.0 - rate);
+                let remains = rate / (1.0 - rate) * change;
+                if remains <= 1.0 {
+                    return true;
+                }
                 // Hopeless within the iterations that are left.
                 let left = i32::try_from(MOST_ITERATIONS - 1 - iteration).unwrap_or(0);
-                if factor * change * rate.powi(left) > 1.0 {
+                if remains * rate.powi(left) > 1.0 {
                     return false;
                 }
             }
-            if factor * change <= 1.0 {
-                self.convergence = factor;
+            if change <= 1e-3 {
                 return true;
             }
             last = Some(change);
@@ -282,7 +281,6 @@ impl OneStep for RadauIia {
         if !self.fresh {
             self.jacobian = None;
             self.factors = None;
-            self.convergence = 1.0;
         }
     }
 
