@@ -66,8 +66,8 @@ def simulate(
     ``position_rad`` (measured), ``motor_position_rad`` and
     ``joint_position_rad`` (true), ``torque_disturbance_nm``,
     ``position_disturbance_rad``. ``attrs["status"]`` is ``completed``,
-    ``diverged`` (unstable loop) or ``step_size_collapsed``; the arrays then
-    end at the sample that failed. The attributes also count the effort. Raises InputError
+    ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either); the arrays
+    then end at the sample that failed. The attributes also count the effort. Raises InputError
     for wrong shapes, non-finite input, unknown effects or a missing controller.
 
     """
