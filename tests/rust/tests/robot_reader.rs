@@ -583,6 +583,23 @@ fn robot_needs_joints() {
 }
 
 #[test]
+fn chain_longer_than_the_compiled_sizes_is_refused() {
+    let first = SMALL.find("[[joint]]").expect("in the small robot");
+    let elastic: String = (0..33)
+        .map(|i| {
+            format!(
+                "[[joint]]\nname = \"e{i}\"\nkind = \"elastic\"\norigin = [0, 0, 0]\n\
+                 axis = [1.0, 0, 0]\nstiffness = 1.0\ndamping = 1.0\n"
+            )
+        })
+        .collect();
+    refused(
+        &format!("{}{elastic}", &SMALL[..first]),
+        "line 6: `joint`: expected at most 32 joints, got 33",
+    );
+}
+
+#[test]
 fn robot_needs_a_driven_joint() {
     let find = |needle| SMALL.find(needle).expect("in the small robot");
     let (first, bend) = (find("[[joint]]"), find("[[joint]]\nname = \"bend\""));

@@ -9,6 +9,7 @@ use super::description::{
     Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, check_unit,
     is_positive_definite,
 };
+use super::dynamics::MOST_JOINTS;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
@@ -170,6 +171,10 @@ fn check_chain(
     sections: &[Section],
 ) -> Result<(), RobotError> {
     let place = |i: usize| sections.get(i).zip(robot.joints.get(i));
+    if robot.joints.len() > MOST_JOINTS {
+        let expected = format!("at most {MOST_JOINTS} joints");
+        return Err(joint_list.invalid(expected, robot.joints.len().to_string()));
+    }
     if robot.n_axes() == 0 {
         let expected = "at least one joint of kind \"driven\"".to_owned();
         return Err(joint_list.invalid(expected, "none".to_owned()));
