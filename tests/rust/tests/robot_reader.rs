@@ -582,17 +582,17 @@ fn robot_needs_joints() {
     );
 }
 
+/// Where the joints, the elastic joint `bend` and the controller begin in `SMALL`.
+fn sections() -> (usize, usize, usize) {
+    let find = |needle| SMALL.find(needle).expect("in the small robot");
+    let bend = find("[[joint]]\nname = \"bend\"");
+    (find("[[joint]]"), bend, find("[controller]"))
+}
+
 #[test]
 fn chain_longer_than_the_compiled_sizes_is_refused() {
-    let first = SMALL.find("[[joint]]").expect("in the small robot");
-    let elastic: String = (0..33)
-        .map(|i| {
-            format!(
-                "[[joint]]\nname = \"e{i}\"\nkind = \"elastic\"\norigin = [0, 0, 0]\n\
-                 axis = [1.0, 0, 0]\nstiffness = 1.0\ndamping = 1.0\n"
-            )
-        })
-        .collect();
+    let (first, bend, end) = sections();
+    let elastic = SMALL[bend..end].repeat(33);
     refused(
         &format!("{}{elastic}", &SMALL[..first]),
         "line 6: `joint`: expected at most 32 joints, got 33",
@@ -601,8 +601,7 @@ fn chain_longer_than_the_compiled_sizes_is_refused() {
 
 #[test]
 fn robot_needs_a_driven_joint() {
-    let find = |needle| SMALL.find(needle).expect("in the small robot");
-    let (first, bend) = (find("[[joint]]"), find("[[joint]]\nname = \"bend\""));
+    let (first, bend, _) = sections();
     refused(
         &format!("{}{}", &SMALL[..first], &SMALL[bend..]),
         "line 6: `joint`: expected at least one joint of kind \"driven\", got none",

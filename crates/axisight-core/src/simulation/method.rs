@@ -172,7 +172,7 @@ impl<S: Scalar> Interval<'_, S> {
                 let n = substeps.max(1);
                 let h = self.sample_time / n as f64;
                 for i in 0..n {
-                    let lines = torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64);
+                    let lines = torque.part(i, n);
                     runge_kutta4::step(self, x, h, lines, stepper);
                     torque.accept();
                 }
@@ -189,14 +189,12 @@ impl<S: Scalar> Interval<'_, S> {
                     let radau = Method::RadauIia { tolerance };
                     return self.advance_implicitly(radau, x, stepper, torque);
                 }
-                stepper.start.copy_from_slice(x);
                 if self.advance_explicitly(tolerance, x, stepper, torque) {
                     let h = self.sample_time / stepper.substeps as f64;
                     dormand_prince::watch_stiffness(stepper, h);
                     return true;
                 }
                 // Explicit steps cannot meet the bound: stiff beyond doubt.
-                x.copy_from_slice(&stepper.start);
                 torque.rewind();
                 dormand_prince::declare_stiff(stepper);
                 self.advance_implicitly(Method::RadauIia { tolerance }, x, stepper, torque)
@@ -220,7 +218,8 @@ impl<S: Scalar> Interval<'_, S> {
             .is_some_and(|solver| solver.advance(method, self, x, torque, effort))
     }
 
-    /// Dormand-Prince with equal sub-steps, as many as the bound asks for.
+    /// Dormand-Prince with equal sub-steps, as many as the bound asks for; where it cannot be
+    /// met, `x` is what it was.
     fn advance_explicitly(
         &self,
         tolerance: f64,
@@ -264,7 +263,7 @@ impl<S: Scalar> Interval<'_, S> {
         let h = self.sample_time / n as f64;
         let mut worst: f64 = 0.0;
         for i in 0..n {
-            let lines = torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64);
+            let lines = torque.part(i, n);
             let error = dormand_prince::step(self, x, h, lines, stepper) / tolerance;
             if error.is_nan() || error > 1.0 {
                 stepper.effort.rejections += 1;

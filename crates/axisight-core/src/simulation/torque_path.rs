@@ -264,6 +264,11 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         &self.buffers.lines
     }
 
+    /// Torque lines of part `i` of `n` equal parts of the sample.
+    pub(super) fn part(&mut self, i: usize, n: usize) -> &[Line<S>] {
+        self.span(i as f64 / n as f64, (i + 1) as f64 / n as f64)
+    }
+
     /// The span in hand was integrated: the next one starts at its end.
     pub(super) fn accept(&mut self) {
         if self.varies {

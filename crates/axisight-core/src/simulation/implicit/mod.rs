@@ -316,7 +316,7 @@ mod tests {
             let step = Step {
                 command: &command,
                 length: duration / n as f64,
-                lines: torque.span(i as f64 / n as f64, (i + 1) as f64 / n as f64),
+                lines: torque.part(i, n),
                 tolerance: 1e9,
                 iteration_tolerance: 1e-13,
             };

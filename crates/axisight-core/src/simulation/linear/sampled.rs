@@ -54,7 +54,6 @@ fn samples<S: Scalar>(
     observe: &mut impl FnMut(&Sample<'_, S>),
 ) -> Status {
     let mut buffers = TorqueBuffers::new(paths.len());
-    let width = 1.0 / state.substeps as f64;
     let mut collapsed = None;
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
@@ -64,8 +63,7 @@ fn samples<S: Scalar>(
         observe(&state.signals.sample(k, &state.absolute));
         let mut torque = SampleTorque::new(paths, &state.signals.command, &mut buffers);
         for substep in 0..state.substeps {
-            let from = substep as f64 * width;
-            state.step(torque.span(from, from + width));
+            state.step(torque.part(substep, state.substeps));
             torque.accept();
         }
         torque.finish();
