@@ -1,0 +1,123 @@
+"""What every estimator returns: a frequency response with its uncertainty.
+
+An ``xarray.Dataset`` over ``frequency_hz``, ``output`` and ``input`` (axes count from 1):
+
+================== ============================= ==========================================
+variable           dims                          meaning
+================== ============================= ==========================================
+response           frequency_hz, output, input   G(i w), complex [output unit / input unit]
+variance           frequency_hz, output, input   E|dG|^2 of the estimate: noise and
+                                                 nonlinear distortion; NaN where unknown
+noise_variance     the same, optional            the share of the noise in it
+condition          frequency_hz                  condition number of U, NaN if not used
+flag               frequency_hz                  see :class:`Flag`
+coherence          frequency_hz, output          multiple coherence, optional
+================== ============================= ==========================================
+
+With a circular complex normal error the band of probability p about G is a disc of radius
+``sqrt(-ln(1 - p) * variance)``; for 95 % that is ``1.73 sqrt(variance)``.
+
+A line that cannot be estimated is NaN and flagged; a number is never infinite.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+
+DIMS = ("frequency_hz", "output", "input")
+
+
+class Flag(IntEnum):
+    """Why a line is not to be trusted."""
+
+    GOOD = 0
+    RANK_DEFICIENT = 1
+    """The experiments do not excite all inputs at this line: NaN."""
+    ILL_CONDITIONED = 2
+    """The response is given, but errors are amplified more than a thousandfold."""
+    NO_EXCITATION = 3
+    """An input has no amplitude at this line: NaN."""
+
+
+def frequency_response(
+    frequency_hz: NDArray[np.float64],
+    response: NDArray[np.complex128],
+    *,
+    estimator: str,
+    variance: NDArray[np.float64] | None = None,
+    noise_variance: NDArray[np.float64] | None = None,
+    condition: NDArray[np.float64] | None = None,
+    flag: NDArray[np.int8] | None = None,
+    coherence: NDArray[np.float64] | None = None,
+    input_unit: str = "Nm",
+    output_unit: str = "rad",
+    attrs: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Return the Dataset described above from arrays of shape (n_freq, n_out, n_in).
+
+    frequency_hz
+        Frequencies [Hz], (n_freq,), ascending.
+    condition, flag, coherence
+        (n_freq,), (n_freq,) and (n_freq, n_out).
+    attrs
+        More provenance, e.g. numbers of experiments and periods.
+
+    Raises InputError for shapes that do not fit.
+    """
+    shape = response.shape
+    if len(shape) != 3 or shape[0] != len(frequency_hz):
+        raise InputError(
+            f"response: expected shape ({len(frequency_hz)}, n_out, n_in), got {shape}"
+        )
+    unit = f"{output_unit}/{input_unit}"
+    n = shape[0]
+    variables: dict[str, Any] = {"response": (DIMS, response, {"units": unit})}
+    squared = {"variance": variance, "noise_variance": noise_variance}
+    if variance is None:
+        squared["variance"] = np.full(shape, np.nan)
+    for name, value in squared.items():
+        if value is not None:
+            _expect(name, value, shape)
+            variables[name] = (DIMS, value, {"units": f"({unit})^2"})
+    condition = np.full(n, np.nan) if condition is None else condition
+    flag = np.zeros(n, np.int8) if flag is None else flag.astype(np.int8)
+    _expect("condition", condition, (n,))
+    _expect("flag", flag, (n,))
+    variables["condition"] = (DIMS[:1], condition, {"units": "1"})
+    meanings = {"flag_values": [f.value for f in Flag], "flag_meanings": _meanings()}
+    variables["flag"] = (DIMS[:1], flag, meanings)
+    if coherence is not None:
+        _expect("coherence", coherence, shape[:2])
+        variables["coherence"] = (DIMS[:2], coherence, {"units": "1"})
+    return xr.Dataset(
+        variables,
+        coords={
+            "frequency_hz": (DIMS[:1], np.asarray(frequency_hz, float), {"units": "Hz"}),
+            "output": np.arange(1, shape[1] + 1),
+            "input": np.arange(1, shape[2] + 1),
+        },
+        attrs={
+            "estimator": estimator,
+            "input_unit": input_unit,
+            "output_unit": output_unit,
+            "axisight_version": version("axisight"),
+            **(attrs or {}),
+        },
+    )
+
+
+def _meanings() -> str:
+    return " ".join(f.name.lower() for f in Flag)
+
+
+def _expect(name: str, value: NDArray[Any], shape: tuple[int, ...]) -> None:
+    if value.shape != shape:
+        raise InputError(f"{name}: expected shape {shape}, got {value.shape}")

@@ -1,0 +1,5 @@
+"""Measured or simulated records of experiments, as the estimators take them."""
+
+from axisight.records.periodic import PeriodicRecords
+
+__all__ = ["PeriodicRecords"]
