@@ -41,7 +41,7 @@ _Effect: TypeAlias = tuple[str, int | None, _Numbers]
 _Effects: TypeAlias = Sequence[_Effect]
 # Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
 _Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
-_Method: TypeAlias = Literal["rk4", "dopri5", "radau5", "rodas4", "auto"]
+_Method: TypeAlias = Literal["rk4", "rkn4", "dopri5", "radau5", "rodas4", "auto"]
 _Model: TypeAlias = Literal["nonlinear", "linear"]
 
 @type_check_only
@@ -162,7 +162,7 @@ class OptionSpec(Protocol):
     ``loss`` is "squared", "huber" or "soft_l1"; ``loss_scale`` is in standard deviations.
     ``loss_tolerance`` is a share of the loss, ``step_tolerance`` a share of each parameter's
     scale. ``block_s`` [s] is the length of the blocks of `FitResult.blocks`. ``method`` is
-    "rk4" (with ``substeps`` per sample) or "dopri5" (with a relative ``tolerance`` per
+    "rk4" or "rkn4" (with ``substeps`` per sample) or "dopri5" (with a relative ``tolerance`` per
     sub-step); `fit_inverse_dynamics` ignores these three.
     """
 
@@ -402,7 +402,7 @@ def simulate(
     ``input`` (n_samples, n_axes) is a motor-side velocity reference [rad/s] through the
     controller if ``reference``, else a commanded torque [Nm]. ``noise`` [rad], of the same
     shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
-    angles at rest, None the operating point. ``method`` is "rk4" with ``substeps`` per sample, or
+    angles at rest, None the operating point. ``method`` is "rk4" or "rkn4" with ``substeps`` per sample, or
     an error-controlled one with a relative ``tolerance`` per step. ``resolution`` [rad] is the
     step of the position sensor, 0 for none.
     """

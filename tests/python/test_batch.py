@@ -14,7 +14,7 @@ ARM = load_robot("irb6600_like")
 N, RUNS = 60, 17
 # Eight go in lock-step: one, some, a full group, one more, two full and one.
 SIZES = (1, 5, 8, 9, 17)
-SAME_BITS = [("nonlinear", "rk4"), ("linear", "dopri5"), ("linear", "rk4")]
+SAME_BITS = [("nonlinear", "rk4"), ("nonlinear", "rkn4"), ("linear", "dopri5"), ("linear", "rk4")]
 SIGNALS = (
     "torque_cmd_nm",
     "position_rad",

@@ -123,6 +123,7 @@ def _columns(frame: pd.DataFrame, prefix: str, count: int) -> Array:
 METHODS = [
     ("dopri5", 1, 1e-7),
     ("rk4", 4, 1e-7),
+    ("rkn4", 4, 1e-7),
     ("radau5", 1, 1e-7),
     ("rodas4", 1, 1e-7),
     ("auto", 1, 1e-7),

@@ -11,11 +11,12 @@ use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Integrator by name: `rk4` with sub-steps, the others with a tolerance.
+/// Integrator by name: `rk4` and `rkn4` with sub-steps, the others with a tolerance.
 pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
     let controlled = match name {
         "rk4" if substeps >= 1 => return Ok(Method::RungeKutta4 { substeps }),
-        "rk4" => {
+        "rkn4" if substeps >= 1 => return Ok(Method::Nystrom4 { substeps }),
+        "rk4" | "rkn4" => {
             return Err(input_error(format!(
                 "substeps: expected at least 1, got {substeps}"
             )));
@@ -26,7 +27,7 @@ pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
         "auto" => Method::Automatic { tolerance },
         _ => {
             return Err(input_error(format!(
-                "method: expected rk4, dopri5, radau5, rodas4 or auto, got {name}"
+                "method: expected rk4, rkn4, dopri5, radau5, rodas4 or auto, got {name}"
             )));
         }
     };

@@ -40,7 +40,7 @@ class Plant(_Model):
     """
 
     model: Literal["linear", "nonlinear"] = "linear"
-    method: Literal["dopri5", "rk4", "radau5", "rodas4", "auto"] = "dopri5"
+    method: Literal["dopri5", "rk4", "rkn4", "radau5", "rodas4", "auto"] = "dopri5"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-7
     substeps: AtLeastOne = 1
     start_rad: list[float] | None = None

@@ -32,15 +32,20 @@ fn observed_order(robot: &RobotDescription, method: Method, rates: [usize; 3]) -
 /// The next term of the error expansion is smaller by w h = 0.1 to 0.2 at these steps, which
 /// moves the observed order by about as much.
 #[test]
-fn runge_kutta_converges_with_order_four() {
-    for text in [PRESET, ARM] {
-        let robot = robot(text);
-        let order = observed_order(
-            &robot,
-            Method::RungeKutta4 { substeps: 1 },
-            [2000, 4000, 8000],
-        );
-        assert!((order - 4.0).abs() < 0.3, "{}: {order}", robot.name);
+fn fixed_steps_converge_with_order_four() {
+    for method in [
+        Method::RungeKutta4 { substeps: 1 },
+        Method::Nystrom4 { substeps: 1 },
+    ] {
+        for text in [PRESET, ARM] {
+            let robot = robot(text);
+            let order = observed_order(&robot, method, [2000, 4000, 8000]);
+            assert!(
+                (order - 4.0).abs() < 0.3,
+                "{method:?} {}: {order}",
+                robot.name
+            );
+        }
     }
 }
 

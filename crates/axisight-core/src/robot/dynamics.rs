@@ -1,12 +1,12 @@
 //! The chain's equations of motion in the form the integrators call: hot, and nothing else.
 //!
-//! One sweep from base to tip gives velocity-product accelerations and the wrench
-//! of every link, one sweep back gives bias forces (recursive Newton-Euler) and
-//! the inertia matrix (composite rigid bodies); Featherstone (2008), *Rigid Body
-//! Dynamics Algorithms*, chapters 5 and 6. The sweep back is in base-frame axes
-//! about the base origin, so that sums and inner products are all that is left of
-//! it. Massless links and coinciding joints, common in elastic robot models, are
-//! skipped. The nominal robot (7 joints, 3 bodies) takes about 1,400 multiply-adds.
+//! What depends on the joint angles alone comes first: joint axes, masses and the inertia
+//! matrix (composite rigid bodies). The rates then give bias forces (recursive Newton-Euler),
+//! as often as they change at the same angles. Featherstone (2008), *Rigid Body Dynamics
+//! Algorithms*, chapters 5 and 6. All of it is in base-frame axes about the base origin, so
+//! that sums, crosses and inner products are all that is left of it. Massless links and
+//! coinciding joints, common in elastic robot models, are skipped. The nominal robot
+//! (7 joints, 3 bodies) takes about 1,400 multiply-adds, 350 of them for the rates.
 //!
 //! Code is made for a few numbers of joints, so that its loops become straight
 //! lines; a chain in between is padded with joints that move nothing.
@@ -137,19 +137,42 @@ impl<S: Scalar> Screw<S> {
         }
     }
 
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.angular += other.angular;
+        self.linear += other.linear;
+    }
+
+    #[inline(always)]
+    fn scale(&self, s: S) -> Self {
+        Self {
+            angular: self.angular.scale(s),
+            linear: self.linear.scale(s),
+        }
+    }
+
+    /// `sum +=` the rate at which a motion fixed in a body that moves with `self` turns.
+    #[inline(always)]
+    fn turn_add(&self, motion: &Self, sum: &mut Self) {
+        sum.angular = self.angular.cross_add(&motion.angular, &sum.angular);
+        sum.linear = self.angular.cross_add(&motion.linear, &sum.linear);
+        sum.linear = self.linear.cross_add(&motion.angular, &sum.linear);
+    }
+
+    /// `sum +=` the same of a momentum or wrench.
+    #[inline(always)]
+    fn turn_momentum_add(&self, momentum: &Self, sum: &mut Self) {
+        sum.angular = self.angular.cross_add(&momentum.angular, &sum.angular);
+        sum.angular = self.linear.cross_add(&momentum.linear, &sum.angular);
+        sum.linear = self.angular.cross_add(&momentum.linear, &sum.linear);
+    }
+
     /// Power of a wrench along a motion.
     #[inline(always)]
     fn dot(&self, other: &Self) -> S {
         let angular = self.angular.dot(&other.angular);
         self.linear.dot_add(&other.linear, angular)
     }
-}
-
-/// Wrench of a link and its moments about the base origin, in base axes.
-#[derive(Debug, Clone, Copy)]
-struct Load<S> {
-    wrench: Screw<S>,
-    moments: Moments<S>,
 }
 
 /// Scratch and results of one evaluation, padded to a compiled size.
@@ -162,8 +185,9 @@ pub struct DynamicsScratch<S> {
     angles: Vec<S>,
     trigonometry: Vec<(S, S)>,
     axes: Vec<Screw<S>>,
+    /// Of the links, about the base origin in base axes.
+    moments: Vec<Moments<S>>,
     wrenches: Vec<Screw<S>>,
-    loads: Vec<Load<S>>,
 }
 
 /// The scratch at the size of the code that uses it.
@@ -173,17 +197,8 @@ pub(super) struct Sized<'a, S, const N: usize> {
     angles: &'a mut [S; N],
     trigonometry: &'a mut [(S, S); N],
     axes: &'a mut [Screw<S>; N],
+    moments: &'a mut [Moments<S>; N],
     wrenches: &'a mut [Screw<S>; N],
-    loads: &'a mut [Load<S>; N],
-}
-
-impl<S: Scalar> Load<S> {
-    fn zero() -> Self {
-        Self {
-            wrench: Screw::zero(),
-            moments: Moments::zero(),
-        }
-    }
 }
 
 impl<S: Scalar> DynamicsScratch<S> {
@@ -197,7 +212,7 @@ impl<S: Scalar> DynamicsScratch<S> {
             trigonometry: self.trigonometry.first_chunk_mut()?,
             axes: self.axes.first_chunk_mut()?,
             wrenches: self.wrenches.first_chunk_mut()?,
-            loads: self.loads.first_chunk_mut()?,
+            moments: self.moments.first_chunk_mut()?,
         })
     }
 }
@@ -228,13 +243,10 @@ macro_rules! sized {
 }
 pub(super) use sized;
 
-/// Where a link is, how it turns, and how it accelerates without joint accelerations.
+/// Where a link is.
 struct Frame<S> {
     columns: [Vec3<S>; 3],
     position: Vec3<S>,
-    angular: Vec3<S>,
-    angular_acc: Vec3<S>,
-    linear_acc: Vec3<S>,
 }
 
 impl<S: Scalar> Dynamics<S> {
@@ -299,8 +311,8 @@ impl<S: Scalar> Dynamics<S> {
             angles: vec![S::zero(); n],
             trigonometry: vec![(S::zero(), S::zero()); n],
             axes: vec![Screw::zero(); n],
+            moments: vec![Moments::zero(); n],
             wrenches: vec![Screw::zero(); n],
-            loads: vec![Load::zero(); n],
         }
     }
 
@@ -310,58 +322,86 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// Inertia matrix and bias forces into `scratch`.
+    fn update<const N: usize>(&self, q: &[S], v: &[S], scratch: &mut DynamicsScratch<S>) {
+        self.place::<N>(q, scratch);
+        self.add_rates::<N>(v, scratch);
+    }
+
+    /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
     #[inline(never)]
-    pub(super) fn update<const N: usize>(
-        &self,
-        q: &[S],
-        v: &[S],
-        scratch: &mut DynamicsScratch<S>,
-    ) {
+    pub(super) fn place<const N: usize>(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
         for (angle, q) in scratch.angles.iter_mut().zip(q) {
             *angle = *q;
         }
         if let Some(mut sized) = scratch.sized::<N>() {
-            self.sweep_out(v, &mut sized);
-            self.sweep_back(&mut sized);
+            self.sweep_out(&mut sized);
+            self.compose(&mut sized);
+        }
+    }
+
+    /// Bias forces at rates `v` and the angles last placed.
+    #[inline(never)]
+    pub(super) fn add_rates<const N: usize>(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+        let Some(sized) = scratch.sized::<N>() else {
+            return;
+        };
+        let mut velocity = Screw::zero();
+        // Gravity is an acceleration of the base.
+        let mut acceleration = Screw {
+            angular: Vec3::zero(),
+            linear: Vec3::constant(self.gravity.map(|g| -g)),
+        };
+        for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(N) {
+            let motion = sized.axes[i].scale(*v);
+            velocity.turn_add(&motion, &mut acceleration);
+            velocity.add(&motion);
+            if segment.body.is_some() {
+                let moments = &sized.moments[i];
+                let mut wrench = moments.wrench(&acceleration);
+                velocity.turn_momentum_add(&moments.wrench(&velocity), &mut wrench);
+                sized.wrenches[i] = wrench;
+            }
+        }
+        let mut tip = Screw::zero();
+        for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
+            if segment.body.is_some() {
+                tip.add(&sized.wrenches[i]);
+            }
+            sized.bias[i] = sized.axes[i].dot(&tip);
         }
     }
 
     #[inline(always)]
-    fn sweep_out<const N: usize>(&self, v: &[S], sized: &mut Sized<'_, S, N>) {
+    fn sweep_out<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
         S::sin_cos_each(sized.angles, sized.trigonometry);
-        let mut frame = Frame::base(&self.gravity);
-        for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(N) {
+        let mut frame = Frame::base();
+        for (i, segment) in self.segments.iter().enumerate().take(N) {
             if let Some(origin) = &segment.origin {
-                let d = frame.apply_constant(origin);
-                frame.carry(&d);
+                frame.position += frame.apply_constant(origin);
             }
             let (turned, screw) = (sized.trigonometry[i], &mut sized.axes[i]);
             match segment.turn {
-                Turn::X { reversed } => frame.turn::<0>(*v, reversed, turned, screw),
-                Turn::Y { reversed } => frame.turn::<1>(*v, reversed, turned, screw),
-                Turn::Z { reversed } => frame.turn::<2>(*v, reversed, turned, screw),
-                Turn::About(axis) => frame.turn_about(*v, &axis, turned, screw),
-                Turn::Along(axis) => frame.slide(*v, &axis, sized.angles[i], screw),
+                Turn::X { reversed } => frame.turn::<0>(reversed, turned, screw),
+                Turn::Y { reversed } => frame.turn::<1>(reversed, turned, screw),
+                Turn::Z { reversed } => frame.turn::<2>(reversed, turned, screw),
+                Turn::About(axis) => frame.turn_about(&axis, turned, screw),
+                Turn::Along(axis) => frame.slide(&axis, sized.angles[i], screw),
             }
             if let Some(body) = &segment.body {
-                frame.load(body, &mut sized.loads[i]);
+                sized.moments[i] = frame.moments(body);
             }
         }
     }
 
     #[inline(always)]
-    fn sweep_back<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
-        let mut tip = Load::zero();
+    fn compose<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
+        let mut tip = Moments::zero();
         // The wrench on everything outwards for a unit acceleration of each joint.
         for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
             if segment.body.is_some() {
-                let load = &sized.loads[i];
-                tip.wrench.angular += load.wrench.angular;
-                tip.wrench.linear += load.wrench.linear;
-                tip.moments.add(&load.moments);
+                tip.add(&sized.moments[i]);
             }
-            sized.bias[i] = sized.axes[i].dot(&tip.wrench);
-            sized.wrenches[i] = tip.moments.wrench(&sized.axes[i]);
+            sized.wrenches[i] = tip.wrench(&sized.axes[i]);
         }
         for i in 0..N {
             for j in i..N {
@@ -376,7 +416,7 @@ impl<S: Scalar> Dynamics<S> {
 
 impl<S: Scalar> Frame<S> {
     #[inline(always)]
-    fn base(gravity: &[f64; 3]) -> Self {
+    fn base() -> Self {
         let (zero, one) = (S::zero(), S::one());
         Self {
             columns: [
@@ -385,36 +425,17 @@ impl<S: Scalar> Frame<S> {
                 Vec3([zero, zero, one]),
             ],
             position: Vec3::zero(),
-            angular: Vec3::zero(),
-            angular_acc: Vec3::zero(),
-            linear_acc: Vec3::constant(gravity.map(|g| -g)),
         }
-    }
-
-    /// Move the origin by `d`, a vector fixed in the frame.
-    #[inline(always)]
-    fn carry(&mut self, d: &Vec3<S>) {
-        let w = &self.angular;
-        let turning = w.cross_add(&w.cross(d), &self.linear_acc);
-        self.linear_acc = self.angular_acc.cross_add(d, &turning);
-        self.position += *d;
     }
 
     /// Turn about column `K`; `screw` becomes the axis.
     #[inline(always)]
-    fn turn<const K: usize>(
-        &mut self,
-        rate: S,
-        reversed: bool,
-        (s, c): (S, S),
-        screw: &mut Screw<S>,
-    ) {
+    fn turn<const K: usize>(&mut self, reversed: bool, (s, c): (S, S), screw: &mut Screw<S>) {
         let (axis, s) = if reversed {
             (self.columns[K].negate(), -s)
         } else {
             (self.columns[K], s)
         };
-        self.spin(&axis, rate);
         let (a, b) = (self.columns[(K + 1) % 3], self.columns[(K + 2) % 3]);
         self.columns[(K + 1) % 3] = b.scale_add(s, &a.scale(c));
         self.columns[(K + 2) % 3] = a.scale_sub(s, &b.scale(c));
@@ -423,10 +444,9 @@ impl<S: Scalar> Frame<S> {
     }
 
     #[inline(never)]
-    fn turn_about(&mut self, rate: S, axis: &[f64; 3], (s, c): (S, S), screw: &mut Screw<S>) {
+    fn turn_about(&mut self, axis: &[f64; 3], (s, c): (S, S), screw: &mut Screw<S>) {
         let turned = rotation(axis, s, c);
         let axis = self.apply_constant(axis);
-        self.spin(&axis, rate);
         let r = self.matrix();
         self.columns = from_fn(|j| r.apply(&Vec3(from_fn(|i| turned[i][j]))));
         screw.angular = axis;
@@ -434,21 +454,11 @@ impl<S: Scalar> Frame<S> {
     }
 
     #[inline(never)]
-    fn slide(&mut self, rate: S, axis: &[f64; 3], q: S, screw: &mut Screw<S>) {
+    fn slide(&mut self, axis: &[f64; 3], q: S, screw: &mut Screw<S>) {
         let axis = self.apply_constant(axis);
-        self.carry(&axis.scale(q));
-        self.linear_acc = self
-            .angular
-            .cross_add(&axis.scale(rate * 2.0), &self.linear_acc);
+        self.position += axis.scale(q);
         screw.angular = Vec3::zero();
         screw.linear = axis;
-    }
-
-    #[inline(always)]
-    fn spin(&mut self, axis: &Vec3<S>, rate: S) {
-        let turn = axis.scale(rate);
-        self.angular_acc = self.angular.cross_add(&turn, &self.angular_acc);
-        self.angular += turn;
     }
 
     /// The vector with constant components in this frame; zero components cost nothing.
@@ -470,24 +480,16 @@ impl<S: Scalar> Frame<S> {
         Mat3([row(0), row(1), row(2)])
     }
 
-    /// Wrench of a link for zero joint accelerations, and its moments.
+    /// Moments of a link about the base origin.
     #[inline(always)]
-    fn load(&self, body: &Moments<S>, out: &mut Load<S>) {
+    fn moments(&self, body: &Moments<S>) -> Moments<S> {
         let r = self.matrix();
-        let first = r.apply(&body.first);
-        let second = rotate_inertia(&r, &body.second);
-        let inertia = Mat3::symmetric(&second);
-        let (w, p) = (&self.angular, &self.position);
-        let push = self.linear_acc.scale(body.mass);
-        let push = self.angular_acc.cross_add(&first, &push);
-        let force = w.cross_add(&w.cross(&first), &push);
-        let twist = first.cross_add(&self.linear_acc, &inertia.apply(&self.angular_acc));
-        let twist = w.cross_add(&inertia.apply(w), &twist);
-        out.wrench.angular = p.cross_add(&force, &twist);
-        out.wrench.linear = force;
-        out.moments.mass = body.mass;
-        out.moments.first = first;
-        out.moments.second = second;
-        out.moments.shift(p);
+        let mut moments = Moments {
+            mass: body.mass,
+            first: r.apply(&body.first),
+            second: rotate_inertia(&r, &body.second),
+        };
+        moments.shift(&self.position);
+        moments
     }
 }

@@ -3,9 +3,17 @@
 use crate::scalar::Scalar;
 
 /// Solve `a x = b` in place for a symmetric positive definite `a` (upper triangle
-/// read, destroyed) by `L D L^T`; about `n^3 / 6` multiplications.
+/// read, destroyed).
 #[inline(always)]
 pub(super) fn solve_symmetric<S: Scalar, const N: usize>(a: &mut [[S; N]; N], b: &mut [S; N]) {
+    factorize(a);
+    solve_factorized(a, b);
+}
+
+/// `L D L^T` of a symmetric positive definite `a`, in its upper triangle; about `n^3 / 6`
+/// multiplications. The diagonal becomes `1 / d`, entries right of it hold `d l`.
+#[inline(always)]
+pub(super) fn factorize<S: Scalar, const N: usize>(a: &mut [[S; N]; N]) {
     for j in 0..N {
         let (done, below) = a.split_at_mut(j + 1);
         let Some(pivot_row) = done.last_mut() else {
@@ -17,11 +25,20 @@ pub(super) fn solve_symmetric<S: Scalar, const N: usize>(a: &mut [[S; N]; N], b:
             for k in i..N {
                 row[k] = l.fma(pivot_row[k], row[k]);
             }
-            b[i] = l.fma(b[j], b[i]);
         }
         pivot_row[j] = inverse;
     }
-    // Entries right of the pivot still hold d * l.
+}
+
+/// Solve with the matrix that [`factorize`] left.
+#[inline(always)]
+pub(super) fn solve_factorized<S: Scalar, const N: usize>(a: &[[S; N]; N], b: &mut [S; N]) {
+    for j in 0..N {
+        let scaled = -(b[j] * a[j][j]);
+        for i in j + 1..N {
+            b[i] = a[j][i].fma(scaled, b[i]);
+        }
+    }
     for j in (0..N).rev() {
         let mut sum = b[j];
         for i in j + 1..N {

@@ -1,5 +1,6 @@
 //! The arm: its description, rigid-body algorithms, equilibrium, linearization and modes.
 
+mod axis;
 mod chain;
 mod description;
 mod dynamics;
@@ -13,6 +14,7 @@ mod reader;
 mod rigid_body;
 mod vector;
 
+pub use axis::{Axis, Gear};
 pub use chain::{Body, Chain, Pose};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
 pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
@@ -20,7 +22,7 @@ pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
 pub use linearization::{Linearization, LinearizationError, linearize};
 pub use modes::{Mode, modes, zoh_frequency_response};
 pub use parameters::{Parameter, ParameterError};
-pub use plant::{Axis, EffectSetting, Gear, Plant, PlantError};
+pub use plant::{EffectSetting, Plant, PlantError};
 pub use reader::{RobotError, read_robot};
 pub use rigid_body::RigidBody;
 pub use vector::{Mat3, Vec3};

@@ -5,14 +5,14 @@
 //! `J_m phi'' = tau - F_v phi' - r tau_g`, `M(q) q'' + c + g = B tau_g - K_e q_e - D_e q_e'`.
 //! A rigid gear has `phi = q / r` and no state of its own.
 
+use super::axis::{Axis, OnMotor, axes, gear_torque};
 use super::chain::Chain;
 use super::description::RobotDescription;
 use super::dynamics::{Dynamics, DynamicsScratch, MOST_JOINTS, sized};
-use super::linear_algebra::solve_symmetric;
+use super::linear_algebra::{factorize, solve_factorized};
 use super::parameters::Parameter;
 use crate::effects::{self, EffectError, EffectInfo, Kernel, Motor, PlantParameters, Scope};
 use crate::scalar::Scalar;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// An effect with its place and parameters.
@@ -54,45 +54,6 @@ pub enum PlantError {
     /// An effect is misused.
     #[error(transparent)]
     Effect(#[from] EffectError),
-}
-
-/// A compliant transmission.
-#[derive(Debug, Clone, Copy)]
-pub struct Gear<S> {
-    /// Stiffness k [Nm/rad].
-    pub stiffness: S,
-    /// Damping d [Nm s/rad].
-    pub damping: S,
-    /// Index of the motor angle among the motor states.
-    slot: usize,
-}
-
-/// One driven axis.
-#[derive(Clone)]
-pub struct Axis<S> {
-    /// Index of the joint the axis drives.
-    pub joint: usize,
-    /// Gear ratio r, joint angle per motor angle.
-    pub ratio: f64,
-    /// Motor inertia [kg m^2].
-    pub motor_inertia: S,
-    /// Viscous friction of the motor [Nm s/rad].
-    pub viscous_friction: S,
-    inverse_motor_inertia: S,
-    /// Compliant transmission; `None` is rigid.
-    pub gear: Option<Gear<S>>,
-    /// Everything that acts on this axis.
-    pub kernels: Vec<Arc<dyn Kernel<S>>>,
-    on_motor: Vec<OnMotor<S>>,
-    on_gear: Vec<Arc<dyn Kernel<S>>>,
-    on_joint: Vec<Arc<dyn Kernel<S>>>,
-}
-
-/// An effect on a motor, and its own states among those of the plant.
-#[derive(Clone)]
-struct OnMotor<S> {
-    kernel: Arc<dyn Kernel<S>>,
-    internal: Range<usize>,
 }
 
 /// A robot with its effects, ready to be integrated.
@@ -231,7 +192,12 @@ impl<S: Scalar> Plant<S> {
 
     /// Number of states: `[phi, q, phi', q']`, then those of the effects.
     pub fn n_states(&self) -> usize {
-        2 * (self.n_motors + self.chain.len()) + self.n_internal
+        2 * self.n_angles() + self.n_internal
+    }
+
+    /// Number of angles, motors' and joints', at the front of the state; as many rates follow.
+    pub fn n_angles(&self) -> usize {
+        self.n_motors + self.chain.len()
     }
 
     /// Number of motor angles among the states (compliant gears).
@@ -254,6 +220,11 @@ impl<S: Scalar> Plant<S> {
             Some(gear) => rates[gear.slot],
             None => rates[self.n_motors + axis.joint] * (1.0 / axis.ratio),
         }
+    }
+
+    /// Index of an axis's motor angle among the states; `None` for a rigid transmission.
+    pub fn motor_slot(&self, axis: usize) -> Option<usize> {
+        self.axes.get(axis)?.gear.as_ref().map(|gear| gear.slot)
     }
 
     /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
@@ -295,7 +266,24 @@ impl<S: Scalar> Plant<S> {
     ) {
         sized!(
             self.dynamics.len(),
-            self.derivative_sized(x, applied, command, scratch, dx)
+            self.derivative_sized(x, applied, command, scratch, dx, true)
+        );
+    }
+
+    /// [`Plant::derivative`] where only rates, torques and the effects' own states have
+    /// changed since the last evaluation with this `scratch`; about half the work.
+    #[inline]
+    pub fn derivative_in_place(
+        &self,
+        x: &[S],
+        applied: &[S],
+        command: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        dx: &mut [S],
+    ) {
+        sized!(
+            self.dynamics.len(),
+            self.derivative_sized(x, applied, command, scratch, dx, false)
         );
     }
 
@@ -332,16 +320,21 @@ impl<S: Scalar> Plant<S> {
         command: &[S],
         scratch: &mut DynamicsScratch<S>,
         dx: &mut [S],
+        moved: bool,
     ) {
         let (m, n) = (self.n_motors, self.chain.len());
         let (angles, rates) = x.split_at(m + n);
         let rates = &rates[..m + n];
         let (q, v) = (&angles[m..], &rates[m..]);
-        self.dynamics.update::<N>(q, v, scratch);
+        if moved {
+            self.dynamics.place::<N>(q, scratch);
+            self.factorize_inertia::<N>(scratch);
+        }
+        self.dynamics.add_rates::<N>(v, scratch);
         let Some(terms) = scratch.sized::<N>() else {
             return;
         };
-        // Matrix and force are used up by the solve below.
+        // The force becomes the acceleration below.
         let force = terms.bias;
         for f in force.iter_mut() {
             *f = -*f;
@@ -357,16 +350,26 @@ impl<S: Scalar> Plant<S> {
                 force[joint] += torque.gear;
                 dx[m + n + gear.slot] = (torque.motor - torque.load) * axis.inverse_motor_inertia;
             } else {
-                let up = 1.0 / axis.ratio;
-                terms.inertia[joint][joint] += axis.motor_inertia * (up * up);
-                force[joint] += torque.motor * up;
+                force[joint] += torque.motor * (1.0 / axis.ratio);
             }
         }
         for (joint, stiffness, damping) in &self.elastic {
             force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
         }
-        solve_symmetric(terms.inertia, force);
+        solve_factorized(terms.inertia, force);
         dx[m + n + m..2 * (m + n)].copy_from_slice(&force[..n]);
+    }
+
+    /// Motors behind rigid gears turn with their joints.
+    #[inline(always)]
+    fn factorize_inertia<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
+        if let Some(terms) = scratch.sized::<N>() {
+            for axis in self.axes.iter().filter(|axis| axis.gear.is_none()) {
+                let up = 1.0 / axis.ratio;
+                terms.inertia[axis.joint][axis.joint] += axis.motor_inertia * (up * up);
+            }
+            factorize(terms.inertia);
+        }
     }
 
     /// Torque that effects add on a motor in state `x` [Nm].
@@ -431,49 +434,6 @@ struct AxisTorque<S> {
     load: S,
 }
 
-#[inline]
-fn gear_torque<S: Scalar>(gear: &Gear<S>, kernels: &[Arc<dyn Kernel<S>>], delta: S, rate: S) -> S {
-    let (mut loaded, mut slope) = (delta, S::one());
-    for kernel in kernels {
-        let (next, factor) = kernel.deflection(loaded);
-        (loaded, slope) = (next, slope * factor);
-    }
-    let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
-    for kernel in kernels {
-        torque += kernel.gear_torque(loaded);
-    }
-    torque
-}
-
-fn axes<S: Scalar>(robot: &RobotDescription, value_of: &impl Fn(Parameter) -> S) -> Vec<Axis<S>> {
-    let mut slot = 0;
-    robot
-        .driven()
-        .map(|(joint, description, drive)| {
-            let gear = description.compliance.map(|_| {
-                slot += 1;
-                Gear {
-                    stiffness: value_of(Parameter::Stiffness(joint)),
-                    damping: value_of(Parameter::Damping(joint)),
-                    slot: slot - 1,
-                }
-            });
-            Axis {
-                joint,
-                ratio: drive.gear_ratio,
-                motor_inertia: value_of(Parameter::MotorInertia(joint)),
-                inverse_motor_inertia: value_of(Parameter::MotorInertia(joint)).recip(),
-                viscous_friction: value_of(Parameter::ViscousFriction(joint)),
-                gear,
-                kernels: Vec::new(),
-                on_motor: Vec::new(),
-                on_gear: Vec::new(),
-                on_joint: Vec::new(),
-            }
-        })
-        .collect()
-}
-
 fn elastic_joints<S: Scalar>(
     robot: &RobotDescription,
     value_of: &impl Fn(Parameter) -> S,
@@ -507,71 +467,4 @@ fn check_bounds<S: Scalar>(info: &'static EffectInfo, values: &[S]) -> Result<()
         }
     }
     Ok(())
-}
-
-impl<S: Scalar> Axis<S> {
-    /// Torque of the effects on the driven joint at `joint_angle` [Nm].
-    pub fn joint_torque(&self, joint_angle: S) -> S {
-        let torques = self.on_joint.iter().map(|k| k.joint_torque(joint_angle));
-        torques.fold(S::zero(), |a, b| a + b)
-    }
-
-    /// Motor angle at rest for a joint angle and a static load [Nm, joint side].
-    ///
-    /// Fixed-point iteration over the transmission error, whose slope is a small
-    /// share of the gear ratio.
-    pub(super) fn motor_angle_at_rest(&self, joint_angle: S, load: S) -> S {
-        let wanted = joint_angle + self.static_deflection(load);
-        let mut angle = wanted * (1.0 / self.ratio);
-        for _ in 0..60 {
-            let errors = self
-                .on_gear
-                .iter()
-                .filter_map(|k| k.transmission_error(angle));
-            let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
-                break;
-            };
-            angle = (wanted - error) * (1.0 / self.ratio);
-        }
-        angle
-    }
-
-    /// Motor torque that carries a static load [Nm, joint side] at a motor angle.
-    pub(super) fn motor_torque_at_rest(&self, angle: S, load: S) -> S {
-        let slopes = self
-            .on_gear
-            .iter()
-            .filter_map(|k| k.transmission_error(angle));
-        load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
-    }
-
-    /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
-    ///
-    /// Fixed-point iteration on the secant stiffness, halfway at a time: for a hardening
-    /// spring the error at least halves each time, however hard it gets.
-    fn static_deflection(&self, load: S) -> S {
-        let Some(gear) = &self.gear else {
-            return S::zero();
-        };
-        let mut loaded = load / gear.stiffness;
-        for _ in 0..60 {
-            let mut extra = S::zero();
-            for kernel in &self.on_gear {
-                extra += kernel.gear_torque(loaded);
-            }
-            let secant = loaded.abs().if_positive(extra / loaded, S::zero());
-            loaded = (loaded + load / (gear.stiffness + secant)) * 0.5;
-        }
-        self.on_gear
-            .iter()
-            .rev()
-            .fold(loaded, |d, kernel| kernel.deflection_inverse(d))
-    }
-}
-
-impl<S: Scalar> Plant<S> {
-    /// Index of an axis's motor angle among the states; `None` for a rigid transmission.
-    pub fn motor_slot(&self, axis: usize) -> Option<usize> {
-        self.axes.get(axis)?.gear.as_ref().map(|gear| gear.slot)
-    }
 }

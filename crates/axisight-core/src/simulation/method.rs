@@ -2,7 +2,7 @@
 
 use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
-use super::{dormand_prince, runge_kutta4};
+use super::{dormand_prince, nystrom4, runge_kutta4};
 use crate::robot::{DynamicsScratch, Plant};
 use crate::scalar::Scalar;
 
@@ -15,6 +15,12 @@ pub enum Method {
     /// Classical Runge-Kutta of order 4 with a fixed number of sub-steps per sample and no
     /// error control: the reference.
     RungeKutta4 {
+        /// Sub-steps per sample.
+        substeps: usize,
+    },
+    /// Nyström's method of order 4 for second-order equations, with a fixed number of
+    /// sub-steps per sample and no error control: the fastest where steps are short anyway.
+    Nystrom4 {
         /// Sub-steps per sample.
         substeps: usize,
     },
@@ -149,7 +155,34 @@ impl<S: Scalar> Stepper<S> {
             &mut self.stages[index],
         );
     }
+
+    /// [`Stepper::stage`] at the angles of the last one.
+    #[inline]
+    pub(super) fn stage_in_place(
+        &mut self,
+        plant: &Plant<S>,
+        index: usize,
+        at: f64,
+        lines: &[Line<S>],
+        command: &[S],
+    ) {
+        for (a, line) in self.applied.iter_mut().zip(lines) {
+            *a = line.at(at);
+        }
+        self.effort.evaluations += 1;
+        plant.derivative_in_place(
+            &self.probe,
+            &self.applied,
+            command,
+            &mut self.plant_scratch,
+            &mut self.stages[index],
+        );
+    }
 }
+
+/// One step of a fixed-step method.
+type Step<S> =
+    fn(&Interval<'_, S>, x: &mut [S], h: f64, lines: &[Line<S>], stepper: &mut Stepper<S>);
 
 /// One sample interval of one plant, integrated by a [`Method`].
 pub(super) struct Interval<'a, S> {
@@ -169,14 +202,10 @@ impl<S: Scalar> Interval<'_, S> {
     ) -> bool {
         match method {
             Method::RungeKutta4 { substeps } => {
-                let n = substeps.max(1);
-                let h = self.sample_time / n as f64;
-                for i in 0..n {
-                    let lines = torque.part(i, n);
-                    runge_kutta4::step(self, x, h, lines, stepper);
-                    torque.accept();
-                }
-                true
+                self.advance_evenly(substeps, runge_kutta4::step, x, stepper, torque)
+            }
+            Method::Nystrom4 { substeps } => {
+                self.advance_evenly(substeps, nystrom4::step, x, stepper, torque)
             }
             Method::DormandPrince { tolerance } => {
                 self.advance_explicitly(tolerance, x, stepper, torque)
@@ -200,6 +229,23 @@ impl<S: Scalar> Interval<'_, S> {
                 self.advance_implicitly(Method::RadauIia { tolerance }, x, stepper, torque)
             }
         }
+    }
+
+    fn advance_evenly(
+        &self,
+        substeps: usize,
+        step: Step<S>,
+        x: &mut [S],
+        stepper: &mut Stepper<S>,
+        torque: &mut SampleTorque<'_, S>,
+    ) -> bool {
+        let n = substeps.max(1);
+        let h = self.sample_time / n as f64;
+        for i in 0..n {
+            step(self, x, h, torque.part(i, n), stepper);
+            torque.accept();
+        }
+        true
     }
 
     fn advance_implicitly(

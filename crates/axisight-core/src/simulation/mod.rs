@@ -8,6 +8,7 @@ mod implicit;
 pub mod linear;
 mod method;
 mod noise;
+mod nystrom4;
 mod runge_kutta4;
 mod torque_path;
 

@@ -127,7 +127,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
     fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Self {
         let (n, m) = (plant.n_states(), plant.n_axes());
         let substeps = match run.method {
-            Method::RungeKutta4 { substeps } => substeps.max(1),
+            Method::RungeKutta4 { substeps } | Method::Nystrom4 { substeps } => substeps.max(1),
             _ => 1,
         };
         let step = run.sample_time / substeps as f64;
