@@ -58,6 +58,7 @@ class Style:
 
 STYLES = {
     "rk4": Style(MEASURED, "s"),
+    "rkn4": Style(GREY, "D"),
     "dopri5": Style(AFTER, "o"),
     "radau5": Style(BEFORE, "^"),
     "rodas4": Style(GREY, "v"),
@@ -121,7 +122,7 @@ def cases() -> list[Case]:
             "presliding",
             "c  Stiff presliding friction, 0.3 µrad",
             presliding(3e-7),
-            [*ours[1:], ("nonlinear", "auto")],
+            [("nonlinear", m) for m in ("dopri5", "radau5", "rodas4", "auto")],
             {"method": "auto", "tolerance": 1e-10},
         ),
         Case(
@@ -166,7 +167,7 @@ def runs(robot: axisight.Robot, case: Case) -> Iterator[Run]:
             exact[model] = axisight.simulate(robot, v, **common, **case.reference)
             assert exact[model].attrs["status"] == "completed", case.name
         settings: list[dict[str, Any]] = [{"tolerance": t} for t in TOLERANCES]
-        if method == "rk4":
+        if method in ("rk4", "rkn4"):
             settings = [{"substeps": n} for n in SUBSTEPS]
         for setting in settings:
             options = {**common, "method": method, **setting}
@@ -210,6 +211,8 @@ LABELS = {
     ("ripple", "nonlinear", "dopri5"): ("dopri5, nonlinear", -1, (-8, -6), "right"),
     ("ripple", "linear", "rk4"): ("rk4, linear", 0, (-5, 11), "left"),
     ("smooth", "nonlinear", "rk4"): ("rk4", 0, (7, 4), "left"),
+    ("smooth", "nonlinear", "rkn4"): ("rkn4", 0, (-6, 6), "right"),
+    ("coulomb", "nonlinear", "rkn4"): ("rkn4", 1, (-8, -2), "right"),
     ("coulomb", "nonlinear", "rk4"): ("rk4", 0, (-6, 8), "right"),
     ("presliding", "nonlinear", "rodas4"): ("rodas4", -1, (-8, -7), "right"),
 }

@@ -159,12 +159,13 @@ def costs() -> None:
     ]
     single = [
         {"method": "rk4"},
+        {"method": "rkn4"},
         {"method": "dopri5"},
         {"method": "radau5"},
         {"method": "rodas4", "tolerance": 1e-5},
         {"model": "linear"},
     ]
-    batch: list[dict[str, Any]] = [{"method": "rk4"}, {"method": "dopri5"}, {"model": "linear"}]
+    batch: list[dict[str, Any]] = [{"method": "rkn4"}, {"method": "dopri5"}, {"model": "linear"}]
     actions: list[Callable[[], object]] = []
     for _, robot in robots:
         v = np.outer(swing(n, 20.0, 1.0), np.ones(robot.n_axes))
@@ -175,8 +176,8 @@ def costs() -> None:
     samples = [n] * len(single) + [n * runs] * len(batch)
     each = np.array(shortest(actions)).reshape(len(robots), -1) / samples
     print("\n### Microseconds per sample and run\n")
-    row("robot", *(o.get("method", "linear") for o in single), "batch rk4", "dopri5", "linear")
-    row(*["---"] * 9)
+    row("robot", *(o.get("method", "linear") for o in single), "batch rkn4", "dopri5", "linear")
+    row(*["---"] * 10)
     for (name, _), seconds in zip(robots, each, strict=True):
         row(
             name, *(f"{1e6 * s:.{0 if s > 1e-4 else 2}{'f' if s > 1e-4 else 'g'}}" for s in seconds)

@@ -2,9 +2,9 @@
 
 Run ``python benches/peers/elastic_arm_steps.py`` from the root of the repository.
 
-Both take classical Runge-Kutta steps of fourth order, one per sample, on one thread, with
-the motor torques held over each step: the static torques plus tones, another value at every
-step. MuJoCo gets the equivalent MJCF (``tests/python/mujoco_model.py``) with everything
+Both take steps of fourth order, one per sample, on one thread (classical Runge-Kutta, and
+ours Nyström's too), with the motor torques held over each step: the static torques plus tones,
+another value at every step. MuJoCo gets the equivalent MJCF (``tests/python/mujoco_model.py``) with everything
 switched off that the arm does not need, and the faster of
 
 * ``mj_step`` with its ``nstep`` argument: the loop in C, no log, torques constant;
@@ -39,6 +39,7 @@ sys.path.insert(0, str(setting.ROOT / "tests" / "python"))
 import mujoco_model
 
 Array = np.ndarray
+OWN = ("rk4", "rkn4")
 UNUSED = (
     "equality",
     "frictionloss",
@@ -101,8 +102,8 @@ def held(torque: Array, times: int) -> Array:
     return np.repeat(torque, times, axis=0)
 
 
-def own_run(s: setting.Setting, torque: Array, substeps: int) -> Array:
-    out = axisight.simulate(s.robot, torque_nm=torque, method="rk4", substeps=substeps)
+def own_run(s: setting.Setting, torque: Array, method: str, substeps: int) -> Array:
+    out = axisight.simulate(s.robot, torque_nm=torque, method=method, substeps=substeps)
     return np.hstack([out["motor_position_rad"], out["joint_position_rad"]])
 
 
@@ -110,16 +111,17 @@ def accuracy(s: setting.Setting, torque: Array) -> list[tuple[str, float, float]
     """Error at 0.5 ms and the order, ours and MuJoCo's."""
     want = independent(s, torque)(32)
     period = s.model.sample_time
-    own = [relative_rms(own_run(s, torque, n), want) for n in (1, 2)]
+    runs = {}
+    for method in OWN:
+        errors = [relative_rms(own_run(s, torque, method, n), want) for n in (1, 2)]
+        runs[f"axisight {method}"] = errors
     theirs = []
     for n in (1, 2):
         model = mujoco_arm(s.text, period / n)
         positions = mujoco_run(model, s.sampled.start, held(torque, n))[::n]
         theirs.append(relative_rms(positions, want))
-    return [
-        ("axisight rk4", own[0], float(np.log2(own[0] / own[1]))),
-        ("MuJoCo RK4", theirs[0], float(np.log2(theirs[0] / theirs[1]))),
-    ]
+    runs["MuJoCo RK4"] = theirs
+    return [(label, e[0], float(np.log2(e[0] / e[1]))) for label, e in runs.items()]
 
 
 def speeds(s: setting.Setting, torque: Array, repeats: int) -> list[tuple[str, float]]:
@@ -135,10 +137,10 @@ def speeds(s: setting.Setting, torque: Array, repeats: int) -> list[tuple[str, f
         data.ctrl[:] = s.feed_forward
         mujoco.mj_step(model, data, count)
 
-    def own() -> object:
-        return axisight.simulate(s.robot, torque_nm=torque, method="rk4")
+    def own(method: str) -> Callable[[], object]:
+        return lambda: axisight.simulate(s.robot, torque_nm=torque, method=method)
 
-    rows = [("axisight rk4, with log", own)]
+    rows = [(f"axisight {method}, with log", own(method)) for method in OWN]
     loop = independent(s, torque)
     rows.append(("numba RK4 loop, with log", lambda: loop(1)))
     rows.append(("MuJoCo RK4, mj_step(nstep)", step))
@@ -162,10 +164,11 @@ def batch(s: setting.Setting, torque: Array, repeats: int, runs: int = 64) -> li
     states = np.tile(state, (runs, 1))
     per = 1e6 / (runs * len(torque))
     out = []
-    own = lambda: axisight.simulate_batch(  # noqa: E731
-        s.robot, torque_nm=many, method="rk4", substeps=1, threads=1
-    )
-    out.append((f"axisight, batch of {runs}", timed(own, repeats)[0] * per))
+    for method in OWN:
+        own = lambda m=method: axisight.simulate_batch(  # noqa: E731
+            s.robot, torque_nm=many, method=m, substeps=1, threads=1
+        )
+        out.append((f"axisight {method}, batch of {runs}", timed(own, repeats)[0] * per))
     run = lambda: rollout.rollout(model, data, states, many)  # noqa: E731
     out.append((f"MuJoCo rollout, batch of {runs}", timed(run, repeats)[0] * per))
     return out
@@ -174,7 +177,7 @@ def batch(s: setting.Setting, torque: Array, repeats: int, runs: int = 64) -> li
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=4000)
+    parser.add_argument("--steps", type=int, default=20000)
     parser.add_argument("--repeats", type=int, default=7)
     args = parser.parse_args()
     s = setting.make(args.steps * 5e-4, smooth=False)
@@ -186,7 +189,7 @@ def main() -> None:
     for label, error, order in accuracy(s, torque):
         print(f"{label:30}{error:15.1e}{order:8.2f}")
     rows = speeds(s, torque, args.repeats) + batch(s, torque, args.repeats)
-    ours = dict(rows)["axisight rk4, with log"]
+    ours = dict(rows)["axisight rkn4, with log"]
     print(f"\n{'':30}{'us/step':>10}{'steps/s':>12}{'peer/ours':>11}")
     for label, us in rows:
         print(f"{label:30}{us:10.3f}{1e6 / us:12.0f}{us / ours:11.2f}")

@@ -44,11 +44,12 @@ REFERENCE_SUBSTEPS = (16, 32)
 
 
 def own_rows(s: setting.Setting, reference: Array, args: argparse.Namespace) -> tuple:
-    """Our two explicit methods at the loosest setting; microseconds per evaluation."""
+    """Our explicit methods at the loosest setting; microseconds per evaluation."""
     rows, per_evaluation = [], {}
     choices = {
         "dopri5": [{"tolerance": t} for t in RTOL],
         "rk4": [{"substeps": n} for n in SUBSTEPS],
+        "rkn4": [{"substeps": n} for n in SUBSTEPS],
     }
     for method, settings in choices.items():
 

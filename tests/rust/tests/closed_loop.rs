@@ -49,6 +49,44 @@ fn fixed_steps_converge_with_order_four() {
     }
 }
 
+/// What depends on the angles alone may be kept: the same bits, gears compliant or rigid.
+#[test]
+fn derivative_in_place_is_the_derivative_at_the_same_angles() {
+    for text in [PRESET, ARM, ROTOR] {
+        let robot = robot(text);
+        let plant = plant::<f64>(&robot, &[]);
+        let (n, n_axes) = (plant.n_states(), robot.n_axes());
+        let at = |seed: usize| -> Vec<f64> {
+            let value = |i: usize| ((7 * i + 13 * seed) as f64).sin();
+            (0..n).map(value).collect()
+        };
+        let (before, mut after) = (at(1), at(2));
+        after[..plant.n_angles()].copy_from_slice(&before[..plant.n_angles()]);
+        let torque = |u: f64| vec![u; n_axes];
+        let derivative = |x: &[f64], u: f64, scratch: &mut _| {
+            let mut dx = vec![0.0; n];
+            plant.derivative(x, &torque(u), &torque(u), scratch, &mut dx);
+            dx
+        };
+        let mut scratch = plant.scratch();
+        derivative(&before, 1.0, &mut scratch);
+        let mut kept = vec![0.0; n];
+        plant.derivative_in_place(&after, &torque(2.0), &torque(2.0), &mut scratch, &mut kept);
+        assert_eq!(
+            kept,
+            derivative(&after, 2.0, &mut plant.scratch()),
+            "{}",
+            robot.name
+        );
+        assert_ne!(
+            kept,
+            derivative(&before, 1.0, &mut scratch),
+            "{}",
+            robot.name
+        );
+    }
+}
+
 /// A tolerance no step can miss leaves one step per sample.
 #[test]
 fn dormand_prince_converges_with_order_five() {
