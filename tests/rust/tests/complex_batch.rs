@@ -20,7 +20,11 @@ fn conditioned(rng: &mut StdRng, n: usize, count: usize, decades: f64) -> Vec<C>
         let (left, right) = (q(rng), q(rng));
         let s = DMatrix::from_fn(n, n, |i, j| {
             let share = i as f64 / (n - 1).max(1) as f64;
-            if i == j { C::new(10f64.powf(-decades * share), 0.0) } else { C::default() }
+            if i == j {
+                C::new(10f64.powf(-decades * share), 0.0)
+            } else {
+                C::default()
+            }
         });
         out.extend((left * s * right).transpose().iter());
     }
@@ -31,7 +35,10 @@ fn conditioned(rng: &mut StdRng, n: usize, count: usize, decades: f64) -> Vec<C>
 fn worst_residual(a: &[C], x: &[C], n: usize) -> f64 {
     let matrices = a.chunks_exact(n * n).zip(x.chunks_exact(n * n));
     let residuals = matrices.map(|(a, x)| {
-        let (a, x) = (DMatrix::from_row_slice(n, n, a), DMatrix::from_row_slice(n, n, x));
+        let (a, x) = (
+            DMatrix::from_row_slice(n, n, a),
+            DMatrix::from_row_slice(n, n, x),
+        );
         let residual = (&a * &x - DMatrix::identity(n, n)).norm();
         residual / (f64::EPSILON * n as f64 * a.norm() * x.norm())
     });
@@ -46,7 +53,10 @@ fn residuals_are_backward_stable_at_any_condition() {
             let a = conditioned(&mut rng, n, 203, decades);
             let mut x = vec![C::default(); a.len()];
             let singular = invert_batch(&a, n, 203, &mut x).unwrap();
-            assert!(singular.iter().all(|s| !s), "size {n}, condition 1e{decades}");
+            assert!(
+                singular.iter().all(|s| !s),
+                "size {n}, condition 1e{decades}"
+            );
             // Gaussian elimination with partial pivoting is good for a few units of this.
             let worst = worst_residual(&a, &x, n);
             assert!(worst < 3.0, "size {n}, condition 1e{decades}: {worst}");
@@ -60,7 +70,10 @@ fn division_is_multiplication_by_the_inverse() {
     for n in 1..=9 {
         for rows in [1, 3] {
             let count = 11;
-            let (u, g) = (random(&mut rng, count * n * n), random(&mut rng, count * rows * n));
+            let (u, g) = (
+                random(&mut rng, count * n * n),
+                random(&mut rng, count * rows * n),
+            );
             let mut y = Vec::new();
             for l in 0..count {
                 let u = DMatrix::from_row_slice(n, n, &u[l * n * n..(l + 1) * n * n]);
@@ -91,8 +104,11 @@ fn singular_and_broken_matrices_are_flagged_where_they_stand() {
         // The last row repeats the first but for rounding.
         for j in 0..n {
             let first = a[6 * size + j];
-            a[6 * size + (n - 1) * n + j] =
-                if n == 1 { C::default() } else { first * C::new(0.3, 0.7) };
+            a[6 * size + (n - 1) * n + j] = if n == 1 {
+                C::default()
+            } else {
+                first * C::new(0.3, 0.7)
+            };
         }
         let mut x = vec![C::default(); a.len()];
         let singular = invert_batch(&a, n, count, &mut x).unwrap();
@@ -118,7 +134,9 @@ fn units_of_rows_and_columns_do_not_matter() {
     let mut x = vec![C::default(); n * n];
     invert_batch(&a, n, 1, &mut x).unwrap();
     let (rows, columns) = ([1e-140, 1.0, 1e90], [1e-30, 1e40, 1.0]);
-    let scaled: Vec<C> = (0..n * n).map(|i| a[i] * rows[i / n] * columns[i % n]).collect();
+    let scaled: Vec<C> = (0..n * n)
+        .map(|i| a[i] * rows[i / n] * columns[i % n])
+        .collect();
     let mut back = vec![C::default(); n * n];
     assert_eq!(invert_batch(&scaled, n, 1, &mut back), Ok(vec![false]));
     for i in 0..n * n {

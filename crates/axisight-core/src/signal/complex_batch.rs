@@ -134,14 +134,7 @@ fn invert_large(n: usize, a: &[C], out: &mut [C], singular: &mut [bool]) {
     }
 }
 
-fn divide_large(
-    n: usize,
-    y: &[C],
-    u: &[C],
-    rows: usize,
-    out: &mut [C],
-    singular: &mut [bool],
-) {
+fn divide_large(n: usize, y: &[C], u: &[C], rows: usize, out: &mut [C], singular: &mut [bool]) {
     let mut solver = SmallSolver::new(n);
     let (mut inverse, nothing) = (vec![C::default(); n * n], C::default());
     let matrices = u.chunks_exact(n * n).zip(y.chunks_exact(rows * n));
@@ -154,7 +147,9 @@ fn divide_large(
         }
         for (i, out) in out.iter_mut().enumerate() {
             let (row, column) = (i / n, i % n);
-            *out = (0..n).fold(nothing, |sum, k| sum + y[row * n + k] * inverse[k * n + column]);
+            *out = (0..n).fold(nothing, |sum, k| {
+                sum + y[row * n + k] * inverse[k * n + column]
+            });
         }
     }
 }
@@ -175,7 +170,7 @@ impl Pair {
     #[inline(always)]
     fn times(self, b: Self) -> Self {
         Self {
-            re: self.re.fma(b.re, -(self.im * b.im)),
+            re: self.im.fnma(b.im, self.re * b.re),
             im: self.re.fma(b.im, self.im * b.re),
         }
     }
@@ -184,8 +179,8 @@ impl Pair {
     #[inline(always)]
     fn minus_product(self, a: Self, b: Self) -> Self {
         Self {
-            re: a.im.fma(b.im, (-a.re).fma(b.re, self.re)),
-            im: (-a.im).fma(b.re, (-a.re).fma(b.im, self.im)),
+            re: a.im.fma(b.im, a.re.fnma(b.re, self.re)),
+            im: a.im.fnma(b.re, a.re.fnma(b.im, self.im)),
         }
     }
 
@@ -197,19 +192,34 @@ impl Pair {
         }
     }
 
-    /// `|re| + |im|`, what LAPACK compares pivots by.
+    /// Squared modulus.
     #[inline(always)]
-    fn size(self) -> V {
-        self.re.abs() + self.im.abs()
+    fn square(self) -> V {
+        self.re.fma(self.re, self.im * self.im)
     }
 
     #[inline(always)]
     fn recip(self) -> Self {
-        let factor = self.re.fma(self.re, self.im * self.im).recip();
+        let factor = self.square().recip();
         Self {
             re: self.re * factor,
             im: -(self.im * factor),
         }
+    }
+
+    /// Entry `entry` of four matrices.
+    #[inline(always)]
+    fn gather(matrices: &[&[C]; LANES], entry: usize) -> Self {
+        let [a, b, c, d] = matrices.map(|m| m[entry]);
+        Self {
+            re: Lanes([a.re, b.re, c.re, d.re]),
+            im: Lanes([a.im, b.im, c.im, d.im]),
+        }
+    }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> C {
+        C::new(self.re.0[lane], self.im.0[lane])
     }
 }
 
@@ -219,79 +229,83 @@ fn exchange(when: V, a: &mut V, b: &mut V) {
     (*a, *b) = (when.if_positive(*b, *a), when.if_positive(*a, *b));
 }
 
-#[inline(always)]
-fn maximum(a: V, b: V) -> V {
-    // A NaN in `a` stays.
-    (b - a).if_positive(b, a)
-}
-
 /// The power of two at or below a positive number, inverted; other numbers give zero,
 /// infinity or NaN, which end in a flag.
 #[inline(always)]
 fn inverse_power_of_two(x: V) -> V {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
-    Lanes(from_fn(|l| f64::from_bits(x.0[l].to_bits() & EXPONENT))).recip()
+    Lanes(x.0.map(|x| f64::from_bits(x.to_bits() & EXPONENT))).recip()
 }
 
 /// `P D A = L U`: U above the diagonal, L below (its diagonal is one), the inverses of the
-/// diagonal of U on it.
+/// diagonal of U on it. Lives in one place and is filled anew for each group of matrices.
 struct Factors<const N: usize> {
     lu: [[Pair; N]; N],
     /// Scale of the row that has come to each place.
     scale: [V; N],
     /// Which row has come to each place.
     row: [V; N],
-    /// Above zero where the matrix is singular.
-    singular: V,
+    /// Above zero where the matrix is singular or a result is not finite.
+    bad: V,
 }
 
 impl<const N: usize> Factors<N> {
+    const EMPTY: Self = Self {
+        lu: [[Pair::ZERO; N]; N],
+        scale: [Lanes([0.0; LANES]); N],
+        row: [Lanes([0.0; LANES]); N],
+        bad: Lanes([0.0; LANES]),
+    };
+
+    /// Factor what stands in `lu`.
     #[inline(always)]
-    fn new(mut a: [[Pair; N]; N]) -> Self {
-        let mut scale = [V::zero(); N];
-        for (row, scale) in a.iter_mut().zip(&mut scale) {
-            let largest = row.iter().fold(V::zero(), |m, x| maximum(m, x.size()));
-            *scale = inverse_power_of_two(largest);
-            for x in row {
-                *x = x.scaled(*scale);
+    fn factor(&mut self) {
+        // Largest square of each column.
+        let mut square_of = [V::zero(); N];
+        for i in 0..N {
+            let mut largest = V::zero();
+            for j in 0..N {
+                let entry = self.lu[i][j];
+                largest = entry.re.magnitude_or(entry.im.magnitude_or(largest));
             }
+            let scale = inverse_power_of_two(largest);
+            for j in 0..N {
+                self.lu[i][j] = self.lu[i][j].scaled(scale);
+                square_of[j] = self.lu[i][j].square().magnitude_or(square_of[j]);
+            }
+            (self.scale[i], self.row[i]) = (scale, V::constant(i as f64));
         }
-        let threshold: [V; N] = from_fn(|j| {
-            let largest = (0..N).fold(V::zero(), |m, i| maximum(m, a[i][j].size()));
-            largest * (4.0 * N as f64 * f64::EPSILON)
-        });
-        let mut out = Self {
-            lu: a,
-            scale,
-            row: from_fn(|i| V::constant(i as f64)),
-            singular: V::zero(),
-        };
+        self.bad = V::zero();
         for k in 0..N {
-            out.pivot(k);
-            let above = out.lu[k][k].size() - threshold[k];
-            out.singular = above.if_positive(out.singular, V::one());
-            let inverse = out.lu[k][k].recip();
-            out.lu[k][k] = inverse;
+            self.pivot(k);
+            let threshold = square_of[k] * (4.0 * N as f64 * f64::EPSILON).powi(2);
+            let above = self.lu[k][k].square() - threshold;
+            self.bad = above.if_positive(self.bad, V::one());
+            let inverse = self.lu[k][k].recip();
+            self.lu[k][k] = inverse;
             for i in k + 1..N {
-                let factor = out.lu[i][k].times(inverse);
-                out.lu[i][k] = factor;
+                let factor = self.lu[i][k].times(inverse);
+                self.lu[i][k] = factor;
                 for j in k + 1..N {
-                    out.lu[i][j] = out.lu[i][j].minus_product(factor, out.lu[k][j]);
+                    self.lu[i][j] = self.lu[i][j].minus_product(factor, self.lu[k][j]);
                 }
             }
         }
-        out
     }
 
     /// Bring the largest entry of column `k` from row `k` on to row `k`.
     #[inline(always)]
     fn pivot(&mut self, k: usize) {
+        let mut size = self.lu[k][k].square();
         for i in k + 1..N {
-            let larger = self.lu[i][k].size() - self.lu[k][k].size();
+            let other = self.lu[i][k].square();
+            let larger = other - size;
+            size = larger.if_positive(other, size);
             let (above, below) = self.lu.split_at_mut(i);
-            for (a, b) in above[k].iter_mut().zip(&mut below[0]) {
-                exchange(larger, &mut a.re, &mut b.re);
-                exchange(larger, &mut a.im, &mut b.im);
+            let (upper, lower) = (&mut above[k], &mut below[0]);
+            for j in 0..N {
+                exchange(larger, &mut upper[j].re, &mut lower[j].re);
+                exchange(larger, &mut upper[j].im, &mut lower[j].im);
             }
             for list in [&mut self.scale, &mut self.row] {
                 let (above, below) = list.split_at_mut(i);
@@ -300,9 +314,21 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// `x` with `U x = b`, in place.
+    /// `L x = b` from place `first` on, in place; zero before it.
     #[inline(always)]
-    fn back_substitute(&self, b: &mut [Pair; N]) {
+    fn forward_substitute(&self, b: &mut [Pair; N], first: usize) {
+        for i in first + 1..N {
+            let mut x = b[i];
+            for k in first..i {
+                x = x.minus_product(self.lu[i][k], b[k]);
+            }
+            b[i] = x;
+        }
+    }
+
+    /// `U x = b`, in place.
+    #[inline(always)]
+    fn back_substitute(&mut self, b: &mut [Pair; N]) {
         for i in (0..N).rev() {
             let mut x = b[i];
             for k in i + 1..N {
@@ -312,18 +338,12 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Column `j` of `U^-1 L^-1`, scaled: the column `row[j]` of the inverse.
+    /// Note where a result is not finite.
     #[inline(always)]
-    fn inverse_column(&self, j: usize) -> [Pair; N] {
-        let mut x = [Pair::ZERO; N];
-        x[j].re = V::one();
-        for i in j + 1..N {
-            for k in j..i {
-                x[i] = x[i].minus_product(self.lu[i][k], x[k]);
-            }
-        }
-        self.back_substitute(&mut x);
-        x.map(|x| x.scaled(self.scale[j]))
+    fn check(&mut self, x: Pair) {
+        // Zero times a number is zero, times anything else NaN, which is not positive.
+        let finite = V::one() + (x.re + x.im) * 0.0;
+        self.bad = finite.if_positive(self.bad, V::one());
     }
 
     fn row(&self, place: usize, lane: usize) -> usize {
@@ -334,38 +354,41 @@ impl<const N: usize> Factors<N> {
     }
 }
 
-/// Entry `(i, j)` of up to four matrices; lanes beyond the last hold it again.
+/// Four slices of `size` numbers; beyond the last slice, the last again.
 #[inline(always)]
-fn gather(a: &[C], size: usize, entry: usize) -> Pair {
-    let last = a.len() / size - 1;
-    let at = |l: usize| a[l.min(last) * size + entry];
-    Pair {
-        re: Lanes(from_fn(|l| at(l).re)),
-        im: Lanes(from_fn(|l| at(l).im)),
-    }
+fn four(a: &[C], size: usize) -> [&[C]; LANES] {
+    let last = (a.len() / size).saturating_sub(1);
+    from_fn(|l| &a[l.min(last) * size..][..size])
 }
 
 fn invert_some<const N: usize>(a: &[C], out: &mut [C], singular: &mut [bool]) {
     let size = N * N;
+    let mut factors = Factors::<N>::EMPTY;
     let groups = a.chunks(LANES * size).zip(out.chunks_mut(LANES * size));
     for ((a, out), singular) in groups.zip(singular.chunks_mut(LANES)) {
-        let factors = Factors::<N>::new(from_fn(|i| from_fn(|j| gather(a, size, i * N + j))));
-        let mut worst = factors.singular;
+        let matrices = four(a, size);
+        for i in 0..N {
+            for j in 0..N {
+                factors.lu[i][j] = Pair::gather(&matrices, i * N + j);
+            }
+        }
+        factors.factor();
         for j in 0..N {
-            let x = factors.inverse_column(j);
-            // Zero times a number is zero, times anything else NaN, which is not positive.
-            for x in &x {
-                let finite = V::one() + (x.re + x.im) * 0.0;
-                worst = finite.if_positive(worst, V::one());
+            let mut x = [Pair::ZERO; N];
+            x[j].re = factors.scale[j];
+            factors.forward_substitute(&mut x, j);
+            factors.back_substitute(&mut x);
+            for x in x {
+                factors.check(x);
             }
             for (l, out) in out.chunks_exact_mut(size).enumerate() {
                 let column = factors.row(j, l);
-                for (i, x) in x.iter().enumerate() {
-                    out[i * N + column] = C::new(x.re.0[l], x.im.0[l]);
+                for i in 0..N {
+                    out[i * N + column] = x[i].lane(l);
                 }
             }
         }
-        finish(worst, size, out, singular);
+        finish(factors.bad, size, out, singular);
     }
 }
 
@@ -377,45 +400,45 @@ fn divide_some<const N: usize>(
     singular: &mut [bool],
 ) {
     let (size, wide) = (N * N, rows * N);
+    let mut factors = Factors::<N>::EMPTY;
     let groups = u.chunks(LANES * size).zip(y.chunks(LANES * wide));
     let results = out.chunks_mut(LANES * wide).zip(singular.chunks_mut(LANES));
     for ((u, y), (out, singular)) in groups.zip(results) {
         // g u = y is u' g' = y'.
-        let factors = Factors::<N>::new(from_fn(|i| from_fn(|j| gather(u, size, j * N + i))));
-        let mut worst = factors.singular;
-        let last = y.len() / wide - 1;
-        for r in 0..rows {
-            let mut x: [Pair; N] = from_fn(|i| {
-                let at = |l: usize| y[l.min(last) * wide + r * N + factors.row(i, l)];
-                let entry = Pair {
-                    re: Lanes(from_fn(|l| at(l).re)),
-                    im: Lanes(from_fn(|l| at(l).im)),
-                };
-                entry.scaled(factors.scale[i])
-            });
-            for i in 0..N {
-                for k in 0..i {
-                    x[i] = x[i].minus_product(factors.lu[i][k], x[k]);
-                }
+        let (matrices, right) = (four(u, size), four(y, wide));
+        for i in 0..N {
+            for j in 0..N {
+                factors.lu[i][j] = Pair::gather(&matrices, j * N + i);
             }
+        }
+        factors.factor();
+        for r in 0..rows {
+            let mut x = [Pair::ZERO; N];
+            for (i, x) in x.iter_mut().enumerate() {
+                for l in 0..LANES {
+                    let entry = right[l][r * N + factors.row(i, l)];
+                    (x.re.0[l], x.im.0[l]) = (entry.re, entry.im);
+                }
+                *x = x.scaled(factors.scale[i]);
+            }
+            factors.forward_substitute(&mut x, 0);
             factors.back_substitute(&mut x);
             for (i, x) in x.iter().enumerate() {
-                let finite = V::one() + (x.re + x.im) * 0.0;
-                worst = finite.if_positive(worst, V::one());
+                factors.check(*x);
                 for (l, out) in out.chunks_exact_mut(wide).enumerate() {
-                    out[r * N + i] = C::new(x.re.0[l], x.im.0[l]);
+                    out[r * N + i] = x.lane(l);
                 }
             }
         }
-        finish(worst, wide, out, singular);
+        finish(factors.bad, wide, out, singular);
     }
 }
 
-/// Flag the singular lanes and make their results NaN.
+/// Flag the bad lanes and make their results NaN.
 #[inline(always)]
-fn finish(worst: V, size: usize, out: &mut [C], singular: &mut [bool]) {
+fn finish(bad: V, size: usize, out: &mut [C], singular: &mut [bool]) {
     for (l, (out, singular)) in out.chunks_exact_mut(size).zip(singular).enumerate() {
-        *singular = worst.0[l] > 0.0;
+        *singular = bad.0[l] > 0.0;
         if *singular {
             out.fill(NAN);
         }
