@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -86,10 +85,3 @@ def expect_experiments(records: PeriodicRecords, why: str) -> None:
             f"records: expected at least {records.n_inputs} experiments for "
             f"{records.n_inputs} inputs, got {records.n_experiments}: {why}"
         )
-
-
-def over_lines(function: Callable[[Complex], Real], values: Complex, good: NDArray[Any]) -> Real:
-    """``function`` of the good lines, NaN elsewhere."""
-    out = np.full(values.shape, np.nan)
-    out[good] = function(values[good])
-    return out

@@ -37,8 +37,7 @@ class Stack:
     @property
     def usable(self) -> NDArray[np.bool_]:
         """Where a realization has an estimate, (realization, n_freq, 1, 1)."""
-        found: NDArray[np.bool_] = np.isfinite(self.response).all(axis=(2, 3), keepdims=True)
-        return found
+        return np.asarray(np.isfinite(self.response).all(axis=(2, 3), keepdims=True))
 
     def mean(self, values: Complex) -> Complex:
         """Mean over the usable realizations, NaN where there is none."""

@@ -36,8 +36,9 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
         known = np.isfinite(freedom) & (freedom > 0)
         nu = freedom[known]
         scale[known] = nu * np.expm1(-np.log1p(-probability) / nu)
-    radius = np.sqrt(variance * scale)
-    radius.attrs = {"units": dataset["response"].attrs.get("units", ""), "probability": probability}
+    units = dataset["response"].attrs.get("units", "")
+    radius: xr.DataArray = variance.copy(data=np.sqrt(variance.values * scale))
+    radius.attrs = {"units": units, "probability": probability}
     return radius.rename("confidence_radius")
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from axisight.errors import InputError
 from axisight.frf.confidence import with_freedom
@@ -13,7 +16,7 @@ from axisight.frf.response import Flag
 Real = NDArray[np.float64]
 
 
-def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> Real:
+def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
     """Weights alpha, (n_freq, n_freq), a row for each frequency smoothed at; each sums to one.
 
     A Hann window over frequency, zero ``bandwidth_hz`` away from the middle. At the ends of
@@ -26,11 +29,15 @@ def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> Real:
     spacing = np.min(np.diff(frequency)) if len(frequency) > 1 else 1.0
     # One spacing beyond the outermost line: there a single line is left.
     room = np.minimum(frequency - frequency[0], frequency[-1] - frequency) + spacing
-    width = np.minimum(bandwidth_hz, room)[:, None]
-    distance = np.abs(frequency[:, None] - frequency[None, :])
-    inside = distance < width * (1 - 1e-9)
-    alpha = np.where(inside, 0.5 * (1 + np.cos(np.pi * distance / width)), 0.0)
-    return np.asarray(alpha / alpha.sum(axis=1, keepdims=True))
+    width = np.minimum(bandwidth_hz, room) * (1 - 1e-9)
+    first = np.searchsorted(frequency, frequency - width, side="right")
+    count = np.searchsorted(frequency, frequency + width, side="left") - first
+    start = np.concatenate([[0], np.cumsum(count)])
+    row = np.repeat(np.arange(len(frequency)), count)
+    column = np.arange(start[-1]) - start[row] + first[row]
+    value = 1 + np.cos(np.pi * (frequency[row] - frequency[column]) / width[row])
+    value /= np.add.reduceat(value, start[:-1])[row]
+    return csr_array((value, column, start), shape=(len(frequency), len(frequency)))
 
 
 def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = None) -> xr.Dataset:
@@ -55,31 +62,31 @@ def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = No
             raise InputError(
                 f"weight: expected {len(frequency)} numbers not below zero, got {weight!r}"
             )
-        alpha = alpha * weight
+        alpha = alpha @ diags_array(weight)
     response = dataset["response"].values
     good = np.isfinite(response).all(axis=(1, 2))
-    alpha = alpha * good
-    total = alpha.sum(axis=1, keepdims=True)
-    alpha = np.divide(alpha, total, out=np.zeros_like(alpha), where=total > 0)
-    lost = ~good | (total[:, 0] <= 0)
+    alpha = alpha @ diags_array(good.astype(float))
+    total = np.asarray(alpha.sum(axis=1))
+    lost = ~good | (total <= 0)
+    alpha = diags_array(np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)) @ alpha
 
-    def mean(values: NDArray[np.generic], power: int) -> NDArray[np.generic]:
-        usable = np.where(good[:, None, None], values, 0)
-        out = np.tensordot(alpha**power, usable, axes=1)
+    def mean(values: NDArray[Any], weights: csr_array) -> NDArray[Any]:
+        usable = np.where(good[:, None, None], values, 0).reshape(len(frequency), -1)
+        out = np.asarray(weights @ usable).reshape(values.shape)
         out[lost] = np.nan
-        return np.asarray(out)
+        return out
 
-    changed = {"response": dataset["response"].copy(data=mean(response, 1))}
+    changed = {"response": dataset["response"].copy(data=mean(response, alpha))}
     for name in ("variance", "noise_variance"):
         if name in dataset:
-            changed[name] = dataset[name].copy(data=mean(dataset[name].values, 2))
+            changed[name] = dataset[name].copy(data=mean(dataset[name].values, alpha.power(2)))
     flag = dataset["flag"].values.copy()
     flag[lost & (flag == Flag.GOOD)] = Flag.NO_EXCITATION
     out = dataset.assign(changed | {"flag": dataset["flag"].copy(data=flag)})
     if "degrees_of_freedom" in dataset:
-        freedom = dataset["degrees_of_freedom"].values / np.sum(alpha**2, axis=1)[
-            :, None, None
-        ].clip(1e-12)
+        # Independent lines in the window.
+        lines = 1 / np.asarray(alpha.power(2).sum(axis=1)).clip(1e-12)
+        freedom = dataset["degrees_of_freedom"].values * lines[:, None, None]
         out = with_freedom(out, np.where(lost[:, None, None], np.nan, freedom))
     out.attrs = dataset.attrs | {"smoothing_bandwidth_hz": float(bandwidth_hz)}
     return out

@@ -8,15 +8,16 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from axisight.errors import InputError
 from axisight.frf._lines import (
+    LARGE_CONDITION,
+    SMALLEST,
     Complex,
     Quantity,
     Real,
-    condition_and_flag,
     output_unit,
-    over_lines,
     provenance,
     spectra,
 )
@@ -26,8 +27,8 @@ from axisight.frf.response import Flag, frequency_response
 from axisight.frf.smoothing import hann_weights
 from axisight.records.periodic import PeriodicRecords
 
-HANN_CORRELATION = (1.0, 2 / 3, 1 / 6)
-"""Correlation of DFT lines 0, 1, 2 apart when white noise goes through a Hann taper."""
+HANN_CORRELATION = (2 / 3, 1 / 6)
+"""Correlation of DFT lines one and two apart when white noise goes through a Hann taper."""
 
 
 def spectral_analysis(
@@ -84,8 +85,8 @@ def spectral_analysis(
             f"window, got a half width of {bandwidth_hz} Hz"
         )
     s_uu, s_yu = _smoothed(alpha, u, u), _smoothed(alpha, y, u)
-    s_yy = np.einsum("kf,foc->ko", alpha, np.abs(y) ** 2)
-    condition, flag = _condition(alpha, u)
+    s_yy = np.asarray(alpha @ np.sum(np.abs(y) ** 2, axis=2))
+    condition, flag = _condition(s_uu)
     response, singular = right_divide(s_yu, s_uu, threads=threads)
     flag[(singular | (freedom <= 0)) & (flag != Flag.NO_EXCITATION)] = Flag.RANK_DEFICIENT
     good = (flag == Flag.GOOD) | (flag == Flag.ILL_CONDITIONED)
@@ -94,7 +95,6 @@ def spectral_analysis(
     explained = np.einsum("koi,koi->ko", response, s_yu.conj()).real
     left = np.maximum(s_yy - explained, 0.0)
     inverse, _ = invert(s_uu, threads=threads)
-    # The sums over c records have the weight of all of them: S / c is the mean.
     gain = np.einsum("kii->ki", inverse).real
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = left[:, :, None] * gain[:, None, :] / freedom[:, None, None]
@@ -131,32 +131,38 @@ def _tapered(records: PeriodicRecords) -> PeriodicRecords:
     return replace(records, input=of(records.input), output=of(records.output))
 
 
-def _smoothed(alpha: Real, a: Complex, b: Complex) -> Complex:
+def _smoothed(alpha: csr_array, a: Complex, b: Complex) -> Complex:
     """Cross spectra summed over records, then smoothed over lines."""
     crossed = a @ b.conj().swapaxes(1, 2)
-    return np.ascontiguousarray(np.tensordot(alpha, crossed, axes=1))
+    out = np.asarray(alpha @ crossed.reshape(len(crossed), -1))
+    return np.ascontiguousarray(out.reshape(crossed.shape))
 
 
-def _freedom(alpha: Real, lines: NDArray[np.int64], taper: str) -> Real:
+def _freedom(alpha: csr_array, lines: NDArray[np.int64], taper: str) -> Real:
     """Independent lines under each window: 1 / sum_kl alpha_k alpha_l rho_kl^2."""
-    apart = np.abs(lines[:, None] - lines[None, :])
-    rho = np.where(apart == 0, 1.0, 0.0)
+    correlated = alpha
     if taper == "hann":
-        for distance, value in enumerate(HANN_CORRELATION):
-            rho[apart == distance] = value
-    return np.asarray(1 / np.einsum("fk,kl,fl->f", alpha, rho**2, alpha))
+        for apart, value in enumerate(HANN_CORRELATION, start=1):
+            # Lines that are ``apart`` lines from each other, among those given.
+            low = np.flatnonzero(np.isin(lines + apart, lines))
+            high = np.searchsorted(lines, lines[low] + apart)
+            size = np.full(len(low), value**2)
+            one = csr_array((size, (low, high)), shape=alpha.shape)
+            correlated = correlated + alpha @ (one + one.T)
+    return 1 / np.asarray(alpha.multiply(correlated).sum(axis=1))
 
 
-def _condition(alpha: Real, u: Complex) -> tuple[Real, NDArray[np.int8]]:
-    """Condition of the weighted spectra under each window."""
-    condition = np.empty(len(u))
-    flag = np.empty(len(u), np.int8)
-    largest = over_lines(lambda v: np.asarray(np.abs(v)), u, np.ones(len(u), bool)).max(axis=(0, 2))
-    for k, row in enumerate(alpha):
-        inside = row > 0
-        columns = np.concatenate(list(u[inside] * np.sqrt(row[inside])[:, None, None]), axis=1)
-        found, marks = condition_and_flag(columns[None])
-        condition[k], flag[k] = found[0], marks[0]
-        if np.any(np.abs(columns).max(axis=1) <= 1e-12 * largest):
-            flag[k] = Flag.NO_EXCITATION
-    return condition, flag
+def _condition(s_uu: Complex) -> tuple[Real, NDArray[np.int8]]:
+    """Square root of the condition of S_uu, inputs scaled to one, and flags."""
+    power = np.einsum("kii->ki", s_uu).real
+    silent = np.any(power <= SMALLEST**2 * power.max(axis=0), axis=1)
+    scale = 1 / np.sqrt(np.where(power > 0, power, 1.0))
+    value = np.linalg.eigvalsh(s_uu * scale[:, :, None] * scale[:, None, :])
+    deficient = value[:, 0] <= 1e-14 * value[:, -1]
+    condition = np.full(len(s_uu), np.nan)
+    usable = ~(silent | deficient)
+    condition[usable] = np.sqrt(value[usable, -1] / value[usable, 0])
+    flag = np.where(condition > LARGE_CONDITION, Flag.ILL_CONDITIONED, Flag.GOOD)
+    flag[deficient] = Flag.RANK_DEFICIENT
+    flag[silent] = Flag.NO_EXCITATION
+    return condition, flag.astype(np.int8)
