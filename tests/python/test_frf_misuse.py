@@ -134,7 +134,7 @@ def test_nan_is_refused_with_its_place() -> None:
     records = loop_records()[0]
     broken = records.output.copy()
     broken[1, 0, 5, 1] = np.nan
-    with pytest.raises(InputError, match="output: .*experiment 2, period 1, sample 6, channel 2"):
+    with pytest.raises(InputError, match=r"output: .*experiment 2, period 1, sample 6, channel 2"):
         replace(records, output=broken)
 
 
