@@ -175,7 +175,7 @@ impl Line {
         let input = &self.average[..m * e];
         self.condition = f64::NAN;
         for (row, largest) in input.chunks_exact(e).zip(largest) {
-            let norm = row.iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
+            let norm = row.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
             if norm <= SMALLEST_AMPLITUDE * largest {
                 return LineFlag::NoExcitation;
             }

@@ -48,7 +48,9 @@ fn operations(n: usize, m: usize, lines: usize) -> f64 {
 
 /// The divisor of `n` with the fewest operations.
 fn transform_length(n: usize, lines: usize) -> usize {
-    let divisors = (1..=n).take_while(|d| d * d <= n).filter(|d| n % d == 0);
+    let divisors = (1..=n)
+        .take_while(|d| d * d <= n)
+        .filter(|d| n.is_multiple_of(*d));
     divisors
         .flat_map(|d| [d, n / d])
         .min_by(|a, b| operations(n, *a, lines).total_cmp(&operations(n, *b, lines)))

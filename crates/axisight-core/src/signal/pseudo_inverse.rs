@@ -69,7 +69,7 @@ impl PseudoInverse {
         for (i, square) in self.squares.iter_mut().enumerate() {
             *square = self.turned[i * e..(i + 1) * e]
                 .iter()
-                .map(|x| x.norm_sqr())
+                .map(Complex::norm_sqr)
                 .sum();
         }
         for column in 0..e {
@@ -95,8 +95,8 @@ impl PseudoInverse {
         let e = self.columns;
         let (above, below) = self.turned.split_at(q * e);
         let (a, b) = (&above[p * e..(p + 1) * e], &below[..e]);
-        let alpha: f64 = a.iter().map(|x| x.norm_sqr()).sum();
-        let beta: f64 = b.iter().map(|x| x.norm_sqr()).sum();
+        let alpha: f64 = a.iter().map(Complex::norm_sqr).sum();
+        let beta: f64 = b.iter().map(Complex::norm_sqr).sum();
         let product: C = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
         let size = product.norm();
         let orthogonal = size <= f64::EPSILON * (alpha * beta).sqrt();
