@@ -1,5 +1,34 @@
 """Frequency responses: estimators, their uncertainty and their errors."""
 
+from axisight.frf.arithmetic_mean import arithmetic_mean
+from axisight.frf.batch_solve import invert, right_divide
+from axisight.frf.confidence import confidence_radius
+from axisight.frf.etfe import etfe
+from axisight.frf.explain import explain_flags
+from axisight.frf.h1 import h1, h2
+from axisight.frf.harmonic_mean import harmonic_mean
+from axisight.frf.joint_input_output import joint_input_output
+from axisight.frf.logarithmic_mean import logarithmic_mean
+from axisight.frf.mfrf import mfrf
 from axisight.frf.response import Flag, frequency_response
+from axisight.frf.smoothing import smooth
+from axisight.frf.spectral_analysis import spectral_analysis
 
-__all__ = ["Flag", "frequency_response"]
+__all__ = [
+    "Flag",
+    "arithmetic_mean",
+    "confidence_radius",
+    "etfe",
+    "explain_flags",
+    "frequency_response",
+    "h1",
+    "h2",
+    "harmonic_mean",
+    "invert",
+    "joint_input_output",
+    "logarithmic_mean",
+    "mfrf",
+    "right_divide",
+    "smooth",
+    "spectral_analysis",
+]
