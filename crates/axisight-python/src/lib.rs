@@ -7,6 +7,7 @@ mod convert;
 mod effects;
 mod entry;
 mod fit;
+mod frf;
 mod montecarlo;
 mod robot;
 mod simulation;
@@ -40,5 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<montecarlo::MonteCarloStudy>()?;
     module.add_class::<montecarlo::MonteCarloEnsemble>()?;
     module.add_function(wrap_pyfunction!(montecarlo::failure_kinds, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::frf_local_model, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::frf_local_periodic, module)?)?;
     Ok(())
 }
