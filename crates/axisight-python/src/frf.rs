@@ -2,8 +2,8 @@
 
 use crate::entry::{detached, input_error};
 use axisight_core::frf::{
-    LineFlag, LocalEstimate, LocalModel, LocalModelError, Records, local_polynomial,
-    local_polynomial_periodic, local_rational,
+    LineFlag, LocalEstimate, LocalModel, LocalModelError, Records, local_polynomial_periodic,
+    local_rational,
 };
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray3};
 use pyo3::prelude::*;
@@ -102,7 +102,7 @@ fn code(flag: LineFlag) -> i8 {
 
 /// Local rational method (polynomial for denominator order 0) at lines of the whole record.
 #[pyfunction]
-#[pyo3(signature = (input, output, lines, *, order, denominator_order, half_width, threads=0))]
+#[pyo3(signature = (input, output, lines, *, order, denominator_order, half_width, band, threads=0))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn frf_local_model<'py>(
     py: Python<'py>,
@@ -112,19 +112,17 @@ pub fn frf_local_model<'py>(
     order: usize,
     denominator_order: usize,
     half_width: usize,
+    band: (usize, usize),
     threads: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = LocalModel {
         order,
         denominator_order,
         half_width,
+        band,
     };
     Owned::new(&input, &output)?.estimate(py, threads, |records| {
-        if denominator_order == 0 {
-            local_polynomial(records, &lines, order, half_width)
-        } else {
-            local_rational(records, &lines, model)
-        }
+        local_rational(records, &lines, model)
     })
 }
 

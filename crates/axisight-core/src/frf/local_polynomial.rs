@@ -1,38 +1,16 @@
 //! Local polynomial method; Pintelon and Schoukens (2012), sections 7.2 and 7.3.
 //!
-//! Arbitrary excitation: response and transient are polynomials over the window, the local
-//! rational method with the denominator one. Periodic excitation, several consecutive
-//! periods: lines between the harmonics hold transient and noise only; a polynomial through
+//! Arbitrary excitation: response and transient are polynomials over the window. That is the
+//! local rational method with the denominator one, and is computed there. Here: periodic
+//! excitation, several consecutive periods: lines between the harmonics hold transient and noise only; a polynomial through
 //! them gives the transient at the harmonic, where it is subtracted from input and output,
 //! and their residuals give the noise. The response is then `Y U^-1` of that one line (the
 //! pseudo-inverse for more experiments than inputs), without any smoothing of the response.
 
 use super::local_estimate::{Line, LineFlag, LocalEstimate, LocalModelError, expect};
 use super::local_least_squares::{C, Columns, Polynomials, Triangle, energy};
-use super::local_rational::{LocalModel, MAX_ORDER, local_rational};
+use super::local_rational::MAX_ORDER;
 use super::record_spectra::{RecordSpectra, Records};
-
-/// Estimate the response at lines of the whole record under arbitrary excitation.
-///
-/// # Errors
-/// As [`local_rational`].
-pub fn local_polynomial(
-    records: &Records<'_>,
-    lines: &[usize],
-    order: usize,
-    half_width: usize,
-) -> Result<LocalEstimate, LocalModelError> {
-    let denominator_order = 0;
-    local_rational(
-        records,
-        lines,
-        LocalModel {
-            order,
-            denominator_order,
-            half_width,
-        },
-    )
-}
 
 /// Estimate the response at lines of the period from records of `n_periods` whole periods.
 /// The window holds `half_width` lines between harmonics on each side.
@@ -48,7 +26,7 @@ pub fn local_polynomial_periodic(
     half_width: usize,
 ) -> Result<LocalEstimate, LocalModelError> {
     let spectra = RecordSpectra::new(records);
-    let points = 2 * half_width;
+    let points = half_width.saturating_mul(2);
     let top = || format!("at most {MAX_ORDER}");
     expect(order <= MAX_ORDER, "order", top, order)?;
     expect(

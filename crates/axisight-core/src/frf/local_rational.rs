@@ -29,6 +29,8 @@ pub struct LocalModel {
     pub denominator_order: usize,
     /// Lines on each side of the line estimated.
     pub half_width: usize,
+    /// First and last line a window may cover; it moves inwards at these ends.
+    pub band: (usize, usize),
 }
 
 /// Largest order of a local polynomial; more is no longer local.
@@ -81,6 +83,7 @@ fn check(
         order,
         denominator_order,
         half_width,
+        band: (first, last),
     } = model;
     let top = || format!("at most {MAX_ORDER}");
     expect(order <= MAX_ORDER, "order", top, order)?;
@@ -90,9 +93,19 @@ fn check(
         top,
         denominator_order,
     )?;
-    let (m, last) = (2 * half_width + 1, spectra.last_line());
-    let longest = || format!("a window 2 half_width + 1 of at most the {last} lines of the record");
-    expect(m <= last, "half_width", longest, half_width)?;
+    let m = half_width.saturating_mul(2).saturating_add(1);
+    let highest = spectra.last_line();
+    let within = || format!("first and last line from 1 to {highest}");
+    let right = 1 <= first && first <= last && last <= highest;
+    expect(right, "band", within, format!("{first} and {last}"))?;
+    let room = last - first + 1;
+    let longest = || format!("a window 2 half_width + 1 of at most the {room} lines of the band");
+    expect(
+        half_width >= 1 && m <= room,
+        "half_width",
+        longest,
+        half_width,
+    )?;
     let unknowns = (order + 1) * (spectra.n_inputs + spectra.n_experiments) + denominator_order;
     let least = || {
         format!(
@@ -107,8 +120,8 @@ fn check(
         least,
         equations,
     )?;
-    let outside = lines.iter().find(|k| **k < 1 || **k > last);
-    let range = || format!("lines from 1 to {last}");
+    let outside = lines.iter().find(|k| **k < first || **k > last);
+    let range = || format!("lines from {first} to {last}");
     expect(
         outside.is_none(),
         "lines",
@@ -180,10 +193,10 @@ impl Kernel {
     }
 
     fn line(&self, line: usize, scratch: &mut Scratch, mut out: Line<'_>) {
-        // The window moves inwards at the ends of the band.
+        let band = self.model.band;
         let first = line
             .saturating_sub(self.model.half_width)
-            .clamp(1, self.spectra.last_line() + 1 - self.x.len());
+            .clamp(band.0, band.1 + 1 - self.x.len());
         let here = line - first;
         if self.silent_input(first) {
             return out.fail(LineFlag::NoExcitation);

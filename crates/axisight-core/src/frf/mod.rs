@@ -8,7 +8,7 @@ mod periodic;
 mod record_spectra;
 
 pub use local_estimate::{LineFlag, LocalEstimate, LocalModelError};
-pub use local_polynomial::{local_polynomial, local_polynomial_periodic};
+pub use local_polynomial::local_polynomial_periodic;
 pub use local_rational::{LocalModel, local_rational};
 pub use periodic::{Output, Spectra, response};
 pub use record_spectra::Records;
