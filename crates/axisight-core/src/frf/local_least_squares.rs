@@ -74,7 +74,9 @@ impl Columns {
         let norm = energy(data).sqrt();
         // Written so that a norm that is not a number is zero as well.
         let scale = if norm > least { 1.0 / norm } else { 0.0 };
-        data.iter_mut().for_each(|v| *v *= scale);
+        for v in data {
+            *v *= scale;
+        }
         norm * f64::from(u8::from(scale > 0.0))
     }
 }
@@ -221,7 +223,9 @@ impl Polynomials {
                     .for_each(|(a, b)| *a -= part * b);
             }
             let norm = energy(&now[..n]).sqrt();
-            now.iter_mut().for_each(|v| *v /= norm);
+            for v in now.iter_mut() {
+                *v /= norm;
+            }
         }
     }
 

@@ -164,7 +164,7 @@ impl Kernel {
             }
             let power = energy(noise.get(combined)) / self.freedom as f64 * (1.0 + excess);
             for i in 0..n {
-                let gain: f64 = triangle.inverse_row(i).iter().map(|c| c.norm_sqr()).sum();
+                let gain: f64 = triangle.inverse_row(i).iter().map(C::norm_sqr).sum();
                 out.variance[o * n + i] = power * gain;
             }
         }

@@ -1,6 +1,6 @@
 //! Local rational method: around each line `D(x) Y = N(x) U + C(x)` by linear least squares.
 //!
-//! McKelvey and Guérin (2012), "Non-parametric frequency response estimation using a local
+//! `McKelvey` and Guérin (2012), "Non-parametric frequency response estimation using a local
 //! rational model"; Pintelon and Schoukens (2012), chapter 7, for the local polynomial
 //! method, which is the case `D = 1`. `N` (a row per output) and the transient `C` (per
 //! output and experiment) are polynomials over the window, `D` one per output with

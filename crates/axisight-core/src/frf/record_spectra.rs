@@ -50,13 +50,13 @@ impl RecordSpectra {
             Some(_) => 0.0,
         };
         // Two channels share a transform: each scaled to its peak, or the rounding of a large
-        // one would drown a small one.
+        // one would drown a small one. A silent one stays silent.
         let peak = |e: usize, c: usize| {
-            let largest = (0..n_samples)
+            (0..n_samples)
                 .map(|n| sample(e, c, n).abs())
-                .fold(0.0, f64::max);
-            if largest > 0.0 { largest } else { 1.0 }
+                .fold(0.0, f64::max)
         };
+        let divisor = |peak: f64| if peak > 0.0 { peak } else { 1.0 };
         for (e, record) in lines.chunks_exact_mut(channels * n_lines).enumerate() {
             record
                 .par_chunks_mut(2 * n_lines)
@@ -65,8 +65,9 @@ impl RecordSpectra {
                     let (a, b) = out.split_at_mut(n_lines);
                     let (c, d) = (2 * pair, 2 * pair + 1);
                     let (p, q) = (peak(e, c), peak(e, d));
+                    let (by_p, by_q) = (divisor(p), divisor(q));
                     let samples =
-                        (0..n_samples).map(|n| (sample(e, c, n) / p, sample(e, d, n) / q));
+                        (0..n_samples).map(|n| (sample(e, c, n) / by_p, sample(e, d, n) / by_q));
                     dft.pair(samples, &wanted, scratch, |i, first, second| {
                         a[i] = first * p;
                         if let Some(value) = b.get_mut(i) {
