@@ -3,11 +3,11 @@
 import control
 import numpy as np
 import pytest
-from local_models_data import System, band, plain_local_model
 
 from axisight.errors import InputError
 from axisight.frf import Flag, local_polynomial, local_rational
 from axisight.records import ArbitraryRecords, PeriodicRecords
+from local_models_data import System, band, plain_local_model
 
 SAMPLE_TIME = 5e-4
 
