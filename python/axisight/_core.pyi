@@ -27,6 +27,8 @@ __all__ = [
     "failure_kinds",
     "fit_inverse_dynamics",
     "fit_simulation",
+    "frf_local_model",
+    "frf_local_periodic",
     "measurement_noise",
     "simulate",
     "simulate_batch",
@@ -614,3 +616,44 @@ def multivariable(
     threads: int = 1,
 ) -> MultivariableEstimate:
     """Estimate from records (experiment, period, sample, channel), outputs times ``factor``."""
+
+@type_check_only
+class LocalEstimate(TypedDict):
+    """Responses by a local model; n_lines leads."""
+
+    # (n_lines, n_outputs, n_inputs); NaN where flagged so.
+    response: NDArray[np.complex128]
+    variance: NDArray[np.float64]
+    # (n_lines,); flags as `axisight.frf.Flag`.
+    condition: NDArray[np.float64]
+    flag: NDArray[np.int8]
+    degrees_of_freedom: int
+
+def frf_local_model(
+    input: _Array,
+    output: _Array,
+    lines: Sequence[int],
+    *,
+    order: int,
+    denominator_order: int,
+    half_width: int,
+    band: tuple[int, int],
+    threads: int = 0,
+) -> LocalEstimate:
+    """Local rational method at lines of the record; polynomial for denominator order 0.
+
+    ``input`` and ``output`` are (n_experiments, n_samples, n_channels); ``band`` holds the
+    first and last line that windows may cover.
+    """
+
+def frf_local_periodic(
+    input: _Array,
+    output: _Array,
+    lines: Sequence[int],
+    *,
+    n_periods: int,
+    order: int,
+    half_width: int,
+    threads: int = 0,
+) -> LocalEstimate:
+    """Local polynomial method for whole periods, joined, at lines of the period."""

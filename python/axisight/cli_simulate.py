@@ -56,7 +56,9 @@ def simulate_command(
     method: Annotated[
         str, typer.Option(help=f"Integrator: {', '.join(get_args(Method))}.")
     ] = "dopri5",
-    tolerance: Annotated[float, typer.Option(help="Relative local error; rk4, rkn4 have none.")] = 1e-7,
+    tolerance: Annotated[
+        float, typer.Option(help="Relative local error; rk4, rkn4 have none.")
+    ] = 1e-7,
     substeps: Annotated[int, typer.Option(help="Steps per sample of rk4, rkn4.")] = 1,
     noise_seed: Annotated[int | None, typer.Option(help="Add sensor noise.")] = None,
     run: Annotated[int, typer.Option(help="Number of the run: another noise per run.")] = 0,

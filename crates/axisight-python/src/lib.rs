@@ -8,6 +8,7 @@ mod effects;
 mod entry;
 mod fit;
 mod frf;
+mod local_models;
 mod montecarlo;
 mod robot;
 mod simulation;
@@ -45,5 +46,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::right_divide_matrices, module)?)?;
     module.add_function(wrap_pyfunction!(frf::record_spectra, module)?)?;
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
+    module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
+    module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
     Ok(())
 }

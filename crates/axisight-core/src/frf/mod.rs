@@ -1,9 +1,20 @@
-//! Frequency responses from periodic records.
+//! Frequency responses from periodic records, and from any records by local models.
 
+mod flag;
+mod local_estimate;
+mod local_least_squares;
+mod local_polynomial;
+mod local_rational;
 mod multivariable;
 mod periodic;
+mod record_spectra;
 mod spectra;
 
-pub use multivariable::{Layout, LineFlag, Multivariable, multivariable};
+pub use flag::LineFlag;
+pub use local_estimate::{LocalEstimate, LocalModelError};
+pub use local_polynomial::local_polynomial_periodic;
+pub use local_rational::{LocalModel, local_rational};
+pub use multivariable::{Layout, Multivariable, multivariable};
 pub use periodic::{Output, Spectra, response};
+pub use record_spectra::Records;
 pub use spectra::{Channels, Extent, spectra};

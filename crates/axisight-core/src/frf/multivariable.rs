@@ -5,6 +5,7 @@
 //! input-output estimate. In all of them the error is to first order
 //! `dG = (dY - G dU) V`: vec(dG) = (V^T kron I) vec(dY - G dU).
 
+use super::flag::LineFlag;
 use crate::signal::PseudoInverse;
 use nalgebra::Complex;
 
@@ -19,21 +20,6 @@ const SMALLEST_AMPLITUDE: f64 = 1e-12;
 
 /// Condition number above which a line is flagged.
 const LARGE_CONDITION: f64 = 1e3;
-
-/// What is wrong with a line; the numbers of the Python enumeration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(i8)]
-pub enum LineFlag {
-    /// Nothing.
-    Good = 0,
-    /// The experiments do not excite all inputs independently.
-    RankDeficient = 1,
-    /// Errors are amplified more than a thousandfold, or the weakest direction of the input
-    /// is lost in its noise.
-    IllConditioned = 2,
-    /// An input has no amplitude.
-    NoExcitation = 3,
-}
 
 /// How the channels of the spectra are laid out.
 #[derive(Debug, Clone, Copy)]

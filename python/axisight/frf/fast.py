@@ -1,0 +1,174 @@
+"""Fast method: noise, odd and even nonlinear distortion from a single realization."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.frf.response import frequency_response
+from axisight.frf.robust import Complex, Real, excitation, inverse, period_variance, spectra
+from axisight.records.periodic import PeriodicRecords
+
+NEIGHBOURS = 6
+"""Detection lines averaged for the distortion at an excited line between them."""
+
+
+class FastMethod(NamedTuple):
+    """Result of :func:`fast_method`."""
+
+    response: xr.Dataset
+    distortion: xr.Dataset
+
+
+def fast_method(records: PeriodicRecords) -> FastMethod:
+    """Return the response and the levels of noise, odd and even distortion.
+
+    Source: Pintelon and Schoukens (2012), section 4.3.2. At a line without excitation a
+    steady-state linear system has no output; what is there, beyond noise, is nonlinear
+    distortion: of even degree at even lines and of odd degree at odd lines, if all excited
+    lines are odd.
+
+    records
+        One realization, that is ``n_inputs`` experiments, of P >= 2 periods in steady state.
+        ``records.detection_lines`` are used; without any, all lines free of excitation
+        between the first and the last excited one.
+
+    ``response``, the Dataset of every estimator, is ``Y U^-1`` at the excited lines.
+    ``noise_variance`` is from the scatter over the periods (P - 1 complex degrees of
+    freedom). ``variance`` adds the distortion power of the detection lines of the same parity,
+    mean of the nearest 6; it is NaN where no such lines exist. That takes the distortion at
+    excited lines to be as large as at detection lines, which holds on random grids.
+
+    ``distortion``, over the detection lines, with coordinates ``line`` and ``kind``
+    ("odd" or "even"):
+
+    ================ =================================== =====================================
+    variable         dims                                meaning
+    ================ =================================== =====================================
+    distortion       frequency_hz, output, experiment    ``2 / N (Y_d - G_d U_d)``, complex
+                                                         amplitude [output unit]
+    noise_variance   the same                            its variance by noise
+    uncorrected      the same                            ``2 / N Y_d``
+    input_amplitude  frequency_hz, input, experiment     ``2 / N U_d`` [input unit]
+    ================ =================================== =====================================
+
+    In a loop, or behind an actuator that is not linear, distortion reaches the input as
+    well; ``G_d U_d`` is what the linear system makes of that, and is no distortion of its
+    own. G_d is interpolated linearly between excited lines and constant beyond them. Its
+    error counts times ``U_d``, to second order. ``|distortion|^2`` holds the noise too:
+    without any distortion ``|distortion|^2 / noise_variance`` is F distributed with 2 and
+    2 (P - 1) degrees of freedom.
+
+    Raises InputError for a single period, other than ``n_inputs`` experiments, detection
+    lines that are excited, and no detection line.
+    """
+    n, periods = records.n_inputs, records.n_periods
+    if records.n_experiments != n:
+        raise InputError(
+            f"records: expected one realization of {n} experiments (one for each input), got "
+            f"{records.n_experiments}; for several see robust_method"
+        )
+    if periods < 2:
+        raise InputError("records: expected at least 2 periods to tell the noise, got 1")
+    detection = _detection_lines(records)
+    excited, free = spectra(records, records.lines), spectra(records, detection)
+    condition, flag = excitation(excited.input)
+    u, y = excited.input[0], excited.output[0]
+    weight = inverse(u.mean(axis=0), flag)
+    response = y.mean(axis=0) @ weight
+    noise = period_variance(((y - response @ u) @ weight)[None])[0]
+
+    between = _interpolate(records.lines, response, detection)
+    error = free.output[0] - between @ free.input[0]
+    level, level_noise = error.mean(axis=0), period_variance(error[None])[0]
+    power = _at_excited(records.lines, detection, np.abs(level) ** 2 - level_noise)
+    share = power @ np.abs(weight) ** 2
+    result = frequency_response(
+        records.frequency_hz,
+        response,
+        estimator="fast_method",
+        variance=noise + share,
+        noise_variance=noise,
+        condition=condition,
+        flag=flag,
+        input_unit=records.input_unit,
+        output_unit=records.output_unit,
+        attrs={"n_periods": periods, "degrees_of_freedom": periods - 1},
+    )
+    scale = 2 / records.n_samples
+    uncorrected, amplitude = free.output[0].mean(axis=0), free.input[0].mean(axis=0)
+    levels = {
+        "distortion": scale * level,
+        "noise_variance": scale**2 * level_noise,
+        "uncorrected": scale * uncorrected,
+        "input_amplitude": scale * amplitude,
+    }
+    return FastMethod(result, _distortion(records, detection, levels))
+
+
+def _detection_lines(records: PeriodicRecords) -> NDArray[np.int64]:
+    lines = records.detection_lines
+    if not lines.size:
+        first, last = records.lines[[0, -1]]
+        lines = np.setdiff1d(np.arange(first, last), records.lines)
+    excited = np.intersect1d(lines, records.lines)
+    if excited.size:
+        raise InputError(f"detection_lines: expected lines without excitation, got {excited[0]}")
+    if not lines.size:
+        raise InputError("detection_lines: expected at least one line free of excitation, got none")
+    return lines
+
+
+def _interpolate(lines: NDArray[np.int64], response: Complex, at: NDArray[np.int64]) -> Complex:
+    """Interpolate linearly over lines, leaving out those that are NaN."""
+    known = np.all(np.isfinite(response), axis=(1, 2))
+    flat = response.reshape(len(lines), -1)[known]
+    if not len(flat):
+        return np.full((len(at), *response.shape[1:]), np.nan, np.complex128)
+    columns = [np.interp(at, lines[known], column) for column in flat.T]
+    return np.stack(columns, axis=-1).reshape(len(at), *response.shape[1:])
+
+
+def _at_excited(excited: NDArray[np.int64], detection: NDArray[np.int64], power: Real) -> Real:
+    """Mean power of the nearest detection lines of the same parity; NaN without any."""
+    out = np.full((len(excited), *power.shape[1:]), np.nan)
+    for parity in (0, 1):
+        here, there = excited % 2 == parity, detection % 2 == parity
+        if here.any() and there.any():
+            distance = np.abs(excited[here, None] - detection[there])
+            nearest = np.argsort(distance, axis=1, kind="stable")[:, :NEIGHBOURS]
+            out[here] = np.maximum(power[there][nearest].mean(axis=1), 0.0)
+    return out
+
+
+def _distortion(
+    records: PeriodicRecords, lines: NDArray[np.int64], levels: dict[str, NDArray[np.inexact]]
+) -> xr.Dataset:
+    unit = records.output_unit
+    dims = ("frequency_hz", "output", "experiment")
+    frequency_hz = lines / (records.n_samples * records.sample_time_s)
+    return xr.Dataset(
+        {
+            "distortion": (dims, levels["distortion"], {"units": unit}),
+            "noise_variance": (dims, levels["noise_variance"], {"units": f"{unit}^2"}),
+            "uncorrected": (dims, levels["uncorrected"], {"units": unit}),
+            "input_amplitude": (
+                ("frequency_hz", "input", "experiment"),
+                levels["input_amplitude"],
+                {"units": records.input_unit},
+            ),
+        },
+        coords={
+            "frequency_hz": (dims[:1], frequency_hz, {"units": "Hz"}),
+            "line": (dims[:1], lines),
+            "kind": (dims[:1], np.where(lines % 2 == 1, "odd", "even")),
+            "output": np.arange(1, records.n_outputs + 1),
+            "input": np.arange(1, records.n_inputs + 1),
+            "experiment": np.arange(1, records.n_experiments + 1),
+        },
+        attrs={"estimator": "fast_method", "n_periods": records.n_periods},
+    )

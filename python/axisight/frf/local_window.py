@@ -1,0 +1,167 @@
+"""What the local methods share: whole records, lines, the width of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.frf.response import frequency_response
+from axisight.records.arbitrary import ArbitraryRecords
+from axisight.records.periodic import PeriodicRecords
+
+Records = PeriodicRecords | ArbitraryRecords
+Lines = Sequence[int] | NDArray[np.int64]
+
+DEGREES_OF_FREEDOM = 12
+"""Least number that a default window leaves: the disc that holds 95 % for a known variance
+then still holds ``1 - (1 - ln(0.05) / 12) ** -12`` = 93 % for the estimated one."""
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Records with their periods joined, and the lines wanted."""
+
+    input: NDArray[np.float64]
+    output: NDArray[np.float64]
+    lines: NDArray[np.int64]
+    n_periods: int
+    frequency_hz: NDArray[np.float64]
+
+    @property
+    def bins(self) -> NDArray[np.int64]:
+        """Lines of the whole record."""
+        return self.lines * self.n_periods
+
+    @property
+    def last_bin(self) -> int:
+        """Highest line of the whole record below half the sampling frequency."""
+        return int((self.input.shape[1] - 1) // 2)
+
+
+def whole(records: Records, lines: Lines | None) -> Whole:
+    """Join the periods of the records and check the lines (None: all, or all excited)."""
+    n_periods = 1
+    if isinstance(records, PeriodicRecords):
+        n_periods = records.n_periods
+        chosen = records.lines if lines is None else np.asarray(lines)
+        joined = [
+            a.reshape(records.n_experiments, -1, a.shape[3])
+            for a in (records.input, records.output)
+        ]
+        if not np.isin(chosen, records.lines).all():
+            raise InputError(f"lines: expected excited lines of the records, got {chosen}")
+    elif isinstance(records, ArbitraryRecords):
+        highest = (records.n_samples - 1) // 2
+        chosen = np.arange(1, highest + 1) if lines is None else np.asarray(lines)
+        joined = [records.input, records.output]
+        if chosen.ndim != 1 or np.any(chosen != chosen.astype(np.int64)):
+            raise InputError(f"lines: expected a list of whole numbers, got {chosen!r}")
+        if np.any((chosen < 1) | (chosen > highest)):
+            raise InputError(f"lines: expected lines from 1 to {highest}, got {chosen}")
+    else:
+        raise InputError(
+            f"records: expected PeriodicRecords or ArbitraryRecords, got {type(records).__name__}"
+        )
+    if not chosen.size or np.any(np.diff(chosen) <= 0):
+        raise InputError("lines: expected ascending lines without repetition, at least one")
+    length = joined[0].shape[1] / n_periods
+    frequency_hz = chosen / (length * records.sample_time_s)
+    return Whole(joined[0], joined[1], chosen.astype(np.int64), n_periods, frequency_hz)
+
+
+def whole_number(name: str, value: int, least: int) -> int:
+    """Return a whole number from the least one to 2^31, or raise InputError."""
+    if isinstance(value, bool) or value != int(value) or not least <= value <= 2**31:
+        raise InputError(f"{name}: expected a whole number of at least {least}, got {value}")
+    return int(value)
+
+
+def regression(
+    records: Records,
+    data: Whole,
+    *,
+    estimator: str,
+    order: int,
+    denominator_order: int,
+    half_width: int | None,
+    threads: int,
+) -> xr.Dataset:
+    """Estimate by local regression over all lines of the record."""
+    if half_width is None:
+        half_width = _half_width(records, data, order, denominator_order)
+    half_width = whole_number("half_width", half_width, 1)
+    found = _core.frf_local_model(
+        data.input,
+        data.output,
+        data.bins.tolist(),
+        order=order,
+        denominator_order=denominator_order,
+        half_width=half_width,
+        band=_band(records, data, half_width),
+        threads=threads,
+    )
+    orders = {"order": order, "denominator_order": denominator_order, "half_width": half_width}
+    return dataset(records, data, found, estimator, orders)
+
+
+def dataset(
+    records: Records,
+    data: Whole,
+    found: _core.LocalEstimate,
+    estimator: str,
+    attrs: dict[str, int],
+) -> xr.Dataset:
+    """Return the response of the core as every estimator does."""
+    provenance = {
+        **attrs,
+        "degrees_of_freedom": found["degrees_of_freedom"],
+        "n_experiments": records.n_experiments,
+        "n_periods": data.n_periods,
+    }
+    return frequency_response(
+        data.frequency_hz,
+        found["response"],
+        estimator=estimator,
+        variance=found["variance"],
+        noise_variance=found["variance"] if data.n_periods > 1 else None,
+        condition=found["condition"],
+        flag=found["flag"],
+        input_unit=records.input_unit,
+        output_unit=records.output_unit,
+        attrs=provenance,
+    )
+
+
+def _half_width(records: Records, data: Whole, order: int, denominator_order: int) -> int:
+    """Smallest half-width with enough degrees of freedom, counted on excited lines only."""
+    experiments, inputs = records.n_experiments, records.n_inputs
+    unknowns = (order + 1) * (inputs + experiments) + denominator_order
+    if not isinstance(records, PeriodicRecords):
+        needed = max(-(-(unknowns + DEGREES_OF_FREEDOM) // experiments), 2 * order + 3)
+        return needed // 2
+    needed = max(-(-(unknowns + DEGREES_OF_FREEDOM) // experiments), order + 2)
+    excited = records.lines * data.n_periods
+    if len(excited) < needed:
+        raise InputError(
+            f"lines: expected at least {needed} excited lines for order {order} with "
+            f"{experiments} experiments and {inputs} inputs, got {len(excited)}"
+        )
+    widest = int((excited[needed - 1 :] - excited[: len(excited) - needed + 1]).max())
+    return -(-widest // 2)
+
+
+def _band(records: Records, data: Whole, half_width: int) -> tuple[int, int]:
+    """Lines that windows may cover: the excited ones, widened where a window needs more."""
+    if not isinstance(records, PeriodicRecords):
+        return 1, data.last_bin
+    first, last = (int(records.lines[i]) * data.n_periods for i in (0, -1))
+    missing = max(0, 2 * half_width + 1 - (last - first + 1))
+    first = max(1, first - (missing + 1) // 2)
+    last = min(data.last_bin, max(last, first + 2 * half_width))
+    return max(1, min(first, last - 2 * half_width)), last
