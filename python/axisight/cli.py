@@ -1,4 +1,4 @@
-"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``effects``, ``excite``, ``montecarlo``, ``demo``."""
+"""The command line: diagnose, check, simulate, effects, excite, montecarlo, demo."""
 
 from __future__ import annotations
 

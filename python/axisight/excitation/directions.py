@@ -46,4 +46,4 @@ def dft_matrix(n_inputs: int) -> NDArray[np.complex128]:
     Guillaume 2006).
     """
     index = np.arange(whole("n_inputs", n_inputs))
-    return np.exp(2j * np.pi * np.outer(index, index) / len(index))
+    return np.asarray(np.exp(2j * np.pi * np.outer(index, index) / len(index)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -55,7 +55,7 @@ def _bytes(reference: References, text: str, kind: str) -> bytes:
             "detection_lines": reference.detection_lines,
             "design": text,
         }
-        scipy.io.savemat(buffer, content, do_compression=True)
+        scipy.io.savemat(cast(Any, buffer), content, do_compression=True)
     elif kind == ".parquet":
         arrow = pa.Table.from_pandas(_table(reference), preserve_index=False)
         arrow = arrow.replace_schema_metadata({**(arrow.schema.metadata or {}), _KEY: text})

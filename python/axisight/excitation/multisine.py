@@ -130,10 +130,8 @@ class Multisine:
         """Return the signal with this peak or this effective rms; give exactly one."""
         if (peak is None) == (rms is None):
             raise InputError("peak, rms: expected exactly one of them")
-        if peak is not None:
-            factor = positive("peak", peak) / self.peak
-        else:
-            factor = positive("rms", rms or 0.0) / self.rms
+        target, own = (rms, self.rms) if peak is None else (peak, self.peak)
+        factor = positive("peak, rms", target or 0.0) / own
         return replace(
             self,
             amplitude=self.amplitude * factor,

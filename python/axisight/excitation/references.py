@@ -72,7 +72,7 @@ class References:
     @property
     def peak(self) -> Real:
         """Largest absolute sample, (n_experiments, n_inputs)."""
-        return np.abs(self.period).max(axis=1)
+        return np.asarray(np.abs(self.period).max(axis=1))
 
     def repeated(self, periods: int) -> Real:
         """Return whole periods in a row, (n_experiments, periods * n_samples, n_inputs)."""
@@ -116,7 +116,7 @@ def references(
         period = _orthogonal(broadband, n, seed_of("seed", seed), seed_of("run", run))
         chosen: Any = "dft"
     else:
-        matrix = direction_matrix(directions, n)  # type: ignore[arg-type]
+        matrix = direction_matrix(directions, n)
         period = matrix.T[:, None, :] * broadband.period[None, :, None]
         chosen = directions if isinstance(directions, str) else matrix.tolist()
     if square is not None:
