@@ -134,7 +134,6 @@ def test_time_ends_a_search() -> None:
 
 def test_single_line_and_two_lines() -> None:
     one = Multisine(T, 1000, [5], [2.0], [0.3])
-    # The grid misses up to 1 - cos(pi / 64) of a peak.
     assert optimize_crest_factor(one, starts=2).crest_factor == pytest.approx(
         np.sqrt(2), rel=1.3e-3
     )

@@ -94,7 +94,7 @@ class ExcitationDesign(_Part):
     schema_: Annotated[Literal["axisight.excite/1"], Field(alias="schema")] = "axisight.excite/1"
     robot: str
     signal: SignalDesign
-    directions: Literal["t1", "t2", "hadamard", "dft"] | list[list[float]] = "t1"
+    directions: Literal["t1", "identity", "t2", "hadamard", "dft"] | list[list[float]] = "t1"
     square: SquareDesign | None = None
     dc_level_rad_s: float | list[float] = 0.0
     limits: LimitDesign | None = None

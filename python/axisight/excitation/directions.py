@@ -11,13 +11,13 @@ from axisight import _core
 from axisight.errors import InputError
 from axisight.excitation.checks import Real, whole
 
-Directions = Literal["t1", "t2", "hadamard"]
+Directions = Literal["t1", "identity", "t2", "hadamard"]
 
 
 def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
     """Return T of ``r(t) = T r_0(t)``, (n_inputs, n_experiments), Wernholt (2004), (6.5).
 
-    ``"t1"`` is the identity, one input at a time; ``"t2"`` that of (6.6), three inputs only;
+    ``"t1"`` or ``"identity"`` is one input at a time; ``"t2"`` that of (6.6), three inputs only;
     ``"hadamard"`` has orthogonal rows of plus and minus one, for 1, 2, 4, 8, ... inputs. A
     matrix of full row rank passes as it is. Raises InputError.
     """
@@ -26,7 +26,7 @@ def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
         if name not in get_args(Directions):
             known = ", ".join(get_args(Directions))
             raise InputError(f"directions: expected one of {known} or a matrix, got {name!r}")
-        return _core.directions("identity" if name == "t1" else name, n)
+        return _core.directions("identity" if name == "t1" else str(name), n)
     matrix = np.array(name, dtype=np.float64)
     if matrix.ndim != 2 or matrix.shape[0] != n or not np.isfinite(matrix).all():
         raise InputError(

