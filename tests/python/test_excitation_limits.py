@@ -64,13 +64,15 @@ def test_what_exceeds_where_and_when() -> None:
     run = simulate(ROBOT, given.period[1])
     torque = np.abs(run["torque_cmd_nm"].values[:, 1])
     limit = 0.9 * torque.max()
-    report = check_limits(given, ROBOT, Limits(torque_nm=[1e4, limit, 1e4]), periods=1)
-    found = next(e for e in report.excesses if e.experiment == 2)
+    report = check_limits(given, ROBOT, Limits(torque_nm=[1e4, limit, 10.0]), periods=1)
+    found = next(e for e in report.excesses if (e.experiment, e.axis) == (2, 2))
     assert not report.ok and found.quantity == "torque" and found.axis == 2
     # Batches run in lock-step with shared steps: equal to the tolerance of the integrator.
     assert found.largest == pytest.approx(torque.max(), rel=1e-4)
     assert found.at_s == pytest.approx(torque.argmax() * ROBOT.sample_time_s, abs=1e-3)
     assert found.first_s == pytest.approx(np.argmax(torque > limit) * ROBOT.sample_time_s, abs=1e-3)
+    ratio = [e.largest / e.limit for e in report.excesses]
+    assert len(ratio) > 1 and ratio == sorted(ratio, reverse=True)
     assert f"axis 2: torque {found.largest:.4g} Nm" in str(report)
 
 

@@ -79,6 +79,11 @@ def test_discrete_interval_binary_puts_its_power_on_the_lines() -> None:
     assert share == pytest.approx(2 * np.sum(spectrum[lines] ** 2))
     # Random signs would put 6 / 256 of their power there.
     assert share > 0.6
+    # Settled: the multisine with the phases found has these signs.
+    found = np.fft.rfft(signal.period)[lines]
+    settled = np.zeros(257, complex)
+    settled[lines] = found / np.abs(found)
+    np.testing.assert_array_equal(np.sign(np.fft.irfft(settled, 512)), signal.period)
     held = discrete_interval_binary(0.256, T, lines, hold=2, starts=5)
     np.testing.assert_array_equal(held.period[::2], held.period[1::2])
 
@@ -86,6 +91,8 @@ def test_discrete_interval_binary_puts_its_power_on_the_lines() -> None:
 def test_stepped_sine() -> None:
     steps = stepped_sine(0.1, T, [10.0, 30.0], amplitude=[1.0, 2.0], waiting_periods=2, periods=3)
     assert steps.signal.n_samples == 2 * 5 * 200
+    # Two periods of 200 samples are waited for in each step of five.
+    np.testing.assert_array_equal(steps.first_sample, [400, 1400])
     for line, first, amplitude in zip(steps.lines, steps.first_sample, [1.0, 2.0], strict=True):
         part = steps.signal.period[first : first + steps.n_samples]
         spectrum = 2 * np.abs(np.fft.rfft(part)) / len(part)
