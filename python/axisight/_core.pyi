@@ -23,6 +23,7 @@ __all__ = [
     "MonteCarloStudy",
     "Robot",
     "__version__",
+    "directions",
     "effect_table",
     "failure_kinds",
     "fit_inverse_dynamics",
@@ -30,8 +31,12 @@ __all__ = [
     "frf_local_model",
     "frf_local_periodic",
     "measurement_noise",
+    "multisine_peak",
+    "optimize_crest_factor",
+    "random_phases",
     "simulate",
     "simulate_batch",
+    "square_period",
 ]
 
 __version__: str
@@ -657,3 +662,56 @@ def frf_local_periodic(
     threads: int = 0,
 ) -> LocalEstimate:
     """Local polynomial method for whole periods, joined, at lines of the period."""
+
+def random_phases(n: int, seed: int, run: int) -> _Array:
+    """Phases [rad], shape (n,), uniform over the circle, a function of (seed, run)."""
+
+def multisine_peak(
+    lines: Sequence[int], amplitude: Sequence[float], phase: Sequence[float]
+) -> float:
+    """Largest absolute value of a sum of sines, on 64 samples per cycle of the highest line."""
+
+def square_period(amplitude: float, period_s: float, smoothing: int, sample_time: float) -> _Array:
+    """One period of a square wave, smoothed by ``smoothing`` samples on either side."""
+
+def directions(name: str, n: int) -> _Array:
+    """Matrix of directions by name, shape (n, n): (axis, experiment)."""
+
+@type_check_only
+class CrestOutput(TypedDict):
+    """Best of a search; ``phase`` holds the wanted lines, then the snow.
+
+    ``snow`` are amplitudes relative to the root mean square of the wanted ones;
+    ``crest_factors`` those of all starts begun.
+    """
+
+    start: int
+    crest_factor: float
+    crest_factors: _Array
+    phase: _Array
+    snow: _Array
+    clipping_iterations: int
+    refinement_steps: int
+    out_of_time: bool
+
+def optimize_crest_factor(
+    lines: Sequence[int],
+    amplitude: Sequence[float],
+    *,
+    snow: Sequence[int],
+    snow_limit: float,
+    phase: Sequence[float] | None,
+    seed: int,
+    clipping: tuple[int, float, float, float, int],
+    refinement: tuple[int, int, int, int] | None,
+    starts: int,
+    time_s: float | None,
+    threads: int,
+    cancel: CancelToken | None = None,
+) -> CrestOutput | None:
+    """Search phases of a low crest factor from many starts; None when cancelled before the first.
+
+    ``clipping``: iterations, first level, last level, relaxation, oversampling.
+    ``refinement``: first exponent, last exponent, iterations, oversampling. ``phase`` [rad]
+    is the one start in the place of random ones.
+    """

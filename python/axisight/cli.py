@@ -1,4 +1,4 @@
-"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``effects``, ``montecarlo``, ``demo``."""
+"""The command line: diagnose, check, simulate, effects, excite, montecarlo, demo."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rich.table import Table
 from axisight.cli_common import ERR as _err
 from axisight.cli_common import OUT as _out
 from axisight.cli_common import errors as _errors
+from axisight.cli_excite import excite_command
 from axisight.cli_montecarlo import montecarlo_command
 from axisight.cli_simulate import simulate_command
 from axisight.demo import write_demo_case
@@ -32,6 +33,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
+app.command("excite")(excite_command)
 app.command("montecarlo")(montecarlo_command)
 app.command("simulate")(simulate_command)
 

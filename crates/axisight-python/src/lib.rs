@@ -6,6 +6,7 @@
 mod convert;
 mod effects;
 mod entry;
+mod excitation;
 mod fit;
 mod frf;
 mod local_models;
@@ -39,6 +40,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
+    module.add_function(wrap_pyfunction!(excitation::random_phases, module)?)?;
+    module.add_function(wrap_pyfunction!(excitation::multisine_peak, module)?)?;
+    module.add_function(wrap_pyfunction!(excitation::square_period, module)?)?;
+    module.add_function(wrap_pyfunction!(excitation::directions, module)?)?;
+    module.add_function(wrap_pyfunction!(excitation::optimize_crest_factor, module)?)?;
     module.add_class::<montecarlo::MonteCarloStudy>()?;
     module.add_class::<montecarlo::MonteCarloEnsemble>()?;
     module.add_function(wrap_pyfunction!(montecarlo::failure_kinds, module)?)?;

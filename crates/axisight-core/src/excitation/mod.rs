@@ -1,11 +1,12 @@
 //! Excitation: velocity references whose spectrum is known.
 
+pub mod crest;
 mod directions;
 mod multisine;
 mod square;
 
 pub use directions::directions;
-pub use multisine::{Grid, Multisine};
+pub use multisine::{Grid, Multisine, random_phases};
 pub use square::Square;
 
 /// An excitation that cannot be made.

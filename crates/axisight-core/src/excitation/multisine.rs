@@ -82,12 +82,7 @@ impl Multisine {
 
     /// Phases of `run` [rad], uniform over the circle.
     pub fn phases(&self, seed: u64, run: u64) -> Vec<f64> {
-        let mut rng = generator(seed, Purpose::Phases, run);
-        let turn = std::f64::consts::TAU;
-        self.lines
-            .iter()
-            .map(|_| rng.random::<f64>() * turn)
-            .collect()
+        random_phases(self.lines.len(), seed, run)
     }
 
     /// One period with the given phases, scaled to the peak.
@@ -104,4 +99,11 @@ impl Multisine {
         }
         x
     }
+}
+
+/// `n` phases [rad], uniform over the circle, of realization `run`.
+pub fn random_phases(n: usize, seed: u64, run: u64) -> Vec<f64> {
+    let mut rng = generator(seed, Purpose::Phases, run);
+    let turn = std::f64::consts::TAU;
+    (0..n).map(|_| rng.random::<f64>() * turn).collect()
 }

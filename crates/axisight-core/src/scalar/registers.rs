@@ -58,9 +58,9 @@ use std::arch::x86_64::{
 };
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512dq"))]
 use std::arch::x86_64::{
-    _mm512_add_pd, _mm512_cmp_pd_mask, _mm512_div_pd, _mm512_fmadd_pd, _mm512_mask_blend_pd,
-    _mm512_mul_pd, _mm512_roundscale_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sqrt_pd,
-    _mm512_sub_pd, _mm512_xor_pd,
+    _mm512_add_pd, _mm512_andnot_pd, _mm512_cmp_pd_mask, _mm512_div_pd, _mm512_fmadd_pd,
+    _mm512_fnmadd_pd, _mm512_mask_blend_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_roundscale_pd,
+    _mm512_set1_pd, _mm512_setzero_pd, _mm512_sqrt_pd, _mm512_sub_pd, _mm512_xor_pd,
 };
 
 operation!(
@@ -97,17 +97,20 @@ operation!(
 operation!(
     /// `c - a * b` with one rounding.
     fnma(a, b, c),
+    |a, b, c| _mm512_fnmadd_pd(a, b, c),
     |a, b, c| _mm256_fnmadd_pd(a, b, c),
     |a: f64, b, c| (-a).mul_add(b, c)
 );
 operation!(
     magnitude(a),
+    |a| _mm512_andnot_pd(_mm512_set1_pd(-0.0), a),
     |a| _mm256_andnot_pd(_mm256_set1_pd(-0.0), a),
     |a: f64| a.abs()
 );
 operation!(
     /// The larger; `b` where either is NaN.
     larger(a, b),
+    |a, b| _mm512_max_pd(a, b),
     |a, b| _mm256_max_pd(a, b),
     |a: f64, b: f64| if a > b { a } else { b }
 );

@@ -5,6 +5,7 @@ mod complex_batch;
 mod complex_solve;
 mod dft;
 mod line_dft;
+mod line_transform;
 mod pseudo_inverse;
 mod weighting;
 
@@ -12,5 +13,6 @@ pub use complex_batch::{BatchShapeError, invert_batch, right_divide_batch};
 pub use complex_solve::SmallSolver;
 pub use dft::{Dft, DftScratch};
 pub use line_dft::{LineDft, LineDftScratch};
+pub use line_transform::{LineGrid, LineTransform};
 pub use pseudo_inverse::PseudoInverse;
 pub use weighting::{Weighting, WeightingError};

@@ -1,0 +1,156 @@
+"""Phases that make the crest factor small."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.excitation.checks import Real, lines_below, positive, seed_of, whole
+from axisight.excitation.multisine import Multisine, response_at
+
+
+@dataclass(frozen=True)
+class Clipping:
+    """Settings of the clipping algorithm, Wernholt (2004), Algorithm 5.1.
+
+    The level falls off as 1 - level goes geometrically from ``1 - first_level`` to
+    ``1 - last_level``, relative to the peak. What is clipped is subtracted ``relaxation``
+    times: 1 is the algorithm as published, over-relaxation needs fewer iterations.
+    ``oversampling`` of the grid is relative to the Nyquist count of the highest line and
+    rounded up to a power of two in samples; peaks hide between samples below 8.
+    """
+
+    iterations: int = 300
+    first_level: float = 0.7
+    last_level: float = 0.999
+    relaxation: float = 4.0
+    oversampling: int = 8
+
+
+@dataclass(frozen=True)
+class LpRefinement:
+    """Settings of the refinement in the L2p norm (Guillaume et al. 1991).
+
+    The exponent 2p doubles from ``first_exponent`` to ``last_exponent``; at each at most
+    ``iterations`` damped Gauss-Newton steps are tried.
+    """
+
+    first_exponent: int = 8
+    last_exponent: int = 2048
+    iterations: int = 100
+    oversampling: int = 16
+
+
+@dataclass(frozen=True, eq=False)
+class CrestSearch:
+    """What a search found.
+
+    signal
+        The multisine with the phases (and the snow) found.
+    crest_factor
+        The crest factor made small: of the signal, or of its output if a response was given.
+    start, seed
+        The start that won: its random phases were those of (seed, run=start); -1 for given
+        phases.
+    crest_factors
+        Of every start begun, in order.
+    clipping_iterations, refinement_steps
+        Effort of all starts together.
+    status
+        ``"completed"``, or ``"out_of_time"``: the time ended before the starts did.
+    """
+
+    signal: Multisine
+    crest_factor: float
+    start: int
+    seed: int
+    crest_factors: Real
+    clipping_iterations: int
+    refinement_steps: int
+    status: Literal["completed", "out_of_time"]
+
+
+def optimize_crest_factor(
+    signal: Multisine,
+    *,
+    starts: int = 16,
+    time_s: float | None = None,
+    seed: int = 0,
+    from_signal: bool = False,
+    clipping: Clipping | None = None,
+    refinement: LpRefinement | Literal["none"] | None = None,
+    snow_lines: ArrayLike = (),
+    snow_limit: float = 1.0,
+    response: ArrayLike | None = None,
+    threads: int = 0,
+) -> CrestSearch:
+    """Return the signal with new phases and a small crest factor; amplitudes stay.
+
+    Parameters
+    ----------
+    signal : the multisine; its snow, if any, is replaced.
+    starts : number of starts. Without ``time_s`` the result depends on signal, settings,
+        seed and this only.
+    time_s : wall time [s] after which no start is begun and the running ones end.
+    seed : start i begins at the phases of :func:`random_phases` for (seed, i).
+    from_signal : start once from the phases of the signal instead.
+    clipping : settings of the clipping algorithm, run first.
+    refinement : settings of the refinement after it; ``"none"`` leaves it out.
+    snow_lines : further lines that may be added ("snowing"), with amplitudes up to
+        ``snow_limit`` times the root mean square of the signal's.
+    snow_limit : see there.
+    response : complex (n_lines,), response at the lines: the crest factor of the output
+        ``G u`` is made small instead of that of the signal. Not together with snow.
+    threads : 0 takes every core. The result does not depend on it.
+
+    Raises InputError naming the field.
+
+    """
+    snow = lines_below("snow_lines", np.asarray(snow_lines), signal.n_samples)
+    amplitude, turned = signal.amplitude, np.zeros(len(signal.lines))
+    if response is not None:
+        if snow.size:
+            raise InputError("response, snow_lines: expected at most one of them")
+        gain = response_at(response, len(signal.lines))
+        amplitude, turned = amplitude * np.abs(gain), np.angle(gain)
+    steps = None if refinement == "none" else astuple(refinement or LpRefinement())
+    found = _core.optimize_crest_factor(
+        signal.lines.tolist(),
+        amplitude.tolist(),
+        snow=snow.tolist(),
+        snow_limit=float(snow_limit),
+        phase=(signal.phase_rad + turned).tolist() if from_signal else None,
+        seed=seed_of("seed", seed),
+        clipping=astuple(clipping or Clipping()),
+        refinement=steps,
+        starts=whole("starts", starts),
+        time_s=None if time_s is None else positive("time_s", time_s),
+        threads=whole("threads", threads, 0),
+    )
+    if found is None:  # only a cancel token does that, and none was given
+        raise KeyboardInterrupt
+    count = len(signal.lines)
+    size = float(np.sqrt(np.mean(signal.amplitude**2)))
+    chosen = replace(
+        signal,
+        phase_rad=found["phase"][:count] - turned,
+        detection_lines=np.setdiff1d(signal.detection_lines, snow),
+        snow_lines=snow,
+        snow_amplitude=found["snow"] * size,
+        snow_phase_rad=found["phase"][count:],
+    )
+    return CrestSearch(
+        signal=chosen,
+        crest_factor=found["crest_factor"],
+        start=-1 if from_signal else found["start"],
+        seed=seed,
+        crest_factors=found["crest_factors"],
+        clipping_iterations=found["clipping_iterations"],
+        refinement_steps=found["refinement_steps"],
+        status="out_of_time" if found["out_of_time"] else "completed",
+    )

@@ -1,0 +1,226 @@
+"""An excitation as a design in TOML: what ``axisight excite`` carries out."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from axisight.errors import InputError
+from axisight.excitation.crest import CrestSearch, optimize_crest_factor
+from axisight.excitation.limits import LimitReport, Limits, check_limits
+from axisight.excitation.lines import Grid
+from axisight.excitation.multisine import Multisine, multisine
+from axisight.excitation.references import References, references
+from axisight.excitation.signals import (
+    PeriodicSignal,
+    chirp,
+    discrete_interval_binary,
+    prbs,
+    square,
+    stepped_sine,
+    triangle,
+)
+from axisight.presets import PRESETS
+from axisight.robot import Robot, load_robot
+
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**64)]
+PerAxis = Positive | list[Positive]
+T = TypeVar("T")
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SignalDesign(_Part):
+    """The broadband signal; ``peak_rad_s`` is its largest value, motor side.
+
+    ``kind`` decides what else counts. Multisine: ``period_s``, ``band_hz`` with ``grid`` (or
+    ``lines``), ``phases`` (``"optimized"`` takes the best of ``starts`` or what ``time_s``
+    allows), ``seed``, ``run``. Chirp, stepped sine and discrete-interval binary: ``period_s``
+    and ``band_hz``; triangle: ``period_s``; PRBS: ``bits`` and ``hold``.
+    """
+
+    kind: Literal[
+        "multisine", "chirp", "stepped_sine", "triangle", "prbs", "discrete_interval_binary"
+    ] = "multisine"
+    peak_rad_s: Positive
+    period_s: Positive | None = None
+    band_hz: tuple[Positive, Positive] | None = None
+    lines: list[Count] | None = None
+    grid: Grid = "full"
+    group: Annotated[int, Field(ge=2)] = 4
+    phases: Literal["optimized", "random", "schroeder"] = "optimized"
+    seed: Seed = 0
+    run: Seed = 0
+    starts: Count = 16
+    time_s: Positive | None = None
+    snow_lines: list[Count] = []
+    bits: Annotated[int, Field(ge=2, le=24)] = 12
+    hold: Count = 1
+
+
+class SquareDesign(_Part):
+    """The smoothed square wave on all axes, Wernholt (2004), (7.3)."""
+
+    amplitude_rad_s: Positive
+    period_s: Positive
+    smoothing_samples: Annotated[int, Field(ge=0)] = 40
+
+
+class LimitDesign(_Part):
+    """Limits of the motors, one number or one per axis, and how long to simulate."""
+
+    velocity_rad_s: PerAxis | None = None
+    acceleration_rad_s2: PerAxis | None = None
+    torque_nm: PerAxis | None = None
+    periods: Count = 2
+    model: Literal["linear", "nonlinear"] = "nonlinear"
+
+
+class ExcitationDesign(_Part):
+    """References for a robot (file or preset).
+
+    ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"`` or rows over axes and
+    columns over experiments. Without ``limits`` nothing is simulated.
+    """
+
+    schema_: Annotated[Literal["axisight.excite/1"], Field(alias="schema")] = "axisight.excite/1"
+    robot: str
+    signal: SignalDesign
+    directions: Literal["t1", "identity", "t2", "hadamard", "dft"] | list[list[float]] = "t1"
+    square: SquareDesign | None = None
+    dc_level_rad_s: float | list[float] = 0.0
+    limits: LimitDesign | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Excited:
+    """What a design gave: references, search of phases and check of limits if there were any."""
+
+    references: References
+    signal: Multisine | PeriodicSignal
+    search: CrestSearch | None
+    report: LimitReport | None
+
+
+def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign:
+    """Return the checked design; raises InputError naming every field that is wrong."""
+    try:
+        return ExcitationDesign(**data)
+    except ValidationError as error:
+        faults = [
+            f"{'.'.join(str(p) for p in f['loc'])}: {f['msg'].lower()}, got {f['input']!r}"
+            for f in error.errors()
+        ]
+        raise InputError(f"{where}: {'; '.join(faults)}") from None
+
+
+def load_design(path: Path | str) -> dict[str, Any]:
+    """Return the design in a TOML file, not yet checked; a robot file lies next to it."""
+    source = Path(path)
+    try:
+        data = tomllib.loads(source.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{source}: expected a design in TOML: {error}") from None
+    robot = data.get("robot")
+    if isinstance(robot, str) and robot not in PRESETS:
+        data["robot"] = str((source.parent / robot).resolve())
+    return data
+
+
+def excite(design: ExcitationDesign) -> Excited:
+    """Carry a design out; raises InputError naming the field."""
+    robot = load_robot(design.robot)
+    signal, search = _signal(design.signal, robot.sample_time_s)
+    wave = design.square
+    made = references(
+        signal,
+        robot.n_axes,
+        directions=design.directions,
+        square=None
+        if wave is None
+        else square(
+            wave.period_s,
+            robot.sample_time_s,
+            amplitude=wave.amplitude_rad_s,
+            smoothing_samples=wave.smoothing_samples,
+        ),
+        dc_level=design.dc_level_rad_s,
+        seed=design.signal.seed,
+        run=design.signal.run,
+    )
+    made.design["excite"] = design.model_dump(by_alias=True, mode="json")
+    return Excited(made, signal, search, _report(design, made, robot))
+
+
+def _report(design: ExcitationDesign, made: References, robot: Robot) -> LimitReport | None:
+    if design.limits is None:
+        return None
+    wanted = design.limits
+    limits = Limits(wanted.velocity_rad_s, wanted.acceleration_rad_s2, wanted.torque_nm)
+    return check_limits(made, robot, limits, periods=wanted.periods, model=wanted.model)
+
+
+def _signal(
+    s: SignalDesign, sample_time_s: float
+) -> tuple[Multisine | PeriodicSignal, CrestSearch | None]:
+    if s.kind == "multisine":
+        made, search = _multisine(s, sample_time_s)
+        return made.scaled(peak=s.peak_rad_s), search
+    if s.kind == "prbs":
+        return prbs(s.bits, sample_time_s, amplitude=s.peak_rad_s, hold=s.hold), None
+    period = _given("period_s", s.period_s)
+    if s.kind == "triangle":
+        return triangle(period, sample_time_s, amplitude=s.peak_rad_s), None
+    band = _given("band_hz", s.band_hz)
+    if s.kind == "chirp":
+        return chirp(period, band, sample_time_s, amplitude=s.peak_rad_s), None
+    lines = multisine(period, sample_time_s, band_hz=band, grid=s.grid, seed=s.seed).lines
+    if s.kind == "stepped_sine":
+        frequencies = lines / period
+        return stepped_sine(period, sample_time_s, frequencies, amplitude=s.peak_rad_s).signal, None
+    return (
+        discrete_interval_binary(
+            period,
+            sample_time_s,
+            lines,
+            amplitude=s.peak_rad_s,
+            hold=s.hold,
+            starts=s.starts,
+            seed=s.seed,
+        ),
+        None,
+    )
+
+
+def _multisine(s: SignalDesign, sample_time_s: float) -> tuple[Multisine, CrestSearch | None]:
+    made = multisine(
+        _given("period_s", s.period_s),
+        sample_time_s,
+        band_hz=s.band_hz,
+        grid=s.grid,
+        lines=s.lines,
+        phases="random" if s.phases == "optimized" else s.phases,
+        seed=s.seed,
+        run=s.run,
+        group=s.group,
+    )
+    if s.phases != "optimized":
+        return made, None
+    search = optimize_crest_factor(
+        made, starts=s.starts, time_s=s.time_s, seed=s.seed, snow_lines=s.snow_lines
+    )
+    return search.signal, search
+
+
+def _given(field: str, value: T | None) -> T:
+    if value is None:
+        raise InputError(f"signal.{field}: expected a value, got none")
+    return value

@@ -1,0 +1,49 @@
+"""Which input moves how in which experiment."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.excitation.checks import Real, whole
+
+Directions = Literal["t1", "identity", "t2", "hadamard"]
+
+
+def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
+    """Return T of ``r(t) = T r_0(t)``, (n_inputs, n_experiments), Wernholt (2004), (6.5).
+
+    ``"t1"`` or ``"identity"`` is one input at a time; ``"t2"`` that of (6.6), three inputs only;
+    ``"hadamard"`` has orthogonal rows of plus and minus one, for 1, 2, 4, 8, ... inputs. A
+    matrix of full row rank passes as it is. Raises InputError.
+    """
+    n = whole("n_inputs", n_inputs)
+    if isinstance(name, str):
+        if name not in get_args(Directions):
+            known = ", ".join(get_args(Directions))
+            raise InputError(f"directions: expected one of {known} or a matrix, got {name!r}")
+        return _core.directions("identity" if name == "t1" else str(name), n)
+    matrix = np.array(name, dtype=np.float64)
+    if matrix.ndim != 2 or matrix.shape[0] != n or not np.isfinite(matrix).all():
+        raise InputError(
+            f"directions: expected finite numbers of shape ({n}, n_experiments), got {matrix.shape}"
+        )
+    rank = int(np.linalg.matrix_rank(matrix))
+    if rank < n:
+        raise InputError(f"directions: expected rank {n}, one per input, got rank {rank}")
+    return matrix
+
+
+def dft_matrix(n_inputs: int) -> NDArray[np.complex128]:
+    """Return the DFT matrix ``W[i, e] = exp(2 pi i i e / n)``, (n_inputs, n_experiments).
+
+    With random phases of its own for every input, ``U(k) = diag(exp(i phi(k))) W`` has
+    orthogonal rows at every line, for any number of inputs (Dobrowiecki, Schoukens and
+    Guillaume 2006).
+    """
+    index = np.arange(whole("n_inputs", n_inputs))
+    return np.asarray(np.exp(2j * np.pi * np.outer(index, index) / len(index)))

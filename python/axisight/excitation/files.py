@@ -1,0 +1,139 @@
+"""References in files, the design beside the samples."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import scipy.io
+
+from axisight.errors import InputError
+from axisight.excitation.references import References
+from axisight.gap.result import write_bytes
+
+_SCHEMA = "axisight.excitation/1"
+_KEY = b"axisight.excitation"
+_DAMAGED = (pa.ArrowException, scipy.io.matlab.MatReadError)
+_KINDS = (".csv", ".mat", ".parquet")
+
+
+def write_references(reference: References, path: Path | str) -> list[Path]:
+    """Write one period of every experiment with its design; return the files written.
+
+    ``.csv`` and ``.parquet`` have columns ``experiment`` (from 1), ``time_s`` and
+    ``velocity_ref_1``, ... (``input_1``, ... for a unit other than rad/s); ``.mat`` has
+    ``period`` (n_experiments, n_samples, n_inputs) and ``sample_time_s``. The design is JSON:
+    beside a CSV in ``NAME.design.json``, in the variable ``design`` of a MAT file, in the
+    metadata of a Parquet file. Numbers are written in full. Raises InputError for another
+    ending or a folder that cannot be written.
+    """
+    target = _known(path)
+    text = json.dumps(_design(reference), indent=1)
+    files = {target: _bytes(reference, text, target.suffix)}
+    if target.suffix == ".csv":
+        files[_beside(target)] = text.encode()
+    for name, data in files.items():
+        try:
+            write_bytes(name, data)
+        except OSError as error:
+            raise InputError(f"{name}: cannot be written: {error}") from None
+    return list(files)
+
+
+def _bytes(reference: References, text: str, kind: str) -> bytes:
+    buffer = io.BytesIO()
+    if kind == ".mat":
+        content = {
+            "period": reference.period,
+            "sample_time_s": reference.sample_time_s,
+            "lines": reference.lines,
+            "detection_lines": reference.detection_lines,
+            "design": text,
+        }
+        scipy.io.savemat(cast(Any, buffer), content, do_compression=True)
+    elif kind == ".parquet":
+        arrow = pa.Table.from_pandas(_table(reference), preserve_index=False)
+        arrow = arrow.replace_schema_metadata({**(arrow.schema.metadata or {}), _KEY: text})
+        pq.write_table(arrow, buffer)
+    else:
+        # The shortest text that reads back as the same number.
+        buffer.write(_table(reference).to_csv(index=False).encode())
+    return buffer.getvalue()
+
+
+def read_references(path: Path | str) -> References:
+    """Return what :func:`write_references` wrote; raises InputError naming file and field."""
+    source = _known(path)
+    try:
+        text, period = _content(source)
+        design = json.loads(text)
+        if design["schema"] != _SCHEMA:
+            raise InputError(f"{source}: schema: expected {_SCHEMA}, got {design['schema']}")
+        period = period.reshape(design["shape"])
+        return References(
+            sample_time_s=design["sample_time_s"],
+            period=period,
+            lines=np.array(design["lines"], np.int64),
+            detection_lines=np.array(design["detection_lines"], np.int64),
+            unit=design["unit"],
+            design=design["design"],
+        )
+    except InputError:
+        raise
+    except (*_DAMAGED, OSError, ValueError, KeyError, TypeError, NotImplementedError) as e:
+        raise InputError(f"{source}: expected references with their design: {e!r}") from None
+
+
+def _design(reference: References) -> dict[str, Any]:
+    return {
+        "schema": _SCHEMA,
+        "sample_time_s": reference.sample_time_s,
+        "shape": list(reference.period.shape),
+        "unit": reference.unit,
+        "lines": reference.lines.tolist(),
+        "detection_lines": reference.detection_lines.tolist(),
+        "design": reference.design,
+    }
+
+
+def _content(source: Path) -> tuple[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """Return the design and the samples in the order (experiment, sample, input)."""
+    if source.suffix == ".mat":
+        content = scipy.io.loadmat(source)
+        return str(content["design"].item()), np.asarray(content["period"], np.float64)
+    if source.suffix == ".parquet":
+        arrow = pq.read_table(source)
+        text = (arrow.schema.metadata or {})[_KEY].decode()
+        table = arrow.to_pandas()
+    else:
+        text = _beside(source).read_text("utf-8")
+        table = pd.read_csv(source, float_precision="round_trip")
+    return text, table.iloc[:, 2:].to_numpy(np.float64)
+
+
+def _table(reference: References) -> pd.DataFrame:
+    e, n, inputs = reference.period.shape
+    stem = "velocity_ref" if reference.unit == "rad/s" else "input"
+    columns = {
+        "experiment": np.repeat(np.arange(1, e + 1), n),
+        "time_s": np.tile(np.arange(n) * reference.sample_time_s, e),
+    }
+    flat = reference.period.reshape(-1, inputs)
+    return pd.DataFrame({**columns, **{f"{stem}_{i + 1}": flat[:, i] for i in range(inputs)}})
+
+
+def _known(path: Path | str) -> Path:
+    target = Path(path)
+    if target.suffix not in _KINDS:
+        raise InputError(f"{target}: expected a name ending in {', '.join(_KINDS)}")
+    return target
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(path.stem + ".design.json")

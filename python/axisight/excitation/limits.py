@@ -1,0 +1,200 @@
+"""Would the machine stand it? Velocity, acceleration and torque of a simulated run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.excitation.checks import Real, per_item, whole
+from axisight.excitation.references import References
+from axisight.robot import Robot
+from axisight.simulation import Model, simulate_batch
+
+Quantity = Literal["reference_velocity", "velocity", "acceleration", "torque"]
+UNITS: dict[Quantity, str] = {
+    "reference_velocity": "rad/s",
+    "velocity": "rad/s",
+    "acceleration": "rad/s^2",
+    "torque": "Nm",
+}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest absolute values of every motor: one number for all axes, one per axis, or None.
+
+    ``velocity_rad_s`` holds for the reference and for the motor; all are motor side.
+    """
+
+    velocity_rad_s: ArrayLike | None = None
+    acceleration_rad_s2: ArrayLike | None = None
+    torque_nm: ArrayLike | None = None
+
+
+@dataclass(frozen=True)
+class Excess:
+    """One limit that one axis passes in one experiment.
+
+    ``experiment`` and ``axis`` count from 1. ``largest`` at ``at_s`` is the largest absolute
+    value; ``first_s`` is when the limit is passed first; ``n_samples`` how often, all periods
+    and the start together.
+    """
+
+    quantity: Quantity
+    experiment: int
+    axis: int
+    limit: float
+    largest: float
+    at_s: float
+    first_s: float
+    n_samples: int
+
+    def __str__(self) -> str:
+        """One line for people."""
+        unit = UNITS[self.quantity]
+        return (
+            f"experiment {self.experiment}, axis {self.axis}: {self.quantity} "
+            f"{self.largest:.4g} {unit} at {self.at_s:.4g} s passes {self.limit:.4g} {unit} "
+            f"(first at {self.first_s:.4g} s, {self.n_samples} samples)"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LimitReport:
+    """What a check found.
+
+    ``excesses`` worst first, relative to the limit; ``largest`` the largest absolute values
+    (quantity, experiment, axis); ``failed`` the experiments (from 1) whose simulation did not
+    complete, with its status.
+    """
+
+    excesses: tuple[Excess, ...]
+    largest: xr.DataArray
+    failed: dict[int, str]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every experiment ran to its end within all limits."""
+        return not self.excesses and not self.failed
+
+    def __str__(self) -> str:
+        """What is wrong, a line each; or that nothing is."""
+        lines = [f"experiment {e}: simulation {status}" for e, status in self.failed.items()]
+        lines += [str(excess) for excess in self.excesses]
+        return "\n".join(lines) or "within all limits"
+
+
+def check_limits(
+    reference: References,
+    robot: Robot,
+    limits: Limits,
+    *,
+    periods: int = 2,
+    model: Model = "nonlinear",
+    effects: Iterable[Effect] = (),
+    start_rad: Sequence[float] | None = None,
+) -> LimitReport:
+    """Simulate every experiment in closed loop from rest and compare with the limits.
+
+    Parameters
+    ----------
+    reference : motor-side velocity references [rad/s] at the robot's sample time.
+    robot : the model; it needs a controller.
+    limits : what must not be passed.
+    periods : periods to simulate; the first one holds the start from rest.
+    model, effects, start_rad : as in :func:`axisight.simulate`.
+
+    Velocity and acceleration are means over a sample, from true motor positions; torque is the
+    command. Raises InputError for other sample times, axes or units and for limits that are
+    not positive.
+
+    """
+    if reference.unit != "rad/s" or reference.n_inputs != robot.n_axes:
+        raise InputError(
+            f"reference: expected {robot.n_axes} velocities [rad/s], got {reference.n_inputs} "
+            f"inputs [{reference.unit}]"
+        )
+    if abs(reference.sample_time_s / robot.sample_time_s - 1) > 1e-9:
+        raise InputError(
+            f"reference: expected the sample time of the robot, {robot.sample_time_s} s, "
+            f"got {reference.sample_time_s} s"
+        )
+    bounds = _bounds(limits, robot.n_axes)
+    given = reference.repeated(whole("periods", periods))
+    run = simulate_batch(robot, given, effects=list(effects), start_rad=start_rad, model=model)
+    step = robot.sample_time_s
+    position = run["motor_position_rad"].values
+    rest = robot.equilibrium(start_rad, effects)["motor_angle_rad"].values
+    before = np.broadcast_to(rest, (len(position), 1, robot.n_axes))
+    velocity = np.diff(position, axis=1, prepend=before) / step
+    signals: dict[Quantity, Real] = {
+        "reference_velocity": given,
+        "velocity": velocity,
+        "acceleration": np.diff(velocity, axis=1, prepend=0.0) / step,
+        "torque": run["torque_cmd_nm"].values,
+    }
+    excesses = [
+        excess
+        for quantity, bound in bounds.items()
+        for excess in _excesses(quantity, signals[quantity], bound, step)
+    ]
+    excesses.sort(key=lambda e: -e.largest / e.limit)
+    status = run["status"].values
+    return LimitReport(
+        excesses=tuple(excesses),
+        largest=xr.DataArray(
+            np.stack([np.nanmax(np.abs(x), axis=1) for x in signals.values()]),
+            dims=("quantity", "experiment", "axis"),
+            coords={
+                "quantity": list(signals),
+                "experiment": np.arange(1, len(given) + 1),
+                "axis": robot.axis_numbers(),
+            },
+        ),
+        failed={e + 1: str(s) for e, s in enumerate(status) if s != "completed"},
+    )
+
+
+def _bounds(limits: Limits, n_axes: int) -> dict[Quantity, Real]:
+    given: dict[Quantity, tuple[str, ArrayLike | None]] = {
+        "reference_velocity": ("velocity_rad_s", limits.velocity_rad_s),
+        "velocity": ("velocity_rad_s", limits.velocity_rad_s),
+        "acceleration": ("acceleration_rad_s2", limits.acceleration_rad_s2),
+        "torque": ("torque_nm", limits.torque_nm),
+    }
+    out: dict[Quantity, Real] = {}
+    for quantity, (name, value) in given.items():
+        if value is not None:
+            out[quantity] = per_item(f"limits.{name}", value, n_axes)
+            if np.any(out[quantity] <= 0):
+                raise InputError(f"limits.{name}: expected positive numbers, got {value}")
+    return out
+
+
+def _excesses(quantity: Quantity, signal: Real, bound: Real, step: float) -> list[Excess]:
+    # A run that failed is NaN afterwards, which is above nothing; it is listed as failed.
+    size = np.abs(signal)
+    above = size > bound
+    out = []
+    for e, a in np.argwhere(above.any(axis=1)):
+        at = int(np.nanargmax(size[e, :, a]))
+        out.append(
+            Excess(
+                quantity=quantity,
+                experiment=int(e) + 1,
+                axis=int(a) + 1,
+                limit=float(bound[a]),
+                largest=float(size[e, at, a]),
+                at_s=at * step,
+                first_s=int(np.argmax(above[e, :, a])) * step,
+                n_samples=int(above[e, :, a].sum()),
+            )
+        )
+    return out

@@ -1,0 +1,180 @@
+"""The references of all experiments: one period of each, and what they were made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from axisight.errors import InputError
+from axisight.excitation.checks import Lines, Real, per_item, positive, seed_of, whole
+from axisight.excitation.directions import Directions, dft_matrix, direction_matrix
+from axisight.excitation.multisine import Multisine, random_phases
+from axisight.excitation.signals import PeriodicSignal
+
+
+@dataclass(frozen=True, eq=False)
+class References:
+    """Velocity references (or other inputs) of a set of experiments.
+
+    sample_time_s
+        Sample time [s].
+    period
+        One period of each experiment, (n_experiments, n_samples, n_inputs).
+    lines, detection_lines
+        Excited lines and lines left free, as multiples of one over the period.
+    unit
+        Unit of the samples.
+    design
+        What they were made from, in plain numbers and words, so that files can hold it.
+    """
+
+    sample_time_s: float
+    period: Real
+    lines: Lines = field(default_factory=lambda: np.empty(0, np.int64))
+    detection_lines: Lines = field(default_factory=lambda: np.empty(0, np.int64))
+    unit: str = "rad/s"
+    design: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the shape."""
+        positive("sample_time_s", self.sample_time_s)
+        period = np.array(self.period, dtype=np.float64)
+        if period.ndim != 3 or 0 in period.shape or not np.isfinite(period).all():
+            raise InputError(
+                "period: expected finite numbers of shape (n_experiments, n_samples, n_inputs), "
+                f"got {period.shape}"
+            )
+        object.__setattr__(self, "period", period)
+
+    @property
+    def n_experiments(self) -> int:
+        """Number of experiments."""
+        return int(self.period.shape[0])
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of a period."""
+        return int(self.period.shape[1])
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return int(self.period.shape[2])
+
+    @property
+    def period_s(self) -> float:
+        """Period [s]."""
+        return self.n_samples * self.sample_time_s
+
+    @property
+    def peak(self) -> Real:
+        """Largest absolute sample, (n_experiments, n_inputs)."""
+        return np.asarray(np.abs(self.period).max(axis=1))
+
+    def repeated(self, periods: int) -> Real:
+        """Return whole periods in a row, (n_experiments, periods * n_samples, n_inputs)."""
+        return np.tile(self.period, (1, whole("periods", periods), 1))
+
+
+def references(
+    broadband: Multisine | PeriodicSignal,
+    n_inputs: int,
+    *,
+    directions: Directions | Literal["dft"] | ArrayLike = "t1",
+    square: PeriodicSignal | None = None,
+    dc_level: ArrayLike = 0.0,
+    seed: int = 0,
+    run: int = 0,
+    unit: str = "rad/s",
+) -> References:
+    """Return ``r(t) = T r_bb(t) + r_sq(t) + dc``, Wernholt (2004), section 7.1.
+
+    Parameters
+    ----------
+    broadband : the scalar signal r_bb.
+    n_inputs : number of inputs (axes).
+    directions : T, see :func:`direction_matrix`; or ``"dft"``, for multisines without snow:
+        input i has phases of its own (the first those of the signal, the others those of
+        (seed, run * n_inputs + i)), turned by 2 pi i e / n in experiment e, see
+        :func:`dft_matrix`. No input exceeds the peak of ``broadband``.
+    square : added to all inputs; its period divides that of the signal.
+    dc_level : added to the inputs, one number or (n_inputs,). A velocity of
+        ``(pi / 2) / T0`` moves the motor by a quarter turn from period to period, so that
+        repetitive disturbances differ between them (section 7.2.8).
+    seed, run : rule the phases of ``"dft"``.
+    unit : unit of the samples.
+
+    Raises InputError naming the field.
+
+    """
+    n = whole("n_inputs", n_inputs)
+    turned = isinstance(directions, str) and directions == "dft"
+    if turned:
+        period = _orthogonal(broadband, n, seed_of("seed", seed), seed_of("run", run))
+        chosen: Any = "dft"
+    else:
+        matrix = direction_matrix(directions, n)
+        period = matrix.T[:, None, :] * broadband.period[None, :, None]
+        chosen = directions if isinstance(directions, str) else matrix.tolist()
+    if square is not None:
+        period = period + _repeated(square, broadband)[None, :, None]
+    level = per_item("dc_level", dc_level, n)
+    detection = getattr(broadband, "detection_lines", np.empty(0, np.int64))
+    return References(
+        sample_time_s=broadband.sample_time_s,
+        period=period + level,
+        lines=broadband.lines,
+        detection_lines=detection,
+        unit=unit,
+        design={
+            "schema": "axisight.excitation/1",
+            "broadband": describe(broadband),
+            "directions": chosen,
+            "seed": seed,
+            "run": run,
+            "square": None if square is None else describe(square),
+            "dc_level": level.tolist(),
+        },
+    )
+
+
+def describe(signal: Multisine | PeriodicSignal) -> dict[str, Any]:
+    """Return a signal in plain numbers and words."""
+    figures = {"rms": signal.rms, "peak": signal.peak, "crest_factor": signal.crest_factor}
+    common = {"sample_time_s": signal.sample_time_s, "n_samples": signal.n_samples, **figures}
+    if isinstance(signal, PeriodicSignal):
+        return {"kind": signal.kind, **common, **signal.settings}
+    names = ("lines", "amplitude", "phase_rad", "detection_lines")
+    snow = ("snow_lines", "snow_amplitude", "snow_phase_rad")
+    arrays = {name: getattr(signal, name).tolist() for name in (*names, *snow)}
+    return {"kind": "multisine", **common, **arrays}
+
+
+def _repeated(square: PeriodicSignal, broadband: Multisine | PeriodicSignal) -> Real:
+    count, rest = divmod(broadband.n_samples, square.n_samples)
+    if rest or abs(square.sample_time_s / broadband.sample_time_s - 1) > 1e-9:
+        raise InputError(
+            f"square: expected a period that divides the {broadband.n_samples} samples of "
+            f"{broadband.sample_time_s} s, got {square.n_samples} of {square.sample_time_s} s"
+        )
+    return np.tile(square.period, count)
+
+
+def _orthogonal(signal: Multisine | PeriodicSignal, n: int, seed: int, run: int) -> Real:
+    if not isinstance(signal, Multisine) or signal.snow_lines.size:
+        raise InputError("directions: expected a multisine without snow for dft")
+    turns = np.angle(dft_matrix(n))
+    period = np.empty((n, signal.n_samples, n))
+    for i in range(n):
+        own = signal.phase_rad
+        if i:
+            own = random_phases(len(signal.lines), seed, run * n + i)
+        inputs = [replace(signal, phase_rad=own + turns[i, e]) for e in range(n)]
+        # One scale for all experiments of an input, or its rows would not be orthogonal.
+        factor = signal.peak / max(x.peak for x in inputs)
+        for e, x in enumerate(inputs):
+            period[e, :, i] = factor * x.period
+    return period

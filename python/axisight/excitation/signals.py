@@ -1,0 +1,321 @@
+"""Periodic signals that are not multisines: chirp, triangle, square, binary sequences, stepped sine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import max_len_seq
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.excitation.checks import (
+    Lines,
+    Real,
+    lines_below,
+    numbers,
+    per_item,
+    positive,
+    seed_of,
+    whole,
+    whole_samples,
+)
+
+# Samples per sample at which the peak of a continuous formula is looked for.
+_FINE = 32
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicSignal:
+    """One period of a sampled signal.
+
+    kind
+        What it is, e.g. ``"chirp"``.
+    sample_time_s, period
+        Sample time [s] and one period, (n_samples,).
+    lines
+        Lines on which it is meant to have power; empty where that is not the point.
+    peak
+        Largest absolute value: of the formula between the samples too for chirp and stepped
+        sine, of the samples for signals that are held.
+    settings
+        What it was made from.
+    """
+
+    kind: str
+    sample_time_s: float
+    period: Real
+    peak: float
+    lines: Lines = field(default_factory=lambda: np.empty(0, np.int64))
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        positive("sample_time_s", self.sample_time_s)
+        object.__setattr__(self, "period", numbers("period", self.period, len(self.period)))
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of the period."""
+        return len(self.period)
+
+    @property
+    def period_s(self) -> float:
+        """Period [s]."""
+        return self.n_samples * self.sample_time_s
+
+    @property
+    def rms(self) -> float:
+        """Effective root mean square: of the power on ``lines``, or of all without lines."""
+        if not self.lines.size:
+            return float(np.sqrt(np.mean(self.period**2)))
+        spectrum = np.fft.rfft(self.period)[self.lines] / self.n_samples
+        return float(np.sqrt(2 * np.sum(np.abs(spectrum) ** 2)))
+
+    @property
+    def crest_factor(self) -> float:
+        """Peak over effective rms."""
+        return self.peak / self.rms
+
+    def scaled(self, *, peak: float) -> PeriodicSignal:
+        """Return the signal with this peak."""
+        factor = positive("peak", peak) / self.peak
+        return replace(self, period=self.period * factor, peak=float(peak))
+
+
+def chirp(
+    period_s: float,
+    band_hz: tuple[float, float],
+    sample_time_s: float,
+    *,
+    amplitude: float = 1.0,
+    phase_rad: float = 0.0,
+) -> PeriodicSignal:
+    """Return ``A sin(2 pi f1 t + pi (f2 - f1) t^2 / T0 + phi)``, Wernholt (2004), (5.4).
+
+    ``band_hz`` is (f1, f2), both multiples of 1/T0 so that the repeated signal has no jump;
+    f1 > f2 sweeps down. A small mean remains that depends on ``phase_rad``. The lines are
+    those of the band. Raises InputError naming the field.
+    """
+    n = whole_samples("period_s", period_s, sample_time_s)
+    ends = [positive("band_hz", f) * period_s for f in band_hz]
+    first, last = (round(k) for k in ends)
+    if max(abs(ends[0] - first), abs(ends[1] - last)) > 1e-9 * max(ends) or first == last:
+        raise InputError(
+            f"band_hz: expected two different multiples of {1 / period_s:g} Hz, got {band_hz}"
+        )
+    lines = lines_below("band_hz", np.arange(min(first, last), max(first, last) + 1), n)
+    positive("amplitude", amplitude)
+
+    def at(part: Real) -> Real:
+        return amplitude * np.sin(
+            2 * np.pi * first * part + np.pi * (last - first) * part**2 + phase_rad
+        )
+
+    fine = at(np.arange(_FINE * n) / (_FINE * n))
+    return PeriodicSignal(
+        "chirp",
+        sample_time_s,
+        at(np.arange(n) / n),
+        peak=float(np.abs(fine).max()),
+        lines=lines,
+        settings={
+            "period_s": period_s,
+            "band_hz": list(band_hz),
+            "amplitude": amplitude,
+            "phase_rad": phase_rad,
+        },
+    )
+
+
+def triangle(period_s: float, sample_time_s: float, *, amplitude: float = 1.0) -> PeriodicSignal:
+    """Return a symmetric triangle wave that starts at zero, rising.
+
+    The period must be a multiple of four samples, so that the tips are sampled.
+    """
+    n = whole_samples("period_s", period_s, sample_time_s)
+    if n % 4:
+        raise InputError(f"period_s: expected a multiple of four samples, got {n}")
+    positive("amplitude", amplitude)
+    quarter = n // 4
+    ramp = np.arange(quarter) / quarter
+    period = amplitude * np.concatenate([ramp, 1 - ramp, -ramp, ramp - 1])
+    settings = {"period_s": period_s, "amplitude": amplitude}
+    return PeriodicSignal("triangle", sample_time_s, period, float(amplitude), settings=settings)
+
+
+def square(
+    period_s: float, sample_time_s: float, *, amplitude: float = 1.0, smoothing_samples: int = 40
+) -> PeriodicSignal:
+    """Return a square wave smoothed by a triangular window, Wernholt (2004), (7.3).
+
+    It is high in the first half; ``smoothing_samples`` is l, the half length of the window.
+    As a velocity reference it keeps motors away from standstill. Raises InputError.
+    """
+    period = _core.square_period(
+        positive("amplitude", amplitude),
+        positive("period_s", period_s),
+        whole("smoothing_samples", smoothing_samples, 0),
+        positive("sample_time_s", sample_time_s),
+    )
+    settings = {
+        "period_s": period_s,
+        "amplitude": amplitude,
+        "smoothing_samples": smoothing_samples,
+    }
+    peak = float(np.abs(period).max())
+    return PeriodicSignal("square", sample_time_s, period, peak, settings=settings)
+
+
+def prbs(
+    bits: int, sample_time_s: float, *, amplitude: float = 1.0, hold: int = 1
+) -> PeriodicSignal:
+    """Return a maximum-length binary sequence of ``2^bits - 1`` values plus or minus A.
+
+    Each value is held for ``hold`` samples. Its mean is ``A / (2^bits - 1)`` in size, its
+    autocorrelation at any other shift ``-A^2 / (2^bits - 1)``. ``bits`` 2 to 24.
+    """
+    if not 2 <= whole("bits", bits) <= 24:
+        raise InputError(f"bits: expected 2 to 24, got {bits}")
+    positive("amplitude", amplitude)
+    sequence, _ = max_len_seq(bits)
+    period = amplitude * np.repeat(2.0 * sequence - 1.0, whole("hold", hold))
+    settings = {"bits": bits, "amplitude": amplitude, "hold": hold}
+    return PeriodicSignal("prbs", sample_time_s, period, float(amplitude), settings=settings)
+
+
+def discrete_interval_binary(
+    period_s: float,
+    sample_time_s: float,
+    lines: ArrayLike,
+    *,
+    weight: ArrayLike = 1.0,
+    amplitude: float = 1.0,
+    hold: int = 1,
+    starts: int = 50,
+    seed: int = 0,
+) -> PeriodicSignal:
+    """Return a binary signal with most of its power on chosen lines.
+
+    The signs of a multisine with amplitudes ``weight`` are taken, then the phases of those,
+    until the signs repeat themselves (Van den Bos and Krol 1979); of ``starts`` random starts
+    the one whose weighted sum of amplitudes on the lines is largest is kept. Signs change
+    every ``hold`` samples only. ``settings["power_share"]`` is the share of the power on the
+    lines. Raises InputError naming the field.
+    """
+    n = whole_samples("period_s", period_s, sample_time_s)
+    if n % whole("hold", hold):
+        raise InputError(f"hold: expected a divisor of the {n} samples of a period, got {hold}")
+    count = n // hold
+    chosen = lines_below("lines", lines, count)
+    if not chosen.size:
+        raise InputError("lines: expected at least one line, got none")
+    w = per_item("weight", weight, len(chosen))
+    if np.any(w <= 0):
+        raise InputError("weight: expected positive numbers")
+    best = max(
+        (
+            _settled(w, chosen, count, _core.random_phases(len(w), seed_of("seed", seed), run))
+            for run in range(whole("starts", starts))
+        ),
+        key=lambda signs: float(w @ np.abs(np.fft.rfft(signs)[chosen])),
+    )
+    period = positive("amplitude", amplitude) * np.repeat(best, hold)
+    signal = PeriodicSignal(
+        "discrete_interval_binary", sample_time_s, period, float(amplitude), lines=chosen
+    )
+    settings = {
+        "period_s": period_s,
+        "amplitude": amplitude,
+        "hold": hold,
+        "starts": starts,
+        "seed": seed,
+        "power_share": (signal.rms / amplitude) ** 2,
+    }
+    return replace(signal, settings=settings)
+
+
+def _settled(weight: Real, lines: Lines, count: int, phase: Real) -> Real:
+    """Signs that are those of the multisine with their own phases."""
+    spectrum = np.zeros(count // 2 + 1, np.complex128)
+    turn = np.exp(1j * phase)
+    signs = np.zeros(count)
+    # The weighted sum of amplitudes never falls, so the signs settle; 1000 is never seen.
+    for _ in range(1000):
+        spectrum[lines] = weight * turn
+        now = np.where(np.fft.irfft(spectrum, count) >= 0, 1.0, -1.0)
+        if np.array_equal(now, signs):
+            break
+        signs = now
+        found = np.fft.rfft(signs)[lines]
+        size = np.abs(found)
+        turn = np.where(size > 0, found / np.where(size > 0, size, 1.0), turn)
+    return signs
+
+
+@dataclass(frozen=True)
+class SteppedSine:
+    """Single sines one after the other, each a whole number of periods T0.
+
+    signal
+        The whole sequence as one long period.
+    lines
+        Line k of each step, a multiple of 1/T0.
+    first_sample, n_samples
+        Where the part to be used of each step starts (its waiting periods are over), and how
+        many samples it has.
+    """
+
+    signal: PeriodicSignal
+    lines: Lines
+    first_sample: Lines
+    n_samples: int
+
+
+def stepped_sine(
+    period_s: float,
+    sample_time_s: float,
+    frequency_hz: ArrayLike,
+    *,
+    amplitude: ArrayLike = 1.0,
+    waiting_periods: int = 1,
+    periods: int = 1,
+) -> SteppedSine:
+    """Return single sines at ``frequency_hz``, multiples of 1/``period_s``, one after the other.
+
+    Each lasts ``waiting_periods`` for the transient and ``periods`` to be used, all of
+    ``period_s``; ``amplitude`` is one number or one per frequency. Every step starts at phase
+    zero, so there is no jump. Raises InputError naming the field.
+    """
+    n = whole_samples("period_s", period_s, sample_time_s)
+    exact = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)) * period_s
+    lines = np.round(exact)
+    if exact.ndim != 1 or not exact.size or np.any(np.abs(exact - lines) > 1e-9 * lines):
+        raise InputError(f"frequency_hz: expected multiples of {1 / period_s:g} Hz")
+    chosen = lines.astype(np.int64)
+    if np.any((chosen < 1) | (2 * chosen >= n)):
+        raise InputError(
+            f"frequency_hz: expected above 0 and below {0.5 / sample_time_s:g} Hz (Nyquist)"
+        )
+    sizes = per_item("amplitude", amplitude, len(chosen))
+    wait, use = whole("waiting_periods", waiting_periods, 0), whole("periods", periods)
+    step = (wait + use) * n
+    time = np.arange(step) % n / n
+    samples = (sizes[:, None] * np.sin(2 * np.pi * chosen[:, None] * time)).ravel()
+    signal = PeriodicSignal(
+        "stepped_sine",
+        sample_time_s,
+        samples,
+        float(np.abs(sizes).max()),
+        settings={
+            "period_s": period_s,
+            "frequency_hz": (chosen / period_s).tolist(),
+            "amplitude": sizes.tolist(),
+            "waiting_periods": wait,
+            "periods": use,
+        },
+    )
+    first = np.arange(len(chosen)) * step + wait * n
+    return SteppedSine(signal, chosen, first.astype(np.int64), use * n)
