@@ -17,6 +17,7 @@ from axisight.cli_common import ERR as _err
 from axisight.cli_common import OUT as _out
 from axisight.cli_common import errors as _errors
 from axisight.cli_montecarlo import montecarlo_command
+from axisight.cli_reproduce import reproduce_command
 from axisight.cli_simulate import simulate_command
 from axisight.demo import write_demo_case
 from axisight.effects import effect_table
@@ -33,6 +34,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.command("montecarlo")(montecarlo_command)
+app.command("reproduce")(reproduce_command)
 app.command("simulate")(simulate_command)
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
