@@ -1,6 +1,6 @@
-"""The study of Wernholt (2004), "On Multivariable and Nonlinear Identification of Industrial
-Robots", chapters 7, 8 and appendix A, on the preset robot.
+"""Wernholt (2004), chapters 7, 8 and appendix A, on the preset robot.
 
+The thesis is "On Multivariable and Nonlinear Identification of Industrial Robots".
 Every table and figure is an item: a function from a :class:`Context` to an :class:`Item`,
 registered by name (``"table-8.2"``, ``"figure-8.9"``). :func:`run` computes items and writes
 tables as CSV, figures as PDF and PNG, and the claims of the text as a computed yes or no with
