@@ -43,6 +43,11 @@ class Experiments:
     output_disturbance: Complex
     estimate: Complex
 
+    def at(self, line: int) -> Experiments:
+        """Return the spectra at one place in ``frequency_hz``."""
+        kept = slice(line, line + 1)
+        return Experiments(*(value[kept] for value in vars(self).values()))
+
 
 def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
     """Return one realization of a design, with the ripple of Table 8.1 and sensor noise."""

@@ -77,19 +77,15 @@ def mean_errors(context: Context) -> Real:
 
 def _mean_error(context: Context, design: Design, run: int) -> Real:
     found = experiments(context, design, run)
-    return mean_relative_error(found.estimate, true_response(context, found.frequency_hz))
+    true = true_response(context, found.frequency_hz)
+    return mean_relative_error(found.estimate, true)
 
 
-def single_frequency(context: Context) -> list[Experiments]:
-    """Return sinusoid and multisine at the frequency of the sinusoid."""
+def single_frequency(context: Context) -> list[list[Experiments]]:
+    """Return realizations of sinusoid and multisine at the frequency of the sinusoid."""
     line = int(np.flatnonzero(excited_lines() == round(SINUSOID_HZ * PERIOD_S))[0])
-    multisine = experiments(context, MULTISINE)
-    parts = {
-        name: value[line : line + 1]
-        for name, value in vars(multisine).items()
-        if isinstance(value, np.ndarray)
-    }
-    return [experiments(context, SINUSOID), Experiments(**parts)]
+    multisines = [experiments(context, MULTISINE, run) for run in range(realizations(context))]
+    return [[experiments(context, SINUSOID)], [found.at(line) for found in multisines]]
 
 
 def snr(found: Experiments) -> tuple[Real, Real]:
@@ -97,6 +93,24 @@ def snr(found: Experiments) -> tuple[Real, Real]:
     u = signal_to_noise_ratio(found.input, found.input_disturbance)
     y = signal_to_noise_ratio(found.output, found.output_disturbance)
     return decibel(u), decibel(y)
+
+
+def single_frequency_snr(context: Context) -> Real:
+    """Return Table 8.3 [dB], (sinusoid or multisine, input or output, row, column)."""
+    found = single_frequency(context)
+    return np.array([np.mean([snr(f) for f in runs], axis=0)[:, 0] for runs in found])
+
+
+def single_frequency_error(context: Context) -> Real:
+    """Return the relative errors of Table 8.4 [1], (sinusoid or multisine, output, input)."""
+
+    def error(found: Experiments) -> Real:
+        true = true_response(context, found.frequency_hz)
+        return np.asarray(np.abs(relative_error(found.estimate, true)[0]))
+
+    return np.array(
+        [np.mean([error(f) for f in runs], axis=0) for runs in single_frequency(context)]
+    )
 
 
 @item("table-8.1")
@@ -156,14 +170,12 @@ def table_8_2(context: Context) -> Item:
 @item("table-8.3")
 def table_8_3(context: Context) -> Item:
     """Return signal-to-noise ratios at one frequency, sinusoid and multisine."""
-    ratios = [snr(found) for found in single_frequency(context)]
-    rows = []
+    here, rows = single_frequency_snr(context), []
     for k, what in enumerate(("sinusoid", "multisine")):
-        for name, thesis, here in (
-            ("input", THESIS_8_3_INPUT[k], ratios[k][0][0]),
-            ("output", THESIS_8_3_OUTPUT[k], ratios[k][1][0]),
+        for m, (name, thesis) in enumerate(
+            (("input", THESIS_8_3_INPUT), ("output", THESIS_8_3_OUTPUT))
         ):
-            rows += _rows({"signal": name, "excitation": what}, thesis, here, "db")
+            rows += _rows({"signal": name, "excitation": what}, thesis[k], here[k, m], "db")
     return Item("table-8.3", f"Signal-to-noise ratio at {SINUSOID_HZ} Hz", {"": pd.DataFrame(rows)})
 
 
@@ -175,13 +187,6 @@ def table_8_4(context: Context) -> Item:
         here = 100 * single_frequency_error(context)[k]
         rows += _rows({"excitation": what}, THESIS_8_4[k], here, "percent")
     return Item("table-8.4", f"Relative error at {SINUSOID_HZ} Hz", {"": pd.DataFrame(rows)})
-
-
-def single_frequency_error(context: Context) -> Real:
-    """Return the relative errors of Table 8.4, (sinusoid or multisine, output, input)."""
-    found = single_frequency(context)
-    errors = [relative_error(f.estimate, true_response(context, f.frequency_hz)) for f in found]
-    return np.abs(np.array([e[0] for e in errors]))
 
 
 def _rows(head: dict[str, str], thesis: Real, here: Real, unit: str) -> list[dict[str, object]]:

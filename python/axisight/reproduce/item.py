@@ -55,7 +55,7 @@ class Item:
 Make = Callable[[Context], Item]
 
 # Importing a module registers its items.
-_MODULES: tuple[str, ...] = ("chapter8_tables",)
+_MODULES: tuple[str, ...] = ("chapter8_tables", "chapter8_figures", "chapter8_averages")
 _ITEMS: dict[str, Make] = {}
 
 
