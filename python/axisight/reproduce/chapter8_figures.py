@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.frf.errors import relative_error
-from axisight.reproduce.chapter8_setting import DESIGNS, Design, excited_lines, square_lines
+from axisight.reproduce.chapter8_setting import Design, excited_lines, square_lines
 from axisight.reproduce.chapter8_study import Experiments, experiments, true_response
 from axisight.reproduce.chapter8_tables import MULTISINE, SINUSOID, realizations
 from axisight.reproduce.context import Context
 from axisight.reproduce.element_plot import (
     ESTIMATE,
+    FAINT,
     MARKED,
+    MEAN,
     SINGLE,
     TRUE,
     Curve,
@@ -22,6 +24,7 @@ from axisight.reproduce.element_plot import (
 from axisight.reproduce.item import Item, item
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 ERROR = "relative error [1]"
 ERROR_RANGE = (1e-4, 1e2)
@@ -43,7 +46,8 @@ def figure_8_2(context: Context) -> Item:
     acceleration = true_response(context, frequency)
     velocity = acceleration / (2j * np.pi * frequency[:, None, None])
     magnitudes = [np.abs(velocity), np.abs(acceleration)]
-    phases = [np.degrees(np.unwrap(np.angle(g), axis=0)) for g in (velocity, acceleration)]
+    phase = np.degrees(np.unwrap(np.angle(velocity), axis=0))
+    phases = [phase, phase + 90.0]
     labels = ("torque to velocity [rad/s/Nm]", "torque to acceleration [rad/s$^2$/Nm]")
     styles: tuple[dict[str, object], ...] = (ESTIMATE | {"lw": 0.9}, TRUE)
 
@@ -64,38 +68,35 @@ def figure_8_2(context: Context) -> Item:
     return Item("figure-8.2", "Bode plots of the robot", {"": table}, figures)
 
 
-def error_item(name: str, title: str, found: list[Experiments], context: Context) -> Item:
-    """Return the relative error of one realization and the mean over several.
+def error_item(name: str, design: Design, found: list[Experiments], true: Complex) -> Item:
+    """Return the relative error of one realization and the mean over those of ``found``.
 
-    Lines that the square wave excites are marked: ``found`` is of a design with one if the
-    title says so.
+    Lines that the square wave excites too are marked.
     """
     frequency = found[0].frequency_hz
-    true = true_response(context, frequency)
     errors = np.array([np.abs(relative_error(f.estimate, true)) for f in found])
-    curves = [Curve(frequency, errors[0], "one realization", ESTIMATE)]
-    columns = {"error": (frequency, errors[0])}
-    if len(found) > 1:
-        mean = errors.mean(axis=0)
-        curves.append(Curve(frequency, mean, f"mean of {len(found)}", TRUE | {"lw": 0.9}))
-        columns["mean_error"] = (frequency, mean)
-    if "with square wave" in title:
+    mean = errors.mean(axis=0)
+    curves = [
+        Curve(frequency, errors[0], "one realization", FAINT),
+        Curve(frequency, mean, f"mean of {len(found)}", MEAN),
+    ]
+    if design.square:
         at = square_lines(excited_lines())
-        curves.append(Curve(frequency[at], errors[0, at], "lines of the square wave", dict(MARKED)))
-    figure = element_figure(curves, ERROR, ylim=ERROR_RANGE)
-    return Item(name, title, {"": element_table(**columns)}, {"": figure})
+        curves.append(Curve(frequency[at], mean[at], "lines of the square wave", MARKED))
+    table = element_table(error=(frequency, errors[0]), mean_error=(frequency, mean))
+    title = f"Relative error of the MFRF estimate, {design}"
+    return Item(name, title, {"": table}, {"": element_figure(curves, ERROR, ylim=ERROR_RANGE)})
 
 
 def _register_errors(number: str, design: Design) -> None:
     @item(f"figure-{number}")
     def figure(context: Context) -> Item:
         runs = [experiments(context, design, run) for run in range(realizations(context))]
-        title = f"Relative error of the MFRF estimate, {design}"
-        return error_item(f"figure-{number}", title, runs, context)
+        true = true_response(context, runs[0].frequency_hz)
+        return error_item(f"figure-{number}", design, runs, true)
 
 
 for _number, _design in ERROR_FIGURES.items():
-    assert _design in DESIGNS
     _register_errors(_number, _design)
 
 

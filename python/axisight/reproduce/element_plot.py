@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from axisight.palette import AFTER, BEFORE, MEASURED
@@ -20,7 +20,9 @@ TRUE = {"color": MEASURED, "lw": 1.6, "alpha": 0.9}
 ESTIMATE = {"color": AFTER, "lw": 0.7}
 DISTURBANCE = {"color": BEFORE, "lw": 0.7}
 SINGLE = {"color": BEFORE, "ls": "none", "marker": "D", "ms": 5, "mec": "white", "mew": 0.5}
-MARKED = {"color": BEFORE, "ls": "none", "marker": ".", "ms": 3.0}
+FAINT = {"color": AFTER, "lw": 0.4, "alpha": 0.6}
+MEAN = {"color": MEASURED, "lw": 0.8}
+MARKED = {"color": BEFORE, "ls": "none", "marker": ".", "ms": 2.2, "mew": 0}
 
 
 @dataclass(frozen=True)
@@ -103,4 +105,4 @@ def _frequency_axis(axes: Axes, frequency: Real) -> None:
     axes.set_xlim(frequency.min() / 1.05, frequency.max() * 1.05)
     axes.xaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 40]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda f, _: f"{f:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())

@@ -55,7 +55,12 @@ class Item:
 Make = Callable[[Context], Item]
 
 # Importing a module registers its items.
-_MODULES: tuple[str, ...] = ("chapter8_tables", "chapter8_figures", "chapter8_averages")
+_MODULES: tuple[str, ...] = (
+    "chapter8_tables",
+    "chapter8_figures",
+    "chapter8_averages",
+    "appendix_a",
+)
 _ITEMS: dict[str, Make] = {}
 
 
