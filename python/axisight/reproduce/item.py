@@ -60,6 +60,7 @@ _MODULES: tuple[str, ...] = (
     "chapter8_figures",
     "chapter8_averages",
     "appendix_a",
+    "chapter8_claims",
 )
 _ITEMS: dict[str, Make] = {}
 
