@@ -61,6 +61,7 @@ _MODULES: tuple[str, ...] = (
     "chapter8_averages",
     "appendix_a",
     "chapter8_claims",
+    "appendix_a_claims",
 )
 _ITEMS: dict[str, Make] = {}
 
