@@ -131,10 +131,11 @@ def test_stochastic_disturbances_are_those_asked_for(quick):
         assert power == pytest.approx(wanted, rel=0.12)
 
 
-def test_reference_reaches_the_input(quick):
+@pytest.mark.parametrize("disturbed_by", [experiments, stochastic_experiments])
+def test_reference_reaches_the_input(quick, disturbed_by):
     """U follows from R and V by (6.8), with the loop of the robot."""
     design = Design("T1", square=True)
-    found = experiments(quick, design)
+    found = disturbed_by(quick, design)
     loop = robot_loop(quick.robot, found.frequency_hz)
     refs = references(quick.robot, design, 0, 0)
     r = loop.prefilter @ np.moveaxis(np.fft.rfft(refs, axis=1)[:, excited_lines()], 0, -1)
@@ -143,7 +144,10 @@ def test_reference_reaches_the_input(quick):
         loop.response, found.input_disturbance, found.output_disturbance / iw
     )
     u, _ = errors.closed_loop_spectra(r, v, loop.response, loop.controller)
-    assert np.median(np.abs(u - found.input) / np.abs(found.input)) < 0.01
+    # Off the diagonal, where the disturbances make most of U.
+    off = ~np.eye(3, dtype=bool)
+    difference = np.abs(u - found.input) / np.abs(found.input)
+    assert np.median(difference[:, off]) < (0.01 if disturbed_by is experiments else 1e-4)
 
 
 def test_same_excitation_repeats(quick):

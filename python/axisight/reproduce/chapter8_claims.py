@@ -20,7 +20,13 @@ from axisight.reproduce.chapter8_compare import (
     mean_error_runs,
     rank,
 )
-from axisight.reproduce.chapter8_setting import DESIGNS, Design, excited_lines, square_lines
+from axisight.reproduce.chapter8_setting import (
+    DESIGNS,
+    Design,
+    excited_lines,
+    references,
+    square_lines,
+)
 from axisight.reproduce.chapter8_study import (
     experiments,
     same_excitation,
@@ -385,16 +391,24 @@ def _sinusoid_coupling(context: Context) -> Result:
 def _nonlinear(context: Context) -> Result:
     found = simulate_nonlinear(context)
     true = true_response(context, excited_lines() / 10.0)
-    error = np.array([100 * mean_relative_error(f.estimate, true) for f in found])
-    linear = np.array(
-        [100 * mean_relative_error(experiments(context, d).estimate, true) for d in DESIGNS]
+    ratio = np.array(
+        [
+            mean_relative_error(f.estimate, true)
+            / mean_relative_error(experiments(context, d).estimate, true)
+            for f, d in zip(found, DESIGNS, strict=True)
+        ]
     )
-    ratio = error / linear
+    still, swung = ratio[[_T1, _T2]], ratio[[_T1_SQUARE, _T2_SQUARE]]
+    refs = references(context.robot, DESIGNS[_T1_SQUARE], context.seed, 0)
+    motion = np.cumsum(refs, axis=1) * context.robot.sample_time_s * context.robot.core.gear_ratio
+    swing = np.ptp(motion, axis=1).max()
     text = (
-        f"entries of Table 8.2, nonlinear over linear, one realization: {ratio.min():.2f} to "
-        f"{ratio.max():.2f}, median {np.median(ratio):.2f}"
+        f"entries of Table 8.2, nonlinear over linear, one realization: {still.min():.2f} to "
+        f"{still.max():.2f} without square wave, {swung.min():.2f} to {swung.max():.2f} with it, "
+        f"{int((ratio > 1.2).sum())} of 36 above 1.2; it swings the joints by up to "
+        f"{swing:.2f} rad, and the response with them"
     )
-    return bool(np.median(np.abs(np.log(ratio))) < np.log(1.2)), text
+    return bool(np.abs(np.log(ratio)).max() < np.log(1.4)), text
 
 
 def _disturbance(
