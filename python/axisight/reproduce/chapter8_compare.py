@@ -23,6 +23,10 @@ from axisight.reproduce.context import Context
 Real = NDArray[np.float64]
 
 
+# Standard errors for a decision: nine elements are judged at a time.
+_DECIDED = 3.0
+
+
 @dataclass(frozen=True)
 class Ratio:
     """A geometric mean over realizations and the standard error of its logarithm."""
@@ -90,12 +94,12 @@ def compare(context: Context, over: int, under: int) -> Ratios:
 def except_for(ratios: Ratios, expected: set[tuple[int, int]], other: str) -> tuple[bool, str]:
     """Return whether a design wins except for the ``expected`` elements, where the other does.
 
-    ``ratios`` are its errors over the other's. Elements within two standard errors of one
+    ``ratios`` are its errors over the other's. Elements within three standard errors of one
     are undecided; that is no exception.
     """
     logs = np.log(ratios.value)
-    worse = logs > 2 * ratios.error
-    undecided = np.abs(logs) <= 2 * ratios.error
+    bound = _DECIDED * ratios.error
+    worse, undecided = logs > bound, np.abs(logs) <= bound
     text = f"{other} better in {_where(worse)}, undecided in {_where(undecided)}; ratios "
     text += ", ".join(
         str(Ratio(float(v), float(e)))
