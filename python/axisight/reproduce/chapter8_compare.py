@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axisight.frf.errors import mean_relative_error
 from axisight.reproduce.chapter8_setting import (
     DESIGNS,
+    PERIOD_S,
     Design,
     excited_lines,
     square_lines,
@@ -41,9 +42,9 @@ class Ratio:
         return cls(float(value), float(error))
 
     @property
-    def upper(self) -> float:
-        """Two standard errors above."""
-        return self.value * float(np.exp(2 * self.error))
+    def decided(self) -> bool:
+        """Whether the ratio is not one, by three standard errors."""
+        return bool(abs(np.log(self.value)) > _DECIDED * self.error)
 
     def __str__(self) -> str:
         """Value and two standard errors."""
@@ -74,7 +75,7 @@ def mean_error_runs(context: Context) -> Real:
     """Return mean relative errors, (realization, design, output, input)."""
 
     def make() -> Real:
-        true = true_response(context, excited_lines() / 10.0)
+        true = true_response(context, excited_lines() / PERIOD_S)
         return np.array(
             [
                 [mean_relative_error(experiments(context, d, run).estimate, true) for d in DESIGNS]
