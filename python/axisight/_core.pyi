@@ -572,3 +572,45 @@ class MonteCarloEnsemble:
         """Add the accumulators of a block."""
     def summary(self, quantiles: Sequence[float]) -> dict[str, NDArray[Any]]:
         """Return statistics, arrays (line, output, input); quantiles lead."""
+
+def invert_matrices(
+    matrices: NDArray[np.complex128], out: NDArray[np.complex128], *, threads: int = 1
+) -> NDArray[np.bool_]:
+    """Write the inverses of ``matrices`` (count, n, n) to ``out``; return where singular."""
+
+def right_divide_matrices(
+    y: NDArray[np.complex128],
+    u: NDArray[np.complex128],
+    out: NDArray[np.complex128],
+    *,
+    threads: int = 1,
+) -> NDArray[np.bool_]:
+    """Write ``y u^-1`` to ``out``; y, out (count, p, n), u (count, n, n)."""
+
+def record_spectra(
+    signal: _Array, lines: Sequence[int], *, remove_drift: bool, threads: int = 1
+) -> NDArray[np.complex128]:
+    """Return DFT lines (experiment, period, line, channel) of (..., sample, channel)."""
+
+@type_check_only
+class MultivariableEstimate(TypedDict):
+    """Arrays (line, output, input), condition and flag (line,)."""
+
+    response: NDArray[np.complex128]
+    noise_variance: _Array
+    noise_freedom: _Array
+    residual_variance: _Array
+    condition: _Array
+    flag: NDArray[np.int8]
+
+def multivariable(
+    input: _Array,
+    output: _Array,
+    reference: _Array | None,
+    lines: Sequence[int],
+    factor: NDArray[np.complex128],
+    *,
+    remove_drift: bool,
+    threads: int = 1,
+) -> MultivariableEstimate:
+    """Estimate from records (experiment, period, sample, channel), outputs times ``factor``."""

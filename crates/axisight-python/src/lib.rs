@@ -7,6 +7,7 @@ mod convert;
 mod effects;
 mod entry;
 mod fit;
+mod frf;
 mod montecarlo;
 mod robot;
 mod simulation;
@@ -40,5 +41,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<montecarlo::MonteCarloStudy>()?;
     module.add_class::<montecarlo::MonteCarloEnsemble>()?;
     module.add_function(wrap_pyfunction!(montecarlo::failure_kinds, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::invert_matrices, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::right_divide_matrices, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::record_spectra, module)?)?;
+    module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     Ok(())
 }

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.frf import mfrf
 from axisight.records import PeriodicRecords
-from axisight.reproduce._estimate import mfrf, spectra
 from axisight.reproduce.chapter8_setting import (
     DESIGNS,
     PERIOD_S,
@@ -166,13 +166,16 @@ def from_signals(
     step: float, lines: Lines, signals: tuple[Real, Real], disturbances: tuple[Real, Real]
 ) -> Experiments:
     """Return the spectra of one period of torque and position, (experiment, sample, axis)."""
-    records, disturbing = (
-        PeriodicRecords(step, u[:, None], y[:, None], lines) for u, y in (signals, disturbances)
-    )
-    u, y = spectra(records)
-    v_u, v_y = spectra(disturbing)
+    (u, y), (v_u, v_y) = ([_spectrum(x, lines) for x in pair] for pair in (signals, disturbances))
+    records = PeriodicRecords(step, signals[0][:, None], signals[1][:, None], lines)
+    estimate = mfrf(records, quantity="acceleration", remove_drift=False)["response"].values
     iw = 2j * np.pi * records.frequency_hz[:, None, None]
-    return Experiments(records.frequency_hz, u, iw * y, v_u, iw * v_y, mfrf(u, iw**2 * y))
+    return Experiments(records.frequency_hz, u, iw * y, v_u, iw * v_y, estimate)
+
+
+def _spectrum(x: Real, lines: Lines) -> Complex:
+    """Return the DFT of (experiment, sample, channel) as (n_freq, channel, experiment)."""
+    return np.moveaxis(np.fft.rfft(x, axis=1)[:, lines], 0, -1)
 
 
 def _without_drift(position: Real, n: int) -> Real:

@@ -11,6 +11,20 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 #[repr(C, align(32))]
 pub struct Lanes<const L: usize>(pub [f64; L]);
 
+impl<const L: usize> Lanes<L> {
+    /// `c - self * b` with one rounding.
+    #[inline(always)]
+    pub(crate) fn fnma(self, b: Self, c: Self) -> Self {
+        Self(vector::fnma(self.0, b.0, c.0))
+    }
+
+    /// The larger of `|self|` and `b`; `b` where either is NaN.
+    #[inline(always)]
+    pub(crate) fn magnitude_or(self, b: Self) -> Self {
+        Self(vector::larger(vector::magnitude(self.0), b.0))
+    }
+}
+
 macro_rules! elementwise {
     ($trait:ident, $method:ident) => {
         impl<const L: usize> $trait for Lanes<L> {

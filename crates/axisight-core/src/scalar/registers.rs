@@ -36,9 +36,9 @@ macro_rules! operation {
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{
     __m256d, _CMP_GT_OQ, _MM_FROUND_NO_EXC, _MM_FROUND_TO_NEAREST_INT, _MM_FROUND_TO_NEG_INF,
-    _mm256_add_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd, _mm256_fmadd_pd, _mm256_mul_pd,
-    _mm256_round_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_sub_pd,
-    _mm256_xor_pd,
+    _mm256_add_pd, _mm256_andnot_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd,
+    _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_round_pd,
+    _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_sub_pd, _mm256_xor_pd,
 };
 
 operation!(add(a, b), |a, b| _mm256_add_pd(a, b), |a, b| a + b);
@@ -50,6 +50,23 @@ operation!(
     fma(a, b, c),
     |a, b, c| _mm256_fmadd_pd(a, b, c),
     |a: f64, b, c| a.mul_add(b, c)
+);
+operation!(
+    /// `c - a * b` with one rounding.
+    fnma(a, b, c),
+    |a, b, c| _mm256_fnmadd_pd(a, b, c),
+    |a: f64, b, c| (-a).mul_add(b, c)
+);
+operation!(
+    magnitude(a),
+    |a| _mm256_andnot_pd(_mm256_set1_pd(-0.0), a),
+    |a: f64| a.abs()
+);
+operation!(
+    /// The larger; `b` where either is NaN.
+    larger(a, b),
+    |a, b| _mm256_max_pd(a, b),
+    |a: f64, b: f64| if a > b { a } else { b }
 );
 operation!(
     neg(a),

@@ -1,0 +1,51 @@
+"""Small complex systems, many at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.errors import InputError
+
+Complex = NDArray[np.complex128]
+
+
+def invert(matrices: NDArray[Any], *, threads: int = 1) -> tuple[Complex, NDArray[np.bool_]]:
+    """Invert many small complex matrices, shape (..., n, n).
+
+    Returns the inverses and where a matrix is singular to working precision or not finite,
+    shape (...,); those inverses are NaN. LU with partial pivoting as in LAPACK's gesv, four
+    matrices in lock-step; ``threads`` 0 takes every core and changes no bit of the result.
+
+    Raises InputError for matrices that are not square.
+    """
+    a = np.ascontiguousarray(matrices, np.complex128)
+    if a.ndim < 2 or a.shape[-1] != a.shape[-2]:
+        raise InputError(f"matrices: expected shape (..., n, n), got {a.shape}")
+    out = np.empty_like(a)
+    stack = (int(np.prod(a.shape[:-2])), *a.shape[-2:])
+    singular = _core.invert_matrices(a.reshape(stack), out.reshape(stack), threads=threads)
+    return out, singular.reshape(a.shape[:-2])
+
+
+def right_divide(
+    y: NDArray[Any], u: NDArray[Any], *, threads: int = 1
+) -> tuple[Complex, NDArray[np.bool_]]:
+    """Solve G U = Y, that is ``Y U^-1``, for many small complex matrices.
+
+    ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes. Returns G,
+    (..., p, n), and flags as `invert`. Raises InputError for shapes that do not fit.
+    """
+    y = np.ascontiguousarray(y, np.complex128)
+    u = np.ascontiguousarray(u, np.complex128)
+    fits = y.ndim >= 2 and u.shape == (*y.shape[:-2], y.shape[-1], y.shape[-1])
+    if not fits:
+        raise InputError(f"u: expected shape (..., n, n) for y {y.shape}, got {u.shape}")
+    out = np.empty_like(y)
+    count = int(np.prod(y.shape[:-2]))
+    stacks = [a.reshape(count, *a.shape[-2:]) for a in (y, u, out)]
+    singular = _core.right_divide_matrices(*stacks, threads=threads)
+    return out, singular.reshape(y.shape[:-2])

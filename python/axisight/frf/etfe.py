@@ -1,0 +1,55 @@
+"""The empirical transfer function estimate of one input, smoothed if wanted."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from axisight.errors import InputError
+from axisight.frf._lines import Quantity, spectra
+from axisight.frf.arithmetic_mean import arithmetic_mean
+from axisight.frf.smoothing import smooth
+from axisight.records.periodic import PeriodicRecords
+
+
+def etfe(
+    records: PeriodicRecords,
+    *,
+    bandwidth_hz: float | None = None,
+    weighting: Literal["flat", "input_power"] = "flat",
+    quantity: Quantity = "position",
+    remove_drift: bool = True,
+    threads: int = 1,
+) -> xr.Dataset:
+    """Estimate G = Y / U of one input, periods averaged, then the mean over experiments.
+
+    Wernholt (2004), (3.45); with ``bandwidth_hz`` smoothed over the lines by (3.46) with a
+    Hann window of that half width. ``weighting`` "input_power" weighs each line with |U|^2
+    as well, which makes it spectral analysis (3.49). Other arguments, Dataset and the
+    meaning of the variances as for `mfrf` and `arithmetic_mean`.
+
+    Bias: exact for periodic records without noise. Without smoothing the variance does not
+    fall with the length of a record that is not periodic. Smoothing flattens resonances, see
+    `smooth`.
+
+    Raises InputError for more than one input (use `mfrf`, then `smooth`).
+    """
+    if records.n_inputs != 1:
+        raise InputError(
+            f"records.input: ETFE expects one input, got {records.n_inputs}; use mfrf, then smooth"
+        )
+    if weighting not in ("flat", "input_power"):
+        raise InputError(f"weighting: expected flat or input_power, got {weighting!r}")
+    dataset = arithmetic_mean(
+        records, quantity=quantity, remove_drift=remove_drift, threads=threads
+    )
+    if bandwidth_hz is not None:
+        weight = None
+        if weighting == "input_power":
+            u, _ = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
+            weight = np.sum(np.abs(u.mean(axis=3)) ** 2, axis=(1, 2))
+        dataset = smooth(dataset, bandwidth_hz, weight=weight)
+    dataset.attrs["estimator"] = "etfe"
+    return dataset

@@ -1,0 +1,51 @@
+"""Joint input-output estimate from the reference."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from axisight.errors import InputError
+from axisight.frf._lines import Quantity, expect_experiments
+from axisight.frf._multivariable import estimate
+from axisight.records.periodic import PeriodicRecords
+
+
+def joint_input_output(
+    records: PeriodicRecords,
+    *,
+    quantity: Quantity = "position",
+    remove_drift: bool = True,
+    threads: int = 1,
+) -> xr.Dataset:
+    """Estimate G = G_yr G_ur^-1, the responses from the reference to output and input.
+
+    G_yr = Y R^+ and G_ur = U R^+ with the pseudo-inverse over all experiments. With as many
+    experiments as inputs R cancels and the result is that of `mfrf`; the use of it lies in
+    many experiments, where noise that does not come from R averages out of both. Wernholt
+    (2004), section 3.4.2; Pintelon and Schoukens (2001), section 2.6.
+
+    Arguments and returned Dataset as for `mfrf`. ``condition`` is that of U.
+
+    Bias: none from noise as the number of realizations of R grows, also in closed loop. For
+    a nonlinear robot it tends to the quotient of two best linear approximations, which is
+    not the best linear approximation of the quotient. With few experiments as `mfrf`.
+
+    Raises InputError where the reference is missing or has not one channel per input, and for
+    fewer experiments than inputs.
+    """
+    if records.reference is None:
+        raise InputError("records.reference: expected the recorded reference, got None")
+    if records.reference.shape[3] != records.n_inputs:
+        raise InputError(
+            f"records.reference: expected one channel per input ({records.n_inputs}), "
+            f"got {records.reference.shape[3]}"
+        )
+    expect_experiments(records, "the response from the reference has no unique solution")
+    return estimate(
+        records,
+        "joint_input_output",
+        by_reference=True,
+        quantity=quantity,
+        remove_drift=remove_drift,
+        threads=threads,
+    )
