@@ -1,4 +1,4 @@
-"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``effects``, ``montecarlo``, ``demo``."""
+"""The command line: ``axisight diagnose``, ``check``, ``simulate``, ``montecarlo``, ``reproduce`` and more."""
 
 from __future__ import annotations
 
