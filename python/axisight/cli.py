@@ -1,4 +1,4 @@
-"""The command line: diagnose, check, simulate, effects, excite, montecarlo, demo."""
+"""The command line: diagnose, check, simulate, effects, excite, montecarlo, reproduce, demo."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from axisight.cli_common import OUT as _out
 from axisight.cli_common import errors as _errors
 from axisight.cli_excite import excite_command
 from axisight.cli_montecarlo import montecarlo_command
+from axisight.cli_reproduce import reproduce_command
 from axisight.cli_simulate import simulate_command
 from axisight.demo import write_demo_case
 from axisight.effects import effect_table
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 app.command("excite")(excite_command)
 app.command("montecarlo")(montecarlo_command)
+app.command("reproduce")(reproduce_command)
 app.command("simulate")(simulate_command)
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]

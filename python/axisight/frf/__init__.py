@@ -1,5 +1,6 @@
 """Frequency responses: estimators, their uncertainty and their errors."""
 
+from axisight.frf import errors
 from axisight.frf.arithmetic_mean import arithmetic_mean
 from axisight.frf.batch_solve import invert, right_divide
 from axisight.frf.confidence import confidence_radius
@@ -12,7 +13,9 @@ from axisight.frf.joint_input_output import joint_input_output
 from axisight.frf.local_polynomial import local_polynomial
 from axisight.frf.local_rational import local_rational
 from axisight.frf.logarithmic_mean import logarithmic_mean
+from axisight.frf.loop import Loop, robot_loop
 from axisight.frf.mfrf import mfrf
+from axisight.frf.planning import averaged_relative_error, compare_designs, predict_errors
 from axisight.frf.response import Flag, frequency_response
 from axisight.frf.robust import robust_method
 from axisight.frf.smoothing import smooth
@@ -21,8 +24,12 @@ from axisight.frf.spectral_analysis import spectral_analysis
 __all__ = [
     "FastMethod",
     "Flag",
+    "Loop",
     "arithmetic_mean",
+    "averaged_relative_error",
+    "compare_designs",
     "confidence_radius",
+    "errors",
     "etfe",
     "explain_flags",
     "fast_method",
@@ -36,7 +43,9 @@ __all__ = [
     "local_rational",
     "logarithmic_mean",
     "mfrf",
+    "predict_errors",
     "right_divide",
+    "robot_loop",
     "robust_method",
     "smooth",
     "spectral_analysis",

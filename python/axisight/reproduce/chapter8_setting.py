@@ -1,0 +1,149 @@
+"""The setting of chapter 8: disturbances of Table 8.1, designs and references of section 8.2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.reproduce._multisine import clipped_multisine
+from axisight.robot import Robot
+
+Real = NDArray[np.float64]
+Lines = NDArray[np.int64]
+
+# Wernholt (2004), Table 8.1: order n, amplitude, phase [rad] of each sine.
+TORQUE_RIPPLE_NM = ((3, 0.06, 1.45), (36, 0.11, 0.90), (72, 0.08, 0.20))
+PROPORTIONAL_RIPPLE = ((18, 0.04, 0.0),)
+RESOLVER_RIPPLE_RAD = (
+    (2, 0.40e-3, -1.84),
+    (10, 0.20e-3, 0.81),
+    (12, 0.22e-3, 2.94),
+    (48, 0.18e-3, 2.94),
+)
+
+PERIOD_S = 10.0
+BAND_HZ = (1.0, 40.0)
+PEAK_RAD_S = 8.0
+SQUARE_RAD_S = 9.6
+SQUARE_PERIOD_S = 5.0
+SMOOTHING_SAMPLES = 40
+
+DIRECTIONS = {
+    "T1": np.eye(3),
+    "T2": np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]]),
+}
+
+
+@dataclass(frozen=True)
+class Design:
+    """One choice of excitation: ``r = T r_bb + r_sq`` in three experiments.
+
+    ``directions`` is T of (6.6). ``sinusoid_hz`` puts one sinusoid of the same peak in the
+    place of the multisine (section 8.3.2).
+    """
+
+    directions: Literal["T1", "T2"] = "T1"
+    square: bool = True
+    sinusoid_hz: float | None = None
+
+    def __str__(self) -> str:
+        """As in the captions of the thesis."""
+        what = "" if self.sinusoid_hz is None else f", sinusoid {self.sinusoid_hz:g} Hz"
+        return f"{self.directions}, {'with' if self.square else 'without'} square wave{what}"
+
+
+# In the order of Table 8.2, left to right and down.
+DESIGNS = (
+    Design("T1", square=False),
+    Design("T1", square=True),
+    Design("T2", square=False),
+    Design("T2", square=True),
+)
+
+
+def excited_lines() -> Lines:
+    """Return the lines of the multisine: 391 from 1 to 40 Hz."""
+    low, high = (round(f * PERIOD_S) for f in BAND_HZ)
+    return np.arange(low, high + 1)
+
+
+def square_lines(lines: Lines) -> NDArray[np.bool_]:
+    """Return which lines the square wave excites too: the odd multiples of its frequency."""
+    ratio = round(PERIOD_S / SQUARE_PERIOD_S)
+    return np.asarray((lines % ratio == 0) & (lines // ratio % 2 == 1))
+
+
+def strong_square_lines(robot: Robot) -> NDArray[np.bool_]:
+    """Return at which lines the square wave is stronger than the multisine."""
+    lines = excited_lines()
+    apart = Design("T1", square=False), Design("T1", square=True)
+    without, with_ = (references(robot, d, 0, 0)[0, :, :2] for d in apart)
+    multisine, square = (np.abs(np.fft.rfft(x)[lines]) for x in (without[:, 0], with_[:, 1]))
+    return np.asarray(square > multisine)
+
+
+def references(robot: Robot, design: Design, seed: int, run: int) -> Real:
+    """Return one period of velocity references [rad/s], (experiment, sample, axis).
+
+    The multisine is a function of (seed, run), the same in all experiments and designs.
+    """
+    n = round(PERIOD_S / robot.sample_time_s)
+    if design.sinusoid_hz is None:
+        broadband = _multisine(n, seed, run)
+    else:
+        turns = design.sinusoid_hz * PERIOD_S / n * np.arange(n)
+        broadband = np.sin(2 * np.pi * turns)
+    directions = DIRECTIONS[design.directions]
+    out = PEAK_RAD_S * np.einsum("ie,t->eti", directions, broadband)
+    if design.square:
+        out += _smoothed_square(robot.sample_time_s, n)[None, :, None]
+    return np.asarray(out)
+
+
+@lru_cache(maxsize=32)
+def _multisine(n: int, seed: int, run: int) -> Real:
+    return clipped_multisine(excited_lines(), n, np.random.default_rng([seed, run]))
+
+
+def _smoothed_square(sample_time_s: float, n: int) -> Real:
+    """Return the square wave of (7.3) over n samples."""
+    half = round(SQUARE_PERIOD_S / sample_time_s) // 2
+    level = np.where(np.arange(n) // half % 2 == 0, SQUARE_RAD_S, -SQUARE_RAD_S)
+    reach = SMOOTHING_SAMPLES + 1
+    weights = (reach - np.abs(np.arange(-reach + 1, reach))) / reach**2
+    wrapped = np.concatenate([level[-reach + 1 :], level, level[: reach - 1]])
+    return np.convolve(wrapped, weights, mode="valid")
+
+
+def ripple(robot: Robot) -> list[Effect]:
+    """Return the disturbances (8.2) of Table 8.1 on every axis.
+
+    The thesis's model is linear, so its commanded torque is the deviation from rest. Ours
+    holds the load: proportional ripple would see the static torque too, 22 and 24 Nm on
+    axes 2 and 3. Its share is therefore taken off again, by a ripple of constant amplitude.
+    """
+    static = robot.equilibrium()["motor_torque_nm"].values
+    effects = []
+    for axis, torque in zip(robot.axis_numbers(), static, strict=True):
+        torques = _terms(TORQUE_RIPPLE_NM, "{}", "_nm") | _terms(PROPORTIONAL_RIPPLE, "u", "")
+        effects.append(Effect("torque_ripple", axis, torques))
+        held = tuple((n, -a * torque, phase) for n, a, phase in PROPORTIONAL_RIPPLE)
+        effects.append(Effect("torque_ripple", axis, _terms(held, "{}", "_nm")))
+        effects.append(Effect("resolver_ripple", axis, _terms(RESOLVER_RIPPLE_RAD, "{}", "_rad")))
+    return effects
+
+
+def _terms(sines: tuple[tuple[int, float, float], ...], label: str, unit: str) -> dict[str, float]:
+    """Return ``a sin(n x + phase)`` as the parameters of a ripple effect."""
+    out = {}
+    for k, (order, amplitude, phase) in enumerate(sines, 1):
+        name = label.format(k)
+        out[f"order_{name}"] = float(order)
+        out[f"cosine_{name}{unit}"] = amplitude * float(np.sin(phase))
+        out[f"sine_{name}{unit}"] = amplitude * float(np.cos(phase))
+    return out

@@ -1,0 +1,85 @@
+"""Items and claims on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pandas as pd
+
+from axisight.reproduce.context import Context
+from axisight.reproduce.item import Claim, Item, item_names, registered
+
+Progress = Callable[[str, int, int], None]
+
+
+def run(
+    name: str,
+    context: Context,
+    out: Path | None = None,
+    progress: Progress = lambda name, done, total: None,
+) -> list[Item]:
+    """Compute the items that ``name`` stands for, in order; write them if ``out`` is given.
+
+    ``progress`` is called with the item about to be computed, the number done and the total.
+    Raises InputError for an unknown name, before anything is computed.
+    """
+    names = item_names(name)
+    items = registered()
+    done = []
+    for k, one in enumerate(names):
+        progress(one, k, len(names))
+        made = items[one](context)
+        if out is not None:
+            write_item(made, out)
+        done.append(made)
+    progress("done", len(names), len(names))
+    claims = [claim for made in done for claim in made.claims]
+    if out is not None and claims:
+        write_claims(claims, out)
+    return done
+
+
+def write_item(made: Item, out: Path) -> list[Path]:
+    """Write tables as CSV (full precision) and figures as PDF and PNG; return the paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for suffix, table in made.tables.items():
+        path = out / f"{_stem(made, suffix)}.csv"
+        table.to_csv(path, index=False, lineterminator="\n")
+        paths.append(path)
+    for suffix, figure in made.figures.items():
+        for kind in ("pdf", "png"):
+            path = out / f"{_stem(made, suffix)}.{kind}"
+            # no creation date: the same study gives the same bytes
+            metadata = {"CreationDate": None} if kind == "pdf" else None
+            figure.savefig(path, dpi=200, metadata=metadata)
+            paths.append(path)
+    return paths
+
+
+def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
+    """Write ``claims.csv`` and ``claims.md``, by section; return the paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    claims = sorted(claims, key=lambda c: c.section)
+    columns = ["id", "section", "statement", "holds", "evidence"]
+    rows = [[getattr(c, name) for name in columns] for c in claims]
+    table = out / "claims.csv"
+    pd.DataFrame(rows, columns=columns).to_csv(table, index=False, lineterminator="\n")
+    page = out / "claims.md"
+    page.write_text(_page(claims), encoding="utf-8")
+    return [table, page]
+
+
+def _page(claims: list[Claim]) -> str:
+    held = sum(c.holds for c in claims)
+    lines = ["# Claims", "", f"{held} of {len(claims)} hold on this robot.", ""]
+    lines += ["| section | statement | holds | evidence |", "|---|---|---|---|"]
+    for c in claims:
+        cells = (c.section, c.statement, "yes" if c.holds else "**no**", c.evidence)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _stem(made: Item, suffix: str) -> str:
+    return f"{made.name}-{suffix}" if suffix else made.name
