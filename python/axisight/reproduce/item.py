@@ -55,7 +55,7 @@ class Item:
 Make = Callable[[Context], Item]
 
 # Importing a module registers its items.
-_MODULES: tuple[str, ...] = ()
+_MODULES: tuple[str, ...] = ("chapter7_periods",)
 _ITEMS: dict[str, Make] = {}
 
 
