@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import FixedLocator, MultipleLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
 from axisight.palette import AFTER, BEFORE
@@ -86,7 +86,7 @@ def zoom_figure(
         ]
         axes.set_xscale("linear")
         axes.set_xlim(low, high)
-        axes.xaxis.set_major_locator(FixedLocator(np.arange(np.ceil(low), high + 0.01)))
+        axes.xaxis.set_major_locator(MultipleLocator(1))
         axes.set_ylim(0.8 * min(m.min() for m in inside), 1.25 * max(m.max() for m in inside))
         axes.set_title(f"({i},{j})", fontsize=8)
         axes.set_xlabel("frequency [Hz]", fontsize=8)

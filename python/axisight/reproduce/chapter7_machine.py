@@ -72,11 +72,12 @@ def small_signal_response(
     context: Context,
     frequency_hz: NDArray[np.float64],
     joint_angle_rad: Sequence[float] | None = None,
+    machine: Machine = REAL,
 ) -> Complex:
     """Return torque to acceleration about rest without dry friction, (n_freq, 3, 3).
 
     What the machine would be if it were linear; springs have their slope under the load.
     """
     iw = 2j * np.pi * frequency_hz[:, None, None]
-    position = context.robot.zoh_response(frequency_hz, joint_angle_rad, effects=REAL.springs())
+    position = context.robot.zoh_response(frequency_hz, joint_angle_rad, effects=machine.springs())
     return np.asarray(iw**2 * position.values)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from axisight.reproduce.chapter7_figure import Curve, reference
 from axisight.reproduce.chapter7_machine import REAL, Machine, small_signal_response
+from axisight.reproduce.chapter7_measures import LOW_HZ
 from axisight.reproduce.chapter7_records import Records, periods, records
 from axisight.reproduce.chapter7_setting import FIRST_LINE, LAST_LINE, PERIOD_S, PERIODS, Design
 from axisight.reproduce.context import Context
@@ -15,6 +16,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FREQUENCY_HZ: Real = np.arange(FIRST_LINE, LAST_LINE + 1) / PERIOD_S
+LOW = FREQUENCY_HZ <= LOW_HZ
 STANDARD = Design()
 
 

@@ -76,13 +76,13 @@ def broadband(design: Design, n: int, seed: int, realization: int) -> Real:
     """
     phase = 2 * np.pi * np.arange(n) / n  # one turn per period
     if design.sinusoid_hz is not None:
-        return np.sin(design.lines()[0] * phase)
+        return np.asarray(np.sin(design.lines()[0] * phase))
     if design.broadband in ("chirp", "centred chirp"):
         turns = LAST_LINE * phase + (FIRST_LINE - LAST_LINE) * phase**2 / (4 * np.pi)
         start = 0.0
         if design.broadband == "centred chirp":
             start = -np.arctan2(np.sin(turns).sum(), np.cos(turns).sum())
-        return np.sin(turns + start)
+        return np.asarray(np.sin(turns + start))
     rng = np.random.default_rng([seed, 7, realization])
     if design.broadband != "low":
         return clipped_multisine(design.lines(), n, rng)

@@ -55,7 +55,13 @@ class Item:
 Make = Callable[[Context], Item]
 
 # Importing a module registers its items.
-_MODULES: tuple[str, ...] = ("chapter7_periods",)
+_MODULES: tuple[str, ...] = (
+    "chapter7_periods",
+    "chapter7_signals",
+    "chapter7_averages",
+    "chapter7_sinusoid",
+    "chapter7_conclusions",
+)
 _ITEMS: dict[str, Make] = {}
 
 
