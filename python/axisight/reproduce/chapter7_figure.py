@@ -1,72 +1,73 @@
-"""Figures and tables of 3 x 3 frequency responses."""
+"""Figures and tables of 3 x 3 frequency responses in chapter 7."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, MultipleLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogFormatter, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
-from axisight.palette import AFTER, BEFORE
+from axisight.palette import AFTER, BEFORE, MEASURED
+from axisight.reproduce.element_plot import Curve, element_figure, element_table
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-REFERENCE = "#b0b0b0"
-UNIT = "rad s$^{-2}$/Nm"
+LABEL = "magnitude [rad s$^{-2}$/Nm]"
+# All responses of the chapter fit; the same for all figures, so that they can be compared.
+_LIMITS = (0.05, 3000.0)
 
-
-@dataclass(frozen=True)
-class Curve:
-    """One or several responses under one label, (n_freq, 3, 3) or (n, n_freq, 3, 3)."""
-
-    label: str
-    frequency_hz: Real
-    response: Complex
-    color: str = AFTER
-    width: float = 0.8
-    marker: str = ""
+_REFERENCE: dict[str, object] = {"color": "#b4b4b4", "lw": 2.2}
+_THIN: dict[str, object] = {"color": AFTER, "lw": 0.7}
+_THICK: dict[str, object] = {"color": BEFORE, "lw": 1.1}
+_SEVERAL: dict[str, object] = {"color": AFTER, "lw": 0.45}
+_MARKERS: dict[str, object] = {
+    "color": MEASURED,
+    "ls": "none",
+    "marker": "D",
+    "ms": 4.5,
+    "mec": "white",
+    "mew": 0.5,
+}
 
 
 def reference(frequency_hz: Real, response: Complex) -> Curve:
     """Return the response of the machine without dry friction, to be drawn below the others."""
-    return Curve("without dry friction", frequency_hz, response, REFERENCE, 2.2)
+    return Curve(frequency_hz, np.abs(response), "without dry friction", _REFERENCE)
 
 
 def thin(label: str, frequency_hz: Real, response: Complex) -> Curve:
-    """Return a curve as the thesis draws thin."""
-    return Curve(label, frequency_hz, response, AFTER, 0.7)
+    """Return a response that the thesis draws thin, (n_freq, 3, 3)."""
+    return Curve(frequency_hz, np.abs(response), label, _THIN)
 
 
 def thick(label: str, frequency_hz: Real, response: Complex) -> Curve:
-    """Return a curve as the thesis draws thick."""
-    return Curve(label, frequency_hz, response, BEFORE, 1.1)
+    """Return a response that the thesis draws thick, (n_freq, 3, 3)."""
+    return Curve(frequency_hz, np.abs(response), label, _THICK)
+
+
+def markers(label: str, frequency_hz: Real, response: Complex) -> Curve:
+    """Return values at single frequencies, (n_freq, 3, 3)."""
+    return Curve(frequency_hz, np.abs(response), label, _MARKERS)
+
+
+def several(label: str, frequency_hz: Real, responses: Complex) -> list[Curve]:
+    """Return responses of equal rank under one label, (n, n_freq, 3, 3)."""
+    labels = [label, *(f"_{label}" for _ in responses[1:])]
+    return [
+        Curve(frequency_hz, np.abs(one), text, _SEVERAL)
+        for one, text in zip(responses, labels, strict=True)
+    ]
 
 
 def matrix_figure(curves: Sequence[Curve]) -> Figure:
     """Return magnitudes of all elements, output down and input across, on common axes."""
-    figure = Figure(figsize=(7.1, 5.9), layout="constrained")
-    grid = figure.subplots(3, 3, sharex=True, sharey=True)
-    for i in range(3):
-        for j in range(3):
-            axes = grid[i, j]
-            _draw(axes, curves, i, j)
-            axes.set_yticks([0.1, 1, 10, 100, 1000])
-            axes.set_xlim(1, 40)
-            axes.set_ylim(0.05, 4000)
-            axes.text(
-                0.04, 0.95, f"({i + 1},{j + 1})", transform=axes.transAxes, va="top", fontsize=8
-            )
-    for axes in grid[-1]:
-        axes.set_xlabel("frequency [Hz]", fontsize=8)
-    for axes in grid[:, 0]:
-        axes.set_ylabel(f"magnitude [{UNIT}]", fontsize=8)
-    _legend(figure, grid[0, 0])
+    figure = element_figure(curves, LABEL, ylim=_LIMITS)
+    # Five decades need no minor ticks, and they take most of the time of drawing.
+    figure.axes[0].yaxis.set_minor_locator(NullLocator())
     return figure
 
 
@@ -74,82 +75,42 @@ def zoom_figure(
     curves: Sequence[Curve], windows: Mapping[tuple[int, int], tuple[float, float]]
 ) -> Figure:
     """Return magnitudes of some elements (from 1) within windows [Hz], side by side."""
-    figure = Figure(figsize=(3.54 * len(windows), 2.9), layout="constrained")
-    grid = figure.subplots(1, len(windows), squeeze=False)[0]
+    figure = Figure(figsize=(7.2, 2.9), layout="constrained")
+    grid = figure.subplots(1, len(windows), squeeze=False, sharey=True)[0]
     for axes, ((i, j), (low, high)) in zip(grid, windows.items(), strict=True):
-        _draw(axes, curves, i - 1, j - 1)
-        inside = [
-            np.abs(
-                c.response[..., (c.frequency_hz >= low) & (c.frequency_hz <= high), i - 1, j - 1]
-            )
-            for c in curves
-        ]
-        axes.set_xscale("linear")
+        for curve in curves:
+            near = (curve.frequency_hz >= low) & (curve.frequency_hz <= high)
+            values = curve.values[near, i - 1, j - 1]
+            axes.plot(curve.frequency_hz[near], values, label=curve.label, **curve.style)
+        axes.set_yscale("log")
         axes.set_xlim(low, high)
         axes.xaxis.set_major_locator(MultipleLocator(1))
-        axes.set_ylim(0.8 * min(m.min() for m in inside), 1.25 * max(m.max() for m in inside))
-        axes.set_title(f"({i},{j})", fontsize=8)
+        axes.yaxis.set_major_formatter(LogFormatter())
+        axes.grid(True, color="#e4e4e4", lw=0.5)
+        axes.set_axisbelow(True)
+        axes.tick_params(labelsize=7)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_title(f"({i},{j})", fontsize=8, pad=2)
         axes.set_xlabel("frequency [Hz]", fontsize=8)
-    grid[0].set_ylabel(f"magnitude [{UNIT}]", fontsize=8)
-    _legend(figure, grid[0])
+    grid[0].set_ylabel(LABEL, fontsize=8)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=len(labels), fontsize=8, frameon=False
+    )
     return figure
 
 
-def _draw(axes: Axes, curves: Sequence[Curve], i: int, j: int) -> None:
-    for curve in curves:
-        several = curve.response if curve.response.ndim == 4 else curve.response[None]
-        for k, response in enumerate(several):
-            axes.plot(
-                curve.frequency_hz,
-                np.abs(response[:, i, j]),
-                color=curve.color,
-                lw=0 if curve.marker else curve.width,
-                marker=curve.marker,
-                ms=5,
-                mew=0.5,
-                mec="white",
-                label=curve.label if k == 0 else None,
-            )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.xaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 40]))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(labelsize=7.5)
-    axes.grid(color="#e6e6e6", lw=0.5)
-    axes.set_axisbelow(True)
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    legend = figure.legend(
-        handles,
-        labels,
-        loc="outside upper center",
-        ncols=min(len(labels), 3),
-        fontsize=8,
-        frameon=False,
-    )
-    for line in legend.get_lines():
-        line.set_linewidth(max(line.get_linewidth(), 1.4) if line.get_linestyle() != "None" else 0)
-
-
 def response_table(frequency_hz: Real, responses: Mapping[str, Complex]) -> pd.DataFrame:
-    """Return a row per line and element: magnitude and phase [deg] of every response.
+    """Return magnitude and phase [deg] of every response, a column per element.
 
-    A response of axes (n, n_freq, 3, 3) fills columns ``name_1`` to ``name_n``.
+    A response of axes (n, n_freq, 3, 3) is numbered from ``name1``.
     """
-    row, output, input_ = np.indices((len(frequency_hz), 3, 3)).reshape(3, -1)
-    columns: dict[str, Real | NDArray[np.int64]] = {
-        "frequency_hz": frequency_hz[row],
-        "output": output + 1,
-        "input": input_ + 1,
-    }
+    columns = {}
     for name, response in responses.items():
-        several = {name: response}
+        single = {name: response}
         if response.ndim == 4:
-            several = {f"{name}_{k}": one for k, one in enumerate(response, 1)}
-        for label, one in several.items():
-            columns[f"{label}_magnitude"] = np.abs(one).ravel()
-            columns[f"{label}_phase_deg"] = np.degrees(np.angle(one)).ravel()
-    return pd.DataFrame(columns)
+            single = {f"{name}{k}": one for k, one in enumerate(response, 1)}
+        for label, one in single.items():
+            columns[label] = frequency_hz, np.abs(one)
+            columns[f"{label}_phase_deg"] = frequency_hz, np.degrees(np.angle(one))
+    return element_table(**columns)

@@ -52,26 +52,26 @@ def log_mean(responses: Complex) -> Complex:
     return np.asarray(magnitude * mean / np.abs(mean))
 
 
-def notch_hz(frequency_hz: Real, element: Complex | Real, band_hz: tuple[float, float]) -> float:
-    """Return where the level is lowest within a band [Hz], finer than the lines.
+def notch_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float]) -> float:
+    """Return where the magnitude is lowest within a band [Hz], finer than the lines.
 
-    A parabola through the lines within 0.8 Hz of the minimum of a running mean of three.
+    Near a notch a response is smooth where its level is not: of a complex parabola through the
+    lines within 0.8 Hz of the lowest running mean of three levels, the smallest magnitude.
     """
     inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-    f, level = frequency_hz[inside], level_db(element)[inside]
-    smooth = np.convolve(level, np.ones(3) / 3, mode="valid")
+    f, values = frequency_hz[inside], element[inside]
+    smooth = np.convolve(level_db(values), np.ones(3) / 3, mode="valid")
     lowest = 1 + int(np.argmin(smooth))
-    near = np.abs(f - f[lowest]) <= 0.85
-    centre = f[lowest]
-    square, slope, _ = np.polyfit(f[near] - centre, level[near], 2)
-    if square <= 0:
-        return float(centre)
-    return float(centre + np.clip(-slope / (2 * square), -0.8, 0.8))
+    offset = f - f[lowest]
+    near = np.abs(offset) < 0.85
+    parabola = np.polyfit(offset[near], values[near], 2)
+    fine = np.linspace(offset[near].min(), offset[near].max(), 801)
+    return float(f[lowest] + fine[np.argmin(np.abs(np.polyval(parabola, fine)))])
 
 
-def peak_hz(frequency_hz: Real, element: Complex | Real, band_hz: tuple[float, float]) -> float:
-    """Return where the level is highest within a band [Hz], as :func:`notch_hz`."""
-    return notch_hz(frequency_hz, 1 / np.abs(element), band_hz)
+def peak_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float]) -> float:
+    """Return where the magnitude is highest within a band [Hz], as :func:`notch_hz`."""
+    return notch_hz(frequency_hz, 1 / element, band_hz)
 
 
 def peak_db(frequency_hz: Real, element: Complex | Real, band_hz: tuple[float, float]) -> float:

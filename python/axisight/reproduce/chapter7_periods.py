@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from axisight.reproduce.chapter7_figure import matrix_figure, response_table, thick, thin
+from axisight.reproduce.chapter7_figure import matrix_figure, response_table, several, thick, thin
 from axisight.reproduce.chapter7_machine import Machine, small_signal_response
 from axisight.reproduce.chapter7_measures import (
     DIAGONAL,
@@ -160,7 +160,7 @@ def single_periods(context: Context) -> Item:
         {"": response_table(FREQUENCY_HZ, {"period": each})},
         {
             "": matrix_figure(
-                [linear_curve(context), thin("four single periods", FREQUENCY_HZ, each)]
+                [linear_curve(context), *several("four single periods", FREQUENCY_HZ, each)]
             )
         },
         claims,
@@ -211,7 +211,7 @@ def drifting_periods(context: Context) -> Item:
             "": matrix_figure(
                 [
                     linear_curve(context),
-                    thin("four periods, a quarter of a motor turn apart", FREQUENCY_HZ, each),
+                    *several("four periods, a quarter of a motor turn apart", FREQUENCY_HZ, each),
                 ]
             )
         },

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.reproduce.chapter7_figure import Curve, reference
+from axisight.reproduce.chapter7_figure import reference
 from axisight.reproduce.chapter7_machine import REAL, Machine, small_signal_response
 from axisight.reproduce.chapter7_measures import LOW_HZ
 from axisight.reproduce.chapter7_records import Records, periods, records
 from axisight.reproduce.chapter7_setting import FIRST_LINE, LAST_LINE, PERIOD_S, PERIODS, Design
 from axisight.reproduce.context import Context
+from axisight.reproduce.element_plot import Curve
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -33,6 +33,7 @@ from axisight.reproduce.chapter7_sets import (
     four_periods,
     linear,
     linear_curve,
+    repeats,
 )
 from axisight.reproduce.chapter7_setting import PEAK_RAD_S, Design, broadband, references
 from axisight.reproduce.context import Context
@@ -57,7 +58,7 @@ def landmarks(sets: dict[str, Complex]) -> pd.DataFrame:
     """Return notch and peak of the diagonal elements, from logarithmic means over sets."""
     rows = []
     for name, responses in sets.items():
-        mean = np.abs(log_mean(responses))
+        mean = log_mean(responses)
         for i in range(3):
             element = mean[:, i, i]
             rows.append(
@@ -177,15 +178,13 @@ def amplitude(context: Context) -> Item:
         }
     )
     full, half = triple(marks, "normal", "notch_hz"), triple(marks, "half", "notch_hz")
-    fall = [a - b for a, b in zip(full, half, strict=True)]
-    cube_free = [
-        a - b
-        for a, b in zip(
+    fall = list(np.subtract(full, half))
+    cube_free = list(
+        np.subtract(
             triple(marks, "normal, linear springs", "notch_hz"),
             triple(marks, "half, linear springs", "notch_hz"),
-            strict=True,
         )
-    ]
+    )
     change = distance_db(log_mean(different(context)), log_mean(different(context, HALF)))
     scatter = scatter_db(different(context)[0])
     claims = (
@@ -214,15 +213,18 @@ def amplitude(context: Context) -> Item:
             "remains is dry friction's",
         ),
     )
+    means = {"normal": log_mean(different(context)), "half": log_mean(different(context, HALF))}
+    of = f"amplitude, log mean of {repeats(context)}"
     curves = [
         linear_curve(context),
-        thick("half amplitude", FREQUENCY_HZ, log_mean(different(context, HALF))),
-        thin("normal amplitude", FREQUENCY_HZ, log_mean(different(context))),
+        thick(f"half {of}", FREQUENCY_HZ, means["half"]),
+        thin(f"normal {of}", FREQUENCY_HZ, means["normal"]),
     ]
     figures = drawn.figures | {
         "notches": zoom_figure(curves, {(1, 1): (3.0, 7.0), (2, 2): (6.0, 11.0)})
     }
-    return Item(drawn.name, title, drawn.tables | {"landmarks": marks}, figures, claims)
+    tables = {"landmarks": marks, "notches": response_table(FREQUENCY_HZ, means)}
+    return Item(drawn.name, title, drawn.tables | tables, figures, claims)
 
 
 @item("figure-7.6")

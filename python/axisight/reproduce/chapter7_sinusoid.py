@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from axisight.palette import MEASURED
-from axisight.reproduce.chapter7_figure import Curve, matrix_figure, response_table, thin
+from axisight.reproduce.chapter7_figure import markers, matrix_figure, response_table, thin
 from axisight.reproduce.chapter7_measures import (
     COUPLING,
     LOW_HZ,
@@ -86,7 +85,7 @@ def single_sinusoids(context: Context) -> Item:
     curves = [
         linear_curve(context),
         thin(f"log mean of {len(different(context))} multisines", FREQUENCY_HZ, average),
-        Curve("single sinusoids", np.array(SINUSOIDS_HZ), sines, MEASURED, marker="D"),
+        markers("single sinusoids", np.array(SINUSOIDS_HZ), sines),
     ]
     tables = {
         "": response_table(FREQUENCY_HZ, {"log_mean": average}),

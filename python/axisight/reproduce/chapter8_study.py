@@ -43,6 +43,11 @@ class Experiments:
     output_disturbance: Complex
     estimate: Complex
 
+    def at(self, line: int) -> Experiments:
+        """Return the spectra at one place in ``frequency_hz``."""
+        kept = slice(line, line + 1)
+        return Experiments(*(value[kept] for value in vars(self).values()))
+
 
 def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
     """Return one realization of a design, with the ripple of Table 8.1 and sensor noise."""
@@ -108,26 +113,26 @@ def from_simulation(context: Context, simulated: xr.Dataset, lines: Lines) -> Ex
     """Return the spectra of the last of two simulated periods."""
     n = simulated.sizes["time"] // 2
     step = context.robot.sample_time_s
-    torque = simulated["torque_disturbance_nm"].values
+    torque = simulated["torque_disturbance_nm"].values[:, n:]
     # The plant sees the mean over a sample, not its beginning.
-    torque = 0.5 * (torque[:, n:] + np.roll(torque, -1, axis=1)[:, n:])
-    records = _records(
-        step,
-        simulated["torque_cmd_nm"].values[:, n:],
-        _without_drift(simulated["position_rad"].values, n),
-        lines,
-    )
-    disturbances = _records(
-        step, torque, simulated["position_disturbance_rad"].values[:, n:], lines
+    torque = 0.5 * (torque + np.roll(torque, -1, axis=1))
+    position = simulated["position_disturbance_rad"].values[:, n:]
+    command = simulated["torque_cmd_nm"].values[:, n:]
+    measured = _without_drift(simulated["position_rad"].values, n)
+    return from_signals(step, lines, (command, measured), (torque, position))
+
+
+def from_signals(
+    step: float, lines: Lines, signals: tuple[Real, Real], disturbances: tuple[Real, Real]
+) -> Experiments:
+    """Return the spectra of one period of torque and position, (experiment, sample, axis)."""
+    records, disturbing = (
+        PeriodicRecords(step, u[:, None], y[:, None], lines) for u, y in (signals, disturbances)
     )
     u, y = spectra(records)
-    v_u, v_y = spectra(disturbances)
+    v_u, v_y = spectra(disturbing)
     iw = 2j * np.pi * records.frequency_hz[:, None, None]
     return Experiments(records.frequency_hz, u, iw * y, v_u, iw * v_y, mfrf(u, iw**2 * y))
-
-
-def _records(step: float, u: Real, y: Real, lines: Lines) -> PeriodicRecords:
-    return PeriodicRecords(step, u[:, None], y[:, None], lines)
 
 
 def _without_drift(position: Real, n: int) -> Real:

@@ -61,6 +61,10 @@ _MODULES: tuple[str, ...] = (
     "chapter7_averages",
     "chapter7_sinusoid",
     "chapter7_conclusions",
+    "chapter8_tables",
+    "chapter8_figures",
+    "chapter8_averages",
+    "appendix_a",
 )
 _ITEMS: dict[str, Make] = {}
 

@@ -1,0 +1,191 @@
+"""Errors predicted from a model before an experiment, to choose its design.
+
+Ripple repeats with the motion, so it is the same in every period and every repetition: only
+simulating the motion predicts it. Sensor noise is added by its variance, with what it leaks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import cast
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.frf.errors import error_variance, estimation_error, signal_to_noise_ratio
+from axisight.frf.leakage import noise_leakage_power
+from axisight.robot import Robot
+from axisight.simulation import Model, simulate_batch
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_DIMS = ("frequency_hz", "output", "input")
+
+
+def predict_errors(
+    robot: Robot,
+    references_rad_s: ArrayLike,
+    lines: ArrayLike,
+    *,
+    effects: Iterable[Effect] = (),
+    waiting_periods: int = 1,
+    n_periods: int = 1,
+    model: Model = "linear",
+    threads: int = 0,
+) -> xr.Dataset:
+    """Return the errors to expect of ``Y U^-1`` under a design, from torque to acceleration.
+
+    Parameters
+    ----------
+    robot : with a ``pi_velocity`` or ``p_velocity`` controller and its sensor noise.
+    references_rad_s : one period of motor velocity references, of one or more realizations:
+        (n_realizations, n_experiments, n_samples, n_axes), n_experiments = n_axes. Square
+        wave, amplitude and directions T are all in it.
+    lines : excited lines k; frequencies ``k / (N T)``.
+    effects : what disturbs: ``torque_ripple`` and ``resolver_ripple``.
+    waiting_periods : simulated before the one that counts. A transient still left then is
+        part of the error, as it would be in the experiment.
+    n_periods : measured periods; they average the noise, not the ripple.
+    model, threads : as in :func:`axisight.simulate_batch`.
+
+    Returns
+    -------
+    Dataset with dims (frequency_hz, output, input): complex ``response`` (the true one) and
+    ``bias`` (mean error over realizations), ``realization_variance`` (their scatter; NaN for
+    one), ``noise_variance`` (of one realization), ``relative_error`` (root mean square of
+    the error of one realization over ``|G|``), and with (frequency_hz, axis, experiment)
+    the median over realizations of ``input_snr``, (8.10), NaN without ripple, and
+    ``output_snr``, (8.11), noise included. See :func:`averaged_relative_error` for more realizations.
+
+    Raises InputError for shapes that do not fit, lines out of range, and a run that fails.
+
+    """
+    refs = np.asarray(references_rad_s, np.float64)
+    n = robot.n_axes
+    if refs.ndim != 4 or refs.shape[1] != n or refs.shape[3] != n or 0 in refs.shape:
+        raise InputError(
+            f"references_rad_s: expected shape (n_realizations, {n}, n_samples, {n}), "
+            f"got {refs.shape}"
+        )
+    k = np.asarray(lines)
+    if k.ndim != 1 or not k.size or k.dtype.kind not in "iu" or k.min() < 1:
+        raise InputError(f"lines: expected whole numbers from 1, got {lines!r}")
+    if k.max() >= refs.shape[2] / 2:
+        raise InputError(f"lines: expected below {refs.shape[2] / 2:g} (Nyquist), got {k.max()}")
+    for name, value, least in (
+        ("waiting_periods", waiting_periods, 0),
+        ("n_periods", n_periods, 1),
+    ):
+        if value < least:
+            raise InputError(f"{name}: expected at least {least}, got {value}")
+    frequency = k / (refs.shape[2] * robot.sample_time_s)
+    true = robot.zoh_response(frequency).values
+    noise = refs.shape[2] * robot.core.position_noise_std**2
+    leaked = noise_leakage_power(robot, frequency, n_periods * refs.shape[2])
+    power = noise / n_periods + leaked / n_periods**2
+    found = []
+    for one in refs:
+        repeated = np.tile(one, (1, waiting_periods + 1, 1))
+        run = simulate_batch(robot, repeated, effects=effects, model=model, threads=threads)
+        if not (run["status"] == "completed").all():
+            raise InputError(f"references_rad_s: the simulation ended as {run['status'].values}")
+        found.append(_one(run, refs.shape[2], k, true, power))
+    return _dataset(frequency, true, found, robot.axis_numbers())
+
+
+def averaged_relative_error(prediction: xr.Dataset, n_realizations: int) -> xr.DataArray:
+    """Return the root mean square relative error after averaging over realizations.
+
+    ``sqrt(|bias|^2 + (realization + noise variance) / M) / |G|`` for the arithmetic mean of M
+    estimates, (7.7). The bias predicted from a few realizations holds their own scatter; its
+    expected share is taken off. Raises InputError if the prediction rests on one.
+    """
+    count = int(prediction.attrs["n_realizations"])
+    if n_realizations < 1 or count < 2:
+        raise InputError(
+            "n_realizations: expected at least 1, and a prediction from at least 2, got "
+            f"{n_realizations} and {count}"
+        )
+    scatter = prediction["realization_variance"]
+    bias = np.maximum(np.abs(prediction["bias"]) ** 2 - scatter / count, 0.0)
+    variance = (scatter + prediction["noise_variance"]) / n_realizations
+    error = np.sqrt(bias + variance) / np.abs(prediction["response"])
+    return cast(xr.DataArray, error).rename("relative_error").assign_attrs(units="1")
+
+
+def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
+    """Return the mean over frequency of the predicted relative error, one row per design.
+
+    Columns: ``design``, ``1,1`` ... (output, input) and ``mean`` over all elements.
+    """
+    rows = []
+    for name, prediction in predictions.items():
+        mean = prediction["relative_error"].mean("frequency_hz")
+        elements = {
+            f"{int(i)},{int(j)}": float(mean.sel(output=i, input=j))
+            for i in mean["output"]
+            for j in mean["input"]
+        }
+        rows.append({"design": name, **elements, "mean": float(mean.mean())})
+    return pd.DataFrame(rows)
+
+
+_Errors = tuple[Complex, Real, Real, Real]
+
+
+def _one(run: xr.Dataset, n: int, lines: NDArray[np.int64], true: Complex, power: Real) -> _Errors:
+    """Return error, noise variance and signal-to-noise ratios of one realization."""
+    names = ("torque_cmd_nm", "position_rad", "torque_disturbance_nm", "position_disturbance_rad")
+    u, y, v_u, v_y = (_spectrum(run[name].values[:, -n:], lines) for name in names)
+    error = estimation_error(y - true @ u, u)
+    variance = error_variance(power, u)
+    to_acceleration = (2 * np.pi * lines / (n * float(run["time"][1]))) ** 2
+    v_y = np.sqrt(np.abs(v_y) ** 2 + power[:, :, None])
+    scale = to_acceleration[:, None, None]
+    return (
+        -scale * error,
+        scale**2 * variance,
+        signal_to_noise_ratio(u, v_u),
+        signal_to_noise_ratio(y, v_y),
+    )
+
+
+def _spectrum(x: Real, lines: NDArray[np.int64]) -> Complex:
+    """Return the DFT at the lines, (n_freq, axis, experiment)."""
+    return np.moveaxis(np.fft.rfft(x, axis=1)[:, lines], 0, -1)
+
+
+def _dataset(frequency: Real, true: Complex, found: list[_Errors], axes: list[int]) -> xr.Dataset:
+    error, noise, input_snr, output_snr = (np.array(part) for part in zip(*found, strict=True))
+    response = -((2 * np.pi * frequency[:, None, None]) ** 2) * true
+    scatter = np.full(response.shape, np.nan)
+    if len(error) > 1:
+        scatter = np.sum(np.abs(error - error.mean(0)) ** 2, axis=0) / (len(error) - 1)
+    noise_variance = noise.mean(0)
+    squared = np.mean(np.abs(error) ** 2, axis=0) + noise_variance
+    unit = "rad/s^2/Nm"
+    snr_dims = ("frequency_hz", "axis", "experiment")
+    return xr.Dataset(
+        {
+            "response": (_DIMS, response, {"units": unit}),
+            "bias": (_DIMS, error.mean(0), {"units": unit}),
+            "realization_variance": (_DIMS, scatter, {"units": f"({unit})^2"}),
+            "noise_variance": (_DIMS, noise_variance, {"units": f"({unit})^2"}),
+            "relative_error": (_DIMS, np.sqrt(squared) / np.abs(response), {"units": "1"}),
+            "input_snr": (snr_dims, np.median(input_snr, axis=0), {"units": "1"}),
+            "output_snr": (snr_dims, np.median(output_snr, axis=0), {"units": "1"}),
+        },
+        coords={
+            "frequency_hz": ("frequency_hz", frequency, {"units": "Hz"}),
+            "output": axes,
+            "input": axes,
+            "axis": axes,
+            "experiment": axes,
+        },
+        attrs={"n_realizations": len(found)},
+    )
