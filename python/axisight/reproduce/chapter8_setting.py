@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -77,6 +78,15 @@ def square_lines(lines: Lines) -> NDArray[np.bool_]:
     return np.asarray((lines % ratio == 0) & (lines // ratio % 2 == 1))
 
 
+def strong_square_lines(robot: Robot) -> NDArray[np.bool_]:
+    """Return at which lines the square wave is stronger than the multisine."""
+    lines = excited_lines()
+    apart = Design("T1", square=False), Design("T1", square=True)
+    without, with_ = (references(robot, d, 0, 0)[0, :, :2] for d in apart)
+    multisine, square = (np.abs(np.fft.rfft(x)[lines]) for x in (without[:, 0], with_[:, 1]))
+    return np.asarray(square > multisine)
+
+
 def references(robot: Robot, design: Design, seed: int, run: int) -> Real:
     """Return one period of velocity references [rad/s], (experiment, sample, axis).
 
@@ -84,7 +94,7 @@ def references(robot: Robot, design: Design, seed: int, run: int) -> Real:
     """
     n = round(PERIOD_S / robot.sample_time_s)
     if design.sinusoid_hz is None:
-        broadband = clipped_multisine(excited_lines(), n, np.random.default_rng([seed, run]))
+        broadband = _multisine(n, seed, run)
     else:
         turns = design.sinusoid_hz * PERIOD_S / n * np.arange(n)
         broadband = np.sin(2 * np.pi * turns)
@@ -93,6 +103,11 @@ def references(robot: Robot, design: Design, seed: int, run: int) -> Real:
     if design.square:
         out += _smoothed_square(robot.sample_time_s, n)[None, :, None]
     return np.asarray(out)
+
+
+@lru_cache(maxsize=32)
+def _multisine(n: int, seed: int, run: int) -> Real:
+    return clipped_multisine(excited_lines(), n, np.random.default_rng([seed, run]))
 
 
 def _smoothed_square(sample_time_s: float, n: int) -> Real:

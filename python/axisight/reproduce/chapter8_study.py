@@ -58,6 +58,46 @@ def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
     return context.shared(key, lambda: _simulated(context, [design], run)[design])
 
 
+def same_excitation(context: Context, design: Design, periods: int) -> list[Experiments]:
+    """Return periods in a row of one design: same excitation, new sensor noise."""
+
+    def make() -> list[Experiments]:
+        refs = np.tile(references(context.robot, design, context.seed, 0), (1, periods + 1, 1))
+        simulated = simulate_batch(
+            context.robot,
+            refs,
+            effects=ripple(context.robot),
+            noise_seed=context.seed,
+            first_run=2**33,
+            model="linear",
+            threads=context.threads,
+        )
+        n = refs.shape[1] // (periods + 1)
+        pairs = (simulated.isel(time=slice(k * n, (k + 2) * n)) for k in range(periods))
+        return [from_simulation(context, pair, excited_lines()) for pair in pairs]
+
+    return context.shared(("chapter8-same", design, periods), make)
+
+
+def simulate_nonlinear(context: Context) -> list[Experiments]:
+    """Return the designs of Table 8.2, first realization, with the full equations of motion."""
+
+    def make() -> list[Experiments]:
+        context.report("12 experiments with the nonlinear model")
+        refs = [references(context.robot, d, context.seed, 0) for d in DESIGNS]
+        simulated = simulate_period(
+            context,
+            np.concatenate(refs),
+            ripple(context.robot),
+            noise_seed=context.seed,
+            model="nonlinear",
+        )
+        parts = (simulated.isel(run=slice(k, k + 3)) for k in range(0, 12, 3))
+        return [from_simulation(context, part, excited_lines()) for part in parts]
+
+    return context.shared("chapter8-nonlinear", make)
+
+
 def true_response(context: Context, frequency_hz: Real) -> Complex:
     """Return the zero-order-hold response from torque to acceleration, (n_freq, 3, 3)."""
     iw = 2j * np.pi * frequency_hz[:, None, None]

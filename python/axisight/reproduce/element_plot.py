@@ -21,8 +21,8 @@ ESTIMATE = {"color": AFTER, "lw": 0.7}
 DISTURBANCE = {"color": BEFORE, "lw": 0.7}
 SINGLE = {"color": BEFORE, "ls": "none", "marker": "D", "ms": 5, "mec": "white", "mew": 0.5}
 FAINT = {"color": AFTER, "lw": 0.4, "alpha": 0.6}
-MEAN = {"color": MEASURED, "lw": 0.8}
-MARKED = {"color": BEFORE, "ls": "none", "marker": ".", "ms": 2.2, "mew": 0}
+MEAN = {"color": MEASURED, "lw": 0.6}
+MARKED = {"color": BEFORE, "ls": "none", "marker": "o", "ms": 1.6, "mew": 0}
 
 
 @dataclass(frozen=True)

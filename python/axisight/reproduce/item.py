@@ -65,6 +65,8 @@ _MODULES: tuple[str, ...] = (
     "chapter8_figures",
     "chapter8_averages",
     "appendix_a",
+    "chapter8_claims",
+    "appendix_a_claims",
 )
 _ITEMS: dict[str, Make] = {}
 
