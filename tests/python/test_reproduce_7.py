@@ -20,6 +20,7 @@ from axisight.reproduce.chapter7_measures import (
 from axisight.reproduce.chapter7_records import periods, records
 from axisight.reproduce.chapter7_setting import (
     PERIOD_S,
+    Broadband,
     Design,
     broadband,
     references,
@@ -84,7 +85,7 @@ def test_square_wave_is_smoothed_by_a_triangle() -> None:
 
 
 @pytest.mark.parametrize("kind", ["multisine", "odd", "low", "chirp", "centred chirp"])
-def test_broadband_signals(kind) -> None:  # type: ignore[no-untyped-def]
+def test_broadband_signals(kind: Broadband) -> None:
     design = Design(kind)
     wave = broadband(design, N, 0, 0)
     assert np.abs(wave).max() == pytest.approx(1, abs=1e-3)
@@ -99,6 +100,11 @@ def test_broadband_signals(kind) -> None:  # type: ignore[no-untyped-def]
     if kind == "low":
         below = design.lines() <= 25
         assert inside[below].min() > 1.5 * inside[~below].max()
+    if "chirp" in kind:
+        # From line 200 down to 5: two crossings a turn, over the first and the last tenth.
+        crossings = np.diff(np.sign(wave)) != 0
+        assert abs(crossings[: N // 10].sum() - 0.2 * 190.25) <= 1
+        assert abs(crossings[-N // 10 :].sum() - 0.2 * 14.75) <= 1
     if kind == "chirp":
         assert abs(wave.mean()) > 0.01
     if kind == "centred chirp":
