@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from axisight.reproduce.chapter7_averages import many, same
+from axisight.reproduce.chapter7_landmarks import landmarks, triple
 from axisight.reproduce.chapter7_machine import Machine, small_signal_response
 from axisight.reproduce.chapter7_measures import (
     COUPLING,
@@ -27,7 +28,7 @@ from axisight.reproduce.chapter7_sets import (
     repeats,
 )
 from axisight.reproduce.chapter7_setting import Design
-from axisight.reproduce.chapter7_signals import HALF, NO_SQUARE, T2, landmarks, triple
+from axisight.reproduce.chapter7_signals import HALF, NO_SQUARE, T2
 from axisight.reproduce.chapter7_sinusoid import LOW_SINUSOIDS, at_sinusoids, sinusoids
 from axisight.reproduce.context import Context
 from axisight.reproduce.item import Claim, Item, item

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from axisight.reproduce.chapter7_figure import (
@@ -13,6 +12,7 @@ from axisight.reproduce.chapter7_figure import (
     thin,
     zoom_figure,
 )
+from axisight.reproduce.chapter7_landmarks import NOTCH_HZ, landmarks, triple
 from axisight.reproduce.chapter7_machine import Machine
 from axisight.reproduce.chapter7_measures import (
     distance_db,
@@ -21,8 +21,6 @@ from axisight.reproduce.chapter7_measures import (
     middle,
     names,
     notch_hz,
-    peak_db,
-    peak_hz,
     scatter_db,
 )
 from axisight.reproduce.chapter7_sets import (
@@ -46,36 +44,9 @@ HALF = Design(scale=0.5)
 T2 = Design(directions="T2")
 CHIRP, CENTRED_CHIRP = Design("chirp"), Design("centred chirp")
 
-# Where the first notch and the first peak of the diagonal elements lie, with room [Hz].
-NOTCH_HZ = ((3.5, 7.0), (5.0, 11.0), (5.0, 12.0))
-PEAK_HZ = ((7.0, 12.0), (10.5, 17.0), (10.5, 17.0))
 # Axis 1 with the friction of axis 2.
 _ROUGH_AXIS_1 = Machine(coulomb_nm=(2.0, 2.0, 1.6))
 _NO_CUBE = Machine(cubic_nm_rad3=(0.0, 0.0, 0.0))
-
-
-def landmarks(sets: dict[str, Complex]) -> pd.DataFrame:
-    """Return notch and peak of the diagonal elements, from logarithmic means over sets."""
-    rows = []
-    for name, responses in sets.items():
-        mean = log_mean(responses)
-        for i in range(3):
-            element = mean[:, i, i]
-            rows.append(
-                {
-                    "set": name,
-                    "element": f"({i + 1},{i + 1})",
-                    "notch_hz": notch_hz(FREQUENCY_HZ, element, NOTCH_HZ[i]),
-                    "peak_hz": peak_hz(FREQUENCY_HZ, element, PEAK_HZ[i]),
-                    "peak_db": peak_db(FREQUENCY_HZ, element, PEAK_HZ[i]),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def triple(table: pd.DataFrame, name: str, column: str) -> list[float]:
-    """Return one column of :func:`landmarks` for axes 1 to 3."""
-    return [float(v) for v in table.loc[table["set"] == name, column]]
 
 
 def _text(values: list[float], digits: int = 2) -> str:
