@@ -199,8 +199,8 @@ def averages_over_multisines(context: Context) -> Item:
     )
     curves = [
         linear_curve(context),
-        thin(f"log mean of {n}, same multisine", FREQUENCY_HZ, alike),
         thick(f"log mean of {n}, different multisines", FREQUENCY_HZ, varied),
+        thin(f"log mean of {n}, same multisine", FREQUENCY_HZ, alike),
     ]
     return Item(
         "figure-7.10",
@@ -237,8 +237,8 @@ def arithmetic_or_logarithmic(context: Context) -> Item:
     )
     curves = [
         linear_curve(context),
-        thin("arithmetic mean", FREQUENCY_HZ, arithmetic),
         thick("logarithmic mean", FREQUENCY_HZ, logarithmic),
+        thin("arithmetic mean", FREQUENCY_HZ, arithmetic),
     ]
     return Item(
         "figure-7.11",

@@ -255,8 +255,8 @@ def averages_over_periods(context: Context) -> Item:
     )
     curves = [
         linear_curve(context),
-        thin("fixed operating point", FREQUENCY_HZ, fixed),
         thick("varying operating point", FREQUENCY_HZ, varying),
+        thin("fixed operating point", FREQUENCY_HZ, fixed),
     ]
     table = response_table(FREQUENCY_HZ, {"fixed": fixed, "varying": varying})
     title = "Magnitude of the estimate averaged over periods at a varying and a fixed point"
