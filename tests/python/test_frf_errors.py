@@ -323,3 +323,13 @@ def test_one_realization_cannot_be_averaged(robot):
     assert np.isnan(predicted["realization_variance"]).all()
     with pytest.raises(InputError, match="n_realizations"):
         averaged_relative_error(predicted, 4)
+
+
+def test_example_of_the_page(repository):
+    """The page's last snippet runs, and T2 pays for ripple in the rows of axis 1's column."""
+    page = (repository / "docs" / "reproduce.md").read_text(encoding="utf-8")
+    snippet = page.rsplit("```python\n", 1)[1].split("```", 1)[0]
+    names = {}
+    exec(snippet, names)
+    table = compare_designs(names["predictions"]).set_index("design")
+    assert table.loc["all axes", "3,1"] > 3 * table.loc["one axis at a time", "3,1"]

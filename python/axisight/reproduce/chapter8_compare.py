@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axisight.frf.errors import mean_relative_error
 from axisight.reproduce.chapter8_setting import (
     DESIGNS,
+    PERIOD_S,
     Design,
     excited_lines,
     square_lines,
@@ -21,6 +22,10 @@ from axisight.reproduce.chapter8_study import experiments, true_response
 from axisight.reproduce.context import Context
 
 Real = NDArray[np.float64]
+
+
+# Standard errors for a decision: nine elements are judged at a time.
+_DECIDED = 3.0
 
 
 @dataclass(frozen=True)
@@ -37,9 +42,9 @@ class Ratio:
         return cls(float(value), float(error))
 
     @property
-    def upper(self) -> float:
-        """Two standard errors above."""
-        return self.value * float(np.exp(2 * self.error))
+    def decided(self) -> bool:
+        """Whether the ratio is not one, by three standard errors."""
+        return bool(abs(np.log(self.value)) > _DECIDED * self.error)
 
     def __str__(self) -> str:
         """Value and two standard errors."""
@@ -70,7 +75,7 @@ def mean_error_runs(context: Context) -> Real:
     """Return mean relative errors, (realization, design, output, input)."""
 
     def make() -> Real:
-        true = true_response(context, excited_lines() / 10.0)
+        true = true_response(context, excited_lines() / PERIOD_S)
         return np.array(
             [
                 [mean_relative_error(experiments(context, d, run).estimate, true) for d in DESIGNS]
@@ -90,12 +95,12 @@ def compare(context: Context, over: int, under: int) -> Ratios:
 def except_for(ratios: Ratios, expected: set[tuple[int, int]], other: str) -> tuple[bool, str]:
     """Return whether a design wins except for the ``expected`` elements, where the other does.
 
-    ``ratios`` are its errors over the other's. Elements within two standard errors of one
+    ``ratios`` are its errors over the other's. Elements within three standard errors of one
     are undecided; that is no exception.
     """
     logs = np.log(ratios.value)
-    worse = logs > 2 * ratios.error
-    undecided = np.abs(logs) <= 2 * ratios.error
+    bound = _DECIDED * ratios.error
+    worse, undecided = logs > bound, np.abs(logs) <= bound
     text = f"{other} better in {_where(worse)}, undecided in {_where(undecided)}; ratios "
     text += ", ".join(
         str(Ratio(float(v), float(e)))

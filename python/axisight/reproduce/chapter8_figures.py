@@ -63,7 +63,7 @@ def figure_8_2(context: Context) -> Item:
     )
     figures = {
         "": element_figure(curves(magnitudes), "|G|"),
-        "phase": element_figure(curves(phases), "phase [deg]", log=False),
+        "phase": element_figure(curves(phases), "phase [deg]", log=False, every=180.0),
     }
     return Item("figure-8.2", "Bode plots of the robot", {"": table}, figures)
 
@@ -76,13 +76,14 @@ def error_item(name: str, design: Design, found: list[Experiments], true: Comple
     frequency = found[0].frequency_hz
     errors = np.array([np.abs(relative_error(f.estimate, true)) for f in found])
     mean = errors.mean(axis=0)
-    curves = [
-        Curve(frequency, errors[0], "one realization", FAINT),
-        Curve(frequency, mean, f"mean of {len(found)}", MEAN),
-    ]
+    curves = [Curve(frequency, errors[0], "one realization", FAINT)]
+    name_of_mean = f"mean of {len(found)}"
     if design.square:
         at = square_lines(excited_lines())
+        curves.append(Curve(frequency[~at], mean[~at], name_of_mean, MEAN))
         curves.append(Curve(frequency[at], mean[at], "lines of the square wave", MARKED))
+    else:
+        curves.append(Curve(frequency, mean, name_of_mean, MEAN))
     table = element_table(error=(frequency, errors[0]), mean_error=(frequency, mean))
     title = f"Relative error of the MFRF estimate, {design}"
     return Item(name, title, {"": table}, {"": element_figure(curves, ERROR, ylim=ERROR_RANGE)})

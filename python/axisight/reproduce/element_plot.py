@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
 from axisight.palette import AFTER, BEFORE, MEASURED
@@ -22,7 +22,7 @@ DISTURBANCE = {"color": BEFORE, "lw": 0.7}
 SINGLE = {"color": BEFORE, "ls": "none", "marker": "D", "ms": 5, "mec": "white", "mew": 0.5}
 FAINT = {"color": AFTER, "lw": 0.4, "alpha": 0.6}
 MEAN = {"color": MEASURED, "lw": 0.6}
-MARKED = {"color": BEFORE, "ls": "none", "marker": "o", "ms": 1.6, "mew": 0}
+MARKED = {"color": BEFORE, "ls": "none", "marker": "o", "ms": 1.8, "mew": 0}
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,12 @@ def element_figure(
     *,
     ylim: tuple[float, float] | None = None,
     log: bool = True,
+    every: float | None = None,
 ) -> Figure:
     """Return a Figure of elements; row is output or channel, column input or experiment.
 
-    All panels share both axes, so that elements can be compared by eye.
+    All panels share both axes, so that elements can be compared by eye. ``every`` is the step
+    of the vertical ticks.
     """
     n_rows, n_columns = curves[0].values.shape[1:]
     figure = Figure(figsize=(7.2, 5.4), layout="constrained")
@@ -53,6 +55,8 @@ def element_figure(
         for j in range(n_columns):
             _panel(grid[i, j], curves, i, j, log)
     _frequency_axis(grid[0, 0], curves[0].frequency_hz)
+    if every is not None:
+        grid[0, 0].yaxis.set_major_locator(MultipleLocator(every))
     if ylim is not None:
         grid[0, 0].set_ylim(*ylim)
     for axes in grid[:, 0]:
@@ -103,6 +107,6 @@ def _panel(axes: Axes, curves: Sequence[Curve], i: int, j: int, log: bool) -> No
 
 def _frequency_axis(axes: Axes, frequency: Real) -> None:
     axes.set_xlim(frequency.min() / 1.05, frequency.max() * 1.05)
-    axes.xaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 40]))
+    axes.xaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 40, 100]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda f, _: f"{f:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
