@@ -12,6 +12,7 @@ from axisight.reproduce.chapter7_machine import Machine, small_signal_response
 from axisight.reproduce.chapter7_measures import (
     COUPLING,
     distance_db,
+    level_db,
     log_mean,
     middle,
     names,
@@ -207,9 +208,11 @@ def _low_frequencies(context: Context) -> tuple[Claim, ...]:
         for x in (taken.responses()[0, 0], taken.averaged()[0])
     )
     truth = at_sinusoids(linear(context))[LOW_SINUSOIDS]
-    sines = middle(distance_db(sinusoids(context)[LOW_SINUSOIDS], truth), COUPLING)
     average = at_sinusoids(log_mean(different(context)))[LOW_SINUSOIDS]
-    multis = middle(distance_db(average, truth), COUPLING)
+    sines, multis = (
+        middle(np.abs(level_db(x / truth))[:, COUPLING])
+        for x in (sinusoids(context)[LOW_SINUSOIDS], average)
+    )
     raised, flat = low[LOW_POWER][COUPLING], low[STANDARD][COUPLING]
     smaller = raised < flat
     return (
