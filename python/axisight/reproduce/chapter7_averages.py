@@ -23,6 +23,7 @@ from axisight.reproduce.chapter7_sets import (
     STANDARD,
     different,
     linear_curve,
+    many,
     repeats,
 )
 from axisight.reproduce.chapter7_setting import (
@@ -45,11 +46,6 @@ def same(context: Context) -> Complex:
     """
     starts = periods(1 if context.quick else PERIODS)
     return records(context, STANDARD, (0,) * repeats(context), starts).averaged()
-
-
-def many(context: Context) -> Complex:
-    """Return estimates of twenty realizations, (realization, n_freq, 3, 3)."""
-    return different(context, count=6 if context.quick else 20)
 
 
 @item("figure-7.8")

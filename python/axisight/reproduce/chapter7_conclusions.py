@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from axisight.reproduce.chapter7_averages import many, same
+from axisight.reproduce.chapter7_averages import same
 from axisight.reproduce.chapter7_landmarks import landmarks, triple
 from axisight.reproduce.chapter7_machine import Machine, small_signal_response
 from axisight.reproduce.chapter7_measures import (
@@ -26,6 +26,7 @@ from axisight.reproduce.chapter7_sets import (
     different,
     four_periods,
     linear,
+    many,
     repeats,
 )
 from axisight.reproduce.chapter7_setting import Design
@@ -88,7 +89,7 @@ def _handling(context: Context) -> tuple[Claim, ...]:
     single = different(context)
     error = {d: _error(context, different(context, d)).mean(axis=0) for d in (STANDARD, NO_SQUARE)}
     worse = error[NO_SQUARE] > error[STANDARD]
-    marks = landmarks({"normal": single, "half": different(context, HALF)})
+    marks = landmarks({"normal": many(context), "half": many(context, HALF)})
     moved = {
         c: np.subtract(triple(marks, "half", c), triple(marks, "normal", c))
         for c in ("notch_hz", "peak_hz")

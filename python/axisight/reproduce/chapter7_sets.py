@@ -45,6 +45,11 @@ def different(
     return taken.responses()[:, 0]
 
 
+def many(context: Context, design: Design = STANDARD, machine: Machine = REAL) -> Complex:
+    """Return estimates of twenty realizations, (realization, n_freq, 3, 3)."""
+    return different(context, design, machine, 6 if context.quick else 20)
+
+
 def linear(context: Context) -> Complex:
     """Return the response of the machine without dry friction, (n_freq, 3, 3)."""
     return context.shared("chapter7 linear", lambda: small_signal_response(context, FREQUENCY_HZ))

@@ -31,6 +31,7 @@ from axisight.reproduce.chapter7_sets import (
     four_periods,
     linear,
     linear_curve,
+    many,
     repeats,
 )
 from axisight.reproduce.chapter7_setting import PEAK_RAD_S, Design, broadband, references
@@ -142,10 +143,10 @@ def amplitude(context: Context) -> Item:
     drawn = _two("figure-7.5", title, context, *_first(context, HALF), labels)
     marks = landmarks(
         {
-            "normal": different(context),
-            "half": different(context, HALF),
-            "normal, linear springs": different(context, machine=_NO_CUBE),
-            "half, linear springs": different(context, HALF, _NO_CUBE),
+            "normal": many(context),
+            "half": many(context, HALF),
+            "normal, linear springs": many(context, machine=_NO_CUBE),
+            "half, linear springs": many(context, HALF, _NO_CUBE),
         }
     )
     full, half = triple(marks, "normal", "notch_hz"), triple(marks, "half", "notch_hz")
@@ -204,7 +205,7 @@ def permutation(context: Context) -> Item:
     title = "Magnitude of the estimate for the permutation matrices T1 and T2"
     drawn = _two("figure-7.6", title, context, *_first(context, T2), ["T1", "T2"])
     sets = {"T1": different(context), "T2": different(context, T2)}
-    marks = landmarks(sets)
+    marks = landmarks({"T1": many(context), "T2": many(context, T2)})
     one, two = triple(marks, "T1", "notch_hz"), triple(marks, "T2", "notch_hz")
     each = [[notch_hz(FREQUENCY_HZ, g[:, i, i], NOTCH_HZ[i]) for g in sets["T1"]] for i in (0, 2)]
     alone = np.std(each, axis=1, ddof=1)
