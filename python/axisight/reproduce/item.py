@@ -56,6 +56,11 @@ Make = Callable[[Context], Item]
 
 # Importing a module registers its items.
 _MODULES: tuple[str, ...] = (
+    "chapter7_periods",
+    "chapter7_signals",
+    "chapter7_averages",
+    "chapter7_sinusoid",
+    "chapter7_conclusions",
     "chapter8_tables",
     "chapter8_figures",
     "chapter8_averages",
