@@ -27,7 +27,11 @@ __all__ = [
     "failure_kinds",
     "fit_inverse_dynamics",
     "fit_simulation",
+    "invert_matrices",
     "measurement_noise",
+    "multivariable",
+    "record_spectra",
+    "right_divide_matrices",
     "simulate",
     "simulate_batch",
 ]
