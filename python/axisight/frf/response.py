@@ -9,9 +9,12 @@ response           frequency_hz, output, input   G(i w), complex [output unit / 
 variance           frequency_hz, output, input   E|dG|^2 of the estimate: noise and
                                                  nonlinear distortion; NaN where unknown
 noise_variance     the same, optional            the share of the noise in it
-condition          frequency_hz                  condition number of U, NaN if not used
+condition          frequency_hz                  condition number of U, rows scaled to unit norm;
+                                                 NaN if not used
 flag               frequency_hz                  see :class:`Flag`
 coherence          frequency_hz, output          multiple coherence, optional
+degrees_of_freedom frequency_hz, output, input   complex, of ``variance``; optional, used by
+                                                 :func:`axisight.frf.confidence_radius`
 ================== ============================= ==========================================
 
 With a circular complex normal error the band of probability p about G is a disc of radius
