@@ -8,9 +8,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// `L` independent values; arithmetic is elementwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C)]
-#[cfg_attr(not(target_feature = "avx512dq"), repr(align(32)))]
-#[cfg_attr(target_feature = "avx512dq", repr(align(64)))]
+#[repr(C, align(32))]
 pub struct Lanes<const L: usize>(pub [f64; L]);
 
 impl<const L: usize> Lanes<L> {

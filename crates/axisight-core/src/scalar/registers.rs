@@ -1,44 +1,29 @@
-//! Elementwise arithmetic on arrays in vector registers, as wide as the target has them.
+//! Elementwise arithmetic on arrays in 256-bit registers. Registers of 512 bits were tried: runs
+//! in lock-step gained a tenth.
 //!
 //! Left to itself the compiler turns only some loops over lanes into vector
 //! instructions, and moves the rest through memory.
 
-/// Apply `$packed` to as many groups of `$width` numbers as are left.
-#[cfg(target_arch = "x86_64")]
-macro_rules! groups {
-    ($feature:literal, $width:literal, $load:ident, $store:ident, $packed:expr,
-     $out:ident, $first:ident, $($argument:ident),+) => {
-        #[cfg(all(target_feature = $feature, target_feature = "fma"))]
-        while $first + $width <= $out.len() {
-            use std::arch::x86_64::{$load, $store};
-            // SAFETY: entries `first` to `first + width - 1` lie inside arrays of `L` numbers,
-            // the unaligned instructions take any address, and the features are compiled in.
-            #[allow(unsafe_code)]
-            unsafe {
-                $(let $argument = $load($argument.as_ptr().add($first));)+
-                $store($out.as_mut_ptr().add($first), ($packed)($($argument),+));
-            }
-            $first += $width;
-        }
-    };
-}
-
-/// One operation on `[f64; L]` from the instructions for eight and four of them and the
+/// One operation on `[f64; L]` from the instruction for four of them and the
 /// plain operation for the rest.
 macro_rules! operation {
-    ($(#[$doc:meta])* $name:ident ( $($argument:ident),+ ),
-     $eight:expr, $four:expr, $plain:expr) => {
+    ($(#[$doc:meta])* $name:ident ( $($argument:ident),+ ), $packed:expr, $plain:expr) => {
         $(#[$doc])*
         #[inline(always)]
         pub(super) fn $name<const L: usize>($($argument: [f64; L]),+) -> [f64; L] {
             let mut out = [0.0; L];
             let mut first = 0;
-            #[cfg(target_arch = "x86_64")]
-            {
-                groups!("avx512dq", 8, _mm512_loadu_pd, _mm512_storeu_pd, $eight,
-                        out, first, $($argument),+);
-                groups!("avx2", 4, _mm256_loadu_pd, _mm256_storeu_pd, $four,
-                        out, first, $($argument),+);
+            #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
+            while first + 4 <= L {
+                use std::arch::x86_64::{_mm256_loadu_pd, _mm256_storeu_pd};
+                // SAFETY: entries `first` to `first + 3` lie inside arrays of `L` numbers, the
+                // unaligned instructions take any address, and the features are compiled in.
+                #[allow(unsafe_code)]
+                unsafe {
+                    $(let $argument = _mm256_loadu_pd($argument.as_ptr().add(first));)+
+                    _mm256_storeu_pd(out.as_mut_ptr().add(first), ($packed)($($argument),+));
+                }
+                first += 4;
             }
             while first < L {
                 out[first] = ($plain)($($argument[first]),+);
@@ -56,96 +41,54 @@ use std::arch::x86_64::{
     _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_round_pd,
     _mm256_set1_pd, _mm256_setzero_pd, _mm256_sqrt_pd, _mm256_sub_pd, _mm256_xor_pd,
 };
-#[cfg(all(target_arch = "x86_64", target_feature = "avx512dq"))]
-use std::arch::x86_64::{
-    _mm512_add_pd, _mm512_andnot_pd, _mm512_cmp_pd_mask, _mm512_div_pd, _mm512_fmadd_pd,
-    _mm512_fnmadd_pd, _mm512_mask_blend_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_roundscale_pd,
-    _mm512_set1_pd, _mm512_setzero_pd, _mm512_sqrt_pd, _mm512_sub_pd, _mm512_xor_pd,
-};
 
-operation!(
-    add(a, b),
-    |a, b| _mm512_add_pd(a, b),
-    |a, b| _mm256_add_pd(a, b),
-    |a, b| a + b
-);
-operation!(
-    sub(a, b),
-    |a, b| _mm512_sub_pd(a, b),
-    |a, b| _mm256_sub_pd(a, b),
-    |a, b| a - b
-);
-operation!(
-    mul(a, b),
-    |a, b| _mm512_mul_pd(a, b),
-    |a, b| _mm256_mul_pd(a, b),
-    |a, b| a * b
-);
-operation!(
-    div(a, b),
-    |a, b| _mm512_div_pd(a, b),
-    |a, b| _mm256_div_pd(a, b),
-    |a, b| a / b
-);
+operation!(add(a, b), |a, b| _mm256_add_pd(a, b), |a, b| a + b);
+operation!(sub(a, b), |a, b| _mm256_sub_pd(a, b), |a, b| a - b);
+operation!(mul(a, b), |a, b| _mm256_mul_pd(a, b), |a, b| a * b);
+operation!(div(a, b), |a, b| _mm256_div_pd(a, b), |a, b| a / b);
 operation!(
     /// `a * b + c` with one rounding.
     fma(a, b, c),
-    |a, b, c| _mm512_fmadd_pd(a, b, c),
     |a, b, c| _mm256_fmadd_pd(a, b, c),
     |a: f64, b, c| a.mul_add(b, c)
 );
 operation!(
     /// `c - a * b` with one rounding.
     fnma(a, b, c),
-    |a, b, c| _mm512_fnmadd_pd(a, b, c),
     |a, b, c| _mm256_fnmadd_pd(a, b, c),
     |a: f64, b, c| (-a).mul_add(b, c)
 );
 operation!(
     magnitude(a),
-    |a| _mm512_andnot_pd(_mm512_set1_pd(-0.0), a),
     |a| _mm256_andnot_pd(_mm256_set1_pd(-0.0), a),
     |a: f64| a.abs()
 );
 operation!(
     /// The larger; `b` where either is NaN.
     larger(a, b),
-    |a, b| _mm512_max_pd(a, b),
     |a, b| _mm256_max_pd(a, b),
     |a: f64, b: f64| if a > b { a } else { b }
 );
 operation!(
     neg(a),
-    |a| _mm512_xor_pd(a, _mm512_set1_pd(-0.0)),
     |a| _mm256_xor_pd(a, _mm256_set1_pd(-0.0)),
     |a: f64| -a
 );
-operation!(
-    sqrt(a),
-    |a| _mm512_sqrt_pd(a),
-    |a| _mm256_sqrt_pd(a),
-    |a: f64| a.sqrt()
-);
+operation!(sqrt(a), |a| _mm256_sqrt_pd(a), |a: f64| a.sqrt());
 operation!(
     /// The nearest whole number, ties to even.
     round(a),
-    |a| _mm512_roundscale_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
     |a| _mm256_round_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a),
     |a: f64| a.round_ties_even()
 );
 operation!(
     floor(a),
-    |a| _mm512_roundscale_pd::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a),
     |a| _mm256_round_pd::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a),
     |a: f64| a.floor()
 );
 operation!(
     /// `a` where `x > 0`, `b` elsewhere, also where `x` is NaN.
     if_positive(x, a, b),
-    |x, a, b| {
-        let positive = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd());
-        _mm512_mask_blend_pd(positive, b, a)
-    },
     |x, a, b| {
         let positive: __m256d = _mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd());
         _mm256_blendv_pd(b, a, positive)
