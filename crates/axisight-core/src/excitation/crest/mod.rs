@@ -45,6 +45,8 @@ impl CrestProblem {
         snow: &[usize],
         snow_limit: f64,
     ) -> Result<Self, ExcitationError> {
+        /// A grid of 2^31 samples is past what anybody can wait for.
+        const MOST: usize = 1 << 24;
         if lines.is_empty() || lines.len() != amplitude.len() {
             let expected = format!("{} numbers, one per line, at least one", lines.len());
             return Err(ExcitationError::new("amplitude", expected, amplitude.len()));
@@ -61,8 +63,6 @@ impl CrestProblem {
                 "a zero or a repetition",
             ));
         }
-        /// A grid of 2^31 samples is past what anybody can wait for.
-        const MOST: usize = 1 << 24;
         if let Some(high) = sorted.last().filter(|k| **k > MOST) {
             return Err(ExcitationError::new(
                 "lines",
@@ -151,7 +151,11 @@ impl FineGrid {
         let n = 2 * pairs.len();
         let sample = |i: usize| {
             let pair = pairs[(i % n) / 2];
-            if i % 2 == 0 { pair.re } else { pair.im }
+            if i.is_multiple_of(2) {
+                pair.re
+            } else {
+                pair.im
+            }
         };
         let mut peak = highest;
         // Lower samples cannot grow past the highest by what lies between them.
