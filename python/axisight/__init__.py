@@ -1,6 +1,6 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
-from axisight import montecarlo
+from axisight import excitation, frf, montecarlo, records
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -55,7 +55,9 @@ __all__ = [
     "effect_info",
     "effect_parameter",
     "effect_table",
+    "excitation",
     "fit",
+    "frf",
     "load_robot",
     "montecarlo",
     "plot_gap_map",
@@ -65,6 +67,7 @@ __all__ = [
     "plot_simulation",
     "read_case",
     "read_log",
+    "records",
     "robot_parameter",
     "robot_parameters",
     "simulate",

@@ -13,10 +13,11 @@ import pytest
 import axisight
 from axisight import _core
 
-PUBLIC = sorted(getattr(axisight, "__all__", ()))
+MODULES = (axisight, axisight.excitation, axisight.frf, axisight.montecarlo, axisight.records)
+PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}
 # The word says it all.
 SELF_EVIDENT = {"name", "path"}
-CLASSES = [name for name in PUBLIC if inspect.isclass(getattr(axisight, name))]
+CLASSES = [thing.__name__ for thing in PUBLIC.values() if inspect.isclass(thing)]
 
 
 def load_script(path: Path) -> ModuleType:
@@ -74,21 +75,21 @@ def test_links_between_pages_lead_somewhere(repository: Path) -> None:
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_public_name_exists_and_has_a_docstring(name: str) -> None:
-    thing = getattr(axisight, name)
+    thing = PUBLIC[name]
     if inspect.isclass(thing) or inspect.isroutine(thing):
         own = thing.__dict__.get("__doc__") if inspect.isclass(thing) else thing.__doc__
-        assert own and own.strip(), f"axisight.{name} has no docstring"
+        assert own and own.strip(), f"{name} has no docstring"
         # dataclass writes its signature as docstring when there is none.
-        assert not own.startswith(f"{name}("), f"axisight.{name} has no docstring of its own"
+        assert not own.startswith(f"{thing.__name__}("), f"{name} has no docstring of its own"
 
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_public_function_documents_its_parameters(name: str) -> None:
-    thing = getattr(axisight, name)
+    thing = PUBLIC[name]
     if not inspect.isroutine(thing):
         return
     wanted = parameters(thing)
     text = inspect.getdoc(thing) or ""
     # A sole argument is what the summary is about.
     missing = [p for p in wanted if not mentions(text, p)] if len(wanted) > 1 else []
-    assert not missing, f"axisight.{name} does not document {', '.join(missing)}"
+    assert not missing, f"{name} does not document {', '.join(missing)}"

@@ -187,7 +187,9 @@ def oracle() -> dict[Lugre, tuple[Array, Array]]:
     return {f: closed_loop(TURNING, f, 1e-9) for f in (STIFF, SOFT)}
 
 
-CASES = [(STIFF, m, 1e-5) for m in IMPLICIT] + [(SOFT, m, 1e-7) for m in (*CONTROLLED, "rk4", "rkn4")]
+CASES = [(STIFF, m, 1e-5) for m in IMPLICIT] + [
+    (SOFT, m, 1e-7) for m in (*CONTROLLED, "rk4", "rkn4")
+]
 
 
 @pytest.mark.parametrize(("parameters", "method", "tolerance"), CASES)

@@ -111,7 +111,10 @@ class Excited:
 
 
 def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign:
-    """Return the checked design; raises InputError naming every field that is wrong."""
+    """Return the checked design in ``data``, the content of a TOML file.
+
+    Raises InputError naming every field that is wrong, after ``where`` it stands.
+    """
     try:
         return ExcitationDesign(**data)
     except ValidationError as error:

@@ -24,6 +24,7 @@ def line_set(
 ) -> tuple[Lines, Lines]:
     """Return the excited lines and the detection lines of a band, as multiples of 1/period.
 
+    ``sample_time_s`` [s] divides the period and sets the Nyquist frequency.
     ``grid`` is ``"full"``; ``"odd"`` harmonics, which keep even distortion off the excited
     lines; ``"odd_odd"``, k = 1, 5, 9, ..., which leaves odd lines free as well; or
     ``"odd_random"``: of every ``group`` successive odd lines one is left out at random, as a

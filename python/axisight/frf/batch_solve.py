@@ -36,7 +36,7 @@ def right_divide(
 ) -> tuple[Complex, NDArray[np.bool_]]:
     """Solve G U = Y, that is ``Y U^-1``, for many small complex matrices.
 
-    ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes. Returns G,
+    ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes; ``threads`` as for `invert`. Returns G,
     (..., p, n), and flags as `invert`. Raises InputError for shapes that do not fit.
     """
     y = np.ascontiguousarray(y, np.complex128)

@@ -27,8 +27,8 @@ def etfe(
 
     Wernholt (2004), (3.45); with ``bandwidth_hz`` smoothed over the lines by (3.46) with a
     Hann window of that half width. ``weighting`` "input_power" weighs each line with |U|^2
-    as well, which makes it spectral analysis (3.49). Other arguments, Dataset and the
-    meaning of the variances as for `mfrf` and `arithmetic_mean`.
+    as well, which makes it spectral analysis (3.49). ``quantity``, ``remove_drift``,
+    ``threads``, Dataset and the meaning of the variances as for `mfrf` and `arithmetic_mean`.
 
     Bias: exact for periodic records without noise. Without smoothing the variance does not
     fall with the length of a record that is not periodic. Smoothing flattens resonances, see

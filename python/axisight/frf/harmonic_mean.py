@@ -21,8 +21,8 @@ def harmonic_mean(
 ) -> xr.Dataset:
     """Average the inverse responses: G is the inverse of the mean of the matrices G_j^-1.
 
-    Wernholt and Moberg (2008). Arguments, Dataset and errors as for `arithmetic_mean`; the
-    variance is that of the mean inverse, carried over by dG = -G d(G^-1) G. Lines where G_j
+    Wernholt and Moberg (2008). ``data``, ``quantity``, ``remove_drift``, ``threads``, Dataset and
+    errors as for `arithmetic_mean`; the variance is that of the mean inverse, carried over by dG = -G d(G^-1) G. Lines where G_j
     is singular are lost for that realization.
 
     Bias: exact without noise and distortion. G^-1 = U Y^-1 divides by the output, so that

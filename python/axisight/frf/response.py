@@ -68,6 +68,12 @@ def frequency_response(
 
     frequency_hz
         Frequencies [Hz], (n_freq,), ascending.
+    response
+        G, complex; ``variance`` and ``noise_variance`` are real, of the same shape.
+    estimator
+        Its name, for the attributes.
+    input_unit, output_unit
+        Units of the channels, for labels.
     condition, flag, coherence
         (n_freq,), (n_freq,) and (n_freq, n_out).
     attrs

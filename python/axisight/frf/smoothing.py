@@ -41,7 +41,7 @@ def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
 
 
 def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = None) -> xr.Dataset:
-    """Smooth a frequency response over its lines, Wernholt (2004), (3.46).
+    """Smooth the response of ``dataset`` over its lines, Wernholt (2004), (3.46).
 
         G(w) = sum_k alpha_k(w) G(w_k) / sum_k alpha_k(w)
 
