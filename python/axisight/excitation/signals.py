@@ -96,9 +96,9 @@ def chirp(
     """Return ``A sin(2 pi f1 t + pi (f2 - f1) t^2 / T0 + phi)``, Wernholt (2004), (5.4).
 
     T0 is ``period_s`` [s], a whole number of samples of ``sample_time_s`` [s]; A is
-    ``amplitude``. ``band_hz`` is (f1, f2), both multiples of 1/T0 so that the repeated signal has no jump;
-    f1 > f2 sweeps down. A small mean remains that depends on ``phase_rad``. The lines are
-    those of the band. Raises InputError naming the field.
+    ``amplitude``. ``band_hz`` is (f1, f2), both multiples of 1/T0 so that the repeated
+    signal has no jump; f1 > f2 sweeps down. A small mean remains that depends on
+    ``phase_rad``. The lines are those of the band. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     ends = [positive("band_hz", f) * period_s for f in band_hz]
@@ -132,9 +132,10 @@ def chirp(
 
 
 def triangle(period_s: float, sample_time_s: float, *, amplitude: float = 1.0) -> PeriodicSignal:
-    """Return a symmetric triangle wave that starts at zero, rising, to plus and minus ``amplitude``.
+    """Return a symmetric triangle wave of height ``amplitude`` that starts at zero, rising.
 
-    ``period_s`` must be a multiple of four samples of ``sample_time_s`` [s], so that the tips are sampled.
+    ``period_s`` must be a multiple of four samples of ``sample_time_s`` [s], so that the
+    tips are sampled.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     if n % 4:
@@ -152,9 +153,10 @@ def square(
 ) -> PeriodicSignal:
     """Return a square wave smoothed by a triangular window, Wernholt (2004), (7.3).
 
-    It is plus and minus ``amplitude`` with period ``period_s`` [s], an even number of samples of
-    ``sample_time_s`` [s], and high in the first half; ``smoothing_samples`` is l, the half length of the window.
-    As a velocity reference it keeps motors away from standstill. Raises InputError.
+    It is plus and minus ``amplitude`` with period ``period_s`` [s], an even number of
+    samples of ``sample_time_s`` [s], and high in the first half; ``smoothing_samples`` is
+    l, the half length of the window. As a velocity reference it keeps motors away from
+    standstill. Raises InputError.
     """
     period = _core.square_period(
         positive("amplitude", amplitude),
@@ -176,7 +178,8 @@ def prbs(
 ) -> PeriodicSignal:
     """Return a maximum-length binary sequence of ``2^bits - 1`` values plus or minus A.
 
-    A is ``amplitude``. Each value is held for ``hold`` samples of ``sample_time_s`` [s]. Its mean is ``A / (2^bits - 1)`` in size, its
+    A is ``amplitude``. Each value is held for ``hold`` samples of ``sample_time_s`` [s]. Its
+    mean is ``A / (2^bits - 1)`` in size, its
     autocorrelation at any other shift ``-A^2 / (2^bits - 1)``. ``bits`` 2 to 24.
     """
     if not 2 <= whole("bits", bits) <= 24:
@@ -202,11 +205,11 @@ def discrete_interval_binary(
     """Return a binary signal with most of its power on chosen lines.
 
     The signs of a multisine with amplitudes ``weight`` are taken, then the phases of those,
-    until the signs repeat themselves (Van den Bos and Krol 1979); of ``starts`` random starts
-    the one whose weighted sum of amplitudes on the lines is largest is kept. Signs change
-    every ``hold`` samples of ``sample_time_s`` [s] only; ``period_s`` [s] is a whole number of
-    holds. Start i is a function of (``seed``, i). ``settings["power_share"]`` is the share of the power on the
-    lines. Raises InputError naming the field.
+    until the signs repeat themselves (Van den Bos and Krol 1979); of ``starts`` random
+    starts the one whose weighted sum of amplitudes on the lines is largest is kept. Signs
+    change every ``hold`` samples of ``sample_time_s`` [s] only; ``period_s`` [s] is a whole
+    number of holds. Start i is a function of (``seed``, i). ``settings["power_share"]`` is
+    the share of the power on the lines. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     if n % whole("hold", hold):
@@ -288,9 +291,10 @@ def stepped_sine(
 ) -> SteppedSine:
     """Return single sines at ``frequency_hz``, multiples of 1/``period_s``, one after the other.
 
-    They are sampled at ``sample_time_s`` [s]. Each lasts ``waiting_periods`` for the transient and ``periods`` to be used, all of
-    ``period_s``; ``amplitude`` is one number or one per frequency. Every step starts at phase
-    zero, so there is no jump. Raises InputError naming the field.
+    They are sampled at ``sample_time_s`` [s]. Each lasts ``waiting_periods`` for the
+    transient and ``periods`` to be used, all of ``period_s``; ``amplitude`` is one number
+    or one per frequency. Every step starts at phase zero, so there is no jump. Raises
+    InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     exact = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)) * period_s

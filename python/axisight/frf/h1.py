@@ -36,9 +36,10 @@ def h1(
     S_yu is the sum of Y U^H and S_uu that of U U^H. Records need not be synchronized.
     Pintelon and Schoukens (2001), section 2.6; Bendat and Piersol, Random Data.
 
-    ``quantity``, ``remove_drift`` and ``threads`` as for `mfrf`. The Dataset has the multiple ``coherence`` of each output as
-    well. ``variance``: from what each experiment leaves of Y - G U, noise and distortion
-    together, with more experiments than inputs; else from the periods, noise only.
+    ``quantity``, ``remove_drift`` and ``threads`` as for `mfrf`. The Dataset has the
+    multiple ``coherence`` of each output as well. ``variance``: from what each experiment
+    leaves of Y - G U, noise and distortion together, with more experiments than inputs;
+    else from the periods, noise only.
 
     Bias: noise on U makes the response too small, by the noise-to-signal power ratio of U;
     averaging does not help. In closed loop noise fed back pulls G towards minus the inverse
@@ -59,8 +60,8 @@ def h2(
 ) -> xr.Dataset:
     """Estimate G = S_yy S_uy^-1, for as many outputs as inputs.
 
-    ``quantity``, ``remove_drift``, ``threads``, Dataset and errors as for `h1`; raises InputError too where the numbers of
-    inputs and outputs differ.
+    ``quantity``, ``remove_drift``, ``threads``, Dataset and errors as for `h1`; raises
+    InputError too where the numbers of inputs and outputs differ.
 
     Bias: noise on Y makes the response too large, by the noise-to-signal power ratio of Y;
     noise on U averages out. Exact without noise and distortion.

@@ -21,9 +21,10 @@ def harmonic_mean(
 ) -> xr.Dataset:
     """Average the inverse responses: G is the inverse of the mean of the matrices G_j^-1.
 
-    Wernholt and Moberg (2008). ``data``, ``quantity``, ``remove_drift``, ``threads``, Dataset and
-    errors as for `arithmetic_mean`; the variance is that of the mean inverse, carried over by dG = -G d(G^-1) G. Lines where G_j
-    is singular are lost for that realization.
+    Wernholt and Moberg (2008). ``data``, ``quantity``, ``remove_drift``, ``threads``,
+    Dataset and errors as for `arithmetic_mean`; the variance is that of the mean inverse,
+    carried over by dG = -G d(G^-1) G. Lines where G_j is singular are lost for that
+    realization.
 
     Bias: exact without noise and distortion. G^-1 = U Y^-1 divides by the output, so that
     noise on U averages out and noise on Y biases: the choice in closed loop where the

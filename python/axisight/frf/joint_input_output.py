@@ -24,7 +24,8 @@ def joint_input_output(
     many experiments, where noise that does not come from R averages out of both. Wernholt
     (2004), section 3.4.2; Pintelon and Schoukens (2001), section 2.6.
 
-    ``quantity``, ``remove_drift``, ``threads`` and the Dataset as for `mfrf`. ``condition`` is that of U.
+    ``quantity``, ``remove_drift``, ``threads`` and the Dataset as for `mfrf`. ``condition``
+    is that of U.
 
     Bias: none from noise as the number of realizations of R grows, also in closed loop. For
     a nonlinear robot it tends to the quotient of two best linear approximations, which is
