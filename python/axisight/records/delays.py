@@ -61,7 +61,8 @@ def estimate_delay(
     n = len(signal)
     cross = (np.fft.rfft(signal) * np.fft.rfft(excitation).conj())[lines]
     weight = np.abs(cross)
-    if not weight.sum() > 0:
+    energy = n * float(np.linalg.norm(signal) * np.linalg.norm(excitation))
+    if not weight.sum() > 1e-12 * energy:
         raise InputError("excitation: expected amplitude at the excited lines, got none")
     spectrum = np.zeros(n // 2 + 1, complex)
     spectrum[lines] = cross

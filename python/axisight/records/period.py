@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend, fftconvolve
+from scipy.signal import fftconvolve
 
 from axisight.errors import InputError
 from axisight.records.lines import repeating_lines
@@ -66,40 +66,47 @@ def find_period(signal: Real) -> Period:
     greatest common divisor of the lines that stand out of the noise: a multiple of the period
     is never taken for it, nor is half of it where odd lines are weak.
 
+    The signal must not drift: a reference or a torque, not a position.
+
     Raises InputError if the signal is constant, does not repeat (autocorrelation below 0.5), or
     repeats after a number of samples that is not whole.
     """
     x = np.atleast_2d(np.asarray(signal, float).T)
-    x = detrend(x, axis=1)
+    x = x - x.mean(axis=1, keepdims=True)
     scale = np.sqrt(np.mean(x * x, axis=1))
     active = scale > 1e-6 * max(scale.max(), np.finfo(float).tiny)
     if x.shape[1] < 8 or not scale.max() > 1e-12 * np.abs(signal).max():
         raise InputError("signal: expected one that moves, to find its period, got a constant")
-    # One channel after the other: each repeats with the common period.
     rho = np.mean([autocorrelation(row) for row in x[active]], axis=0)
-    lag = _best_lag(rho)
-    rough = _straight_line(rho, lag)
-    _expect_whole(rough)
-    refined = _straight_line(rho, _whole_period(x[active], rough.n_samples))
-    _expect_whole(refined)
-    return refined
+    candidates = [_straight_line(rho, lag) for lag in _good_lags(rho)]
+    rough = next((c for c in candidates if _is_whole(c)), candidates[0])
+    if _is_whole(rough):
+        rough = _straight_line(rho, _whole_period(x[active], rough.n_samples))
+    if not _is_whole(rough):
+        raise InputError(not_whole(rough.samples))
+    return rough
 
 
-def _best_lag(rho: Real) -> int:
-    """The shortest lag at which the signal repeats about as well as it ever does."""
+def _good_lags(rho: Real) -> list[int]:
+    """The lags, ascending, at which the signal repeats about as well as it ever does."""
     longest = len(rho) // 2
     reach = rho[: longest + 2]
     negative = np.flatnonzero(reach < 0)
     peaks = 1 + np.flatnonzero((reach[1:-1] > reach[:-2]) & (reach[1:-1] >= reach[2:]))
     peaks = peaks[peaks > negative[0]] if negative.size else peaks[:0]
-    best = float(reach[peaks].max()) if peaks.size else 0.0
+    # Heights between the samples, or a period of so many and a half would look worse.
+    left, mid, right = reach[peaks - 1], reach[peaks], reach[peaks + 1]
+    bend = np.minimum(left - 2 * mid + right, -1e-15)
+    heights = mid - np.clip((left - right) ** 2 / (8 * bend), -0.5, 0)
+    best = float(heights.max()) if peaks.size else 0.0
     if best < _LEAST_REPETITION:
         raise InputError(
             "signal: expected at least two periods, got none that repeats: the best "
             f"autocorrelation is {best:.2f}, below {_LEAST_REPETITION}; record more periods or "
             "give period_s"
         )
-    return int(peaks[1 - reach[peaks] <= 2 * (1 - best) + 1e-9][0])
+    good = peaks[best - heights <= 3 * abs(1 - best) + 1e-4]
+    return [int(lag) for lag in good]
 
 
 def _straight_line(rho: Real, lag: int) -> Period:
@@ -107,7 +114,8 @@ def _straight_line(rho: Real, lag: int) -> Period:
     n = len(rho)
     orders: list[int] = []
     places: list[float] = []
-    slope, error = float(lag), 0.0
+    errors: list[float] = []
+    slope = float(lag)
     while not orders or (len(orders) + 1) * slope < 0.75 * n:
         m = len(orders) + 1
         middle = round(m * slope)
@@ -115,22 +123,23 @@ def _straight_line(rho: Real, lag: int) -> Period:
         top = int(reach[np.argmax(rho[reach])])
         left, mid, right = rho[top - 1 : top + 2]
         bend = min(left - 2 * mid + right, -1e-15)
-        if m == 1:  # as a delay between two noisy copies, and what the parabola is off by
-            error = 0.01 + float(np.sqrt(2 * max(1 - mid, 0.0) / (-bend * (n - top))))
         orders.append(m)
         places.append(top + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)))
+        # As a delay between two noisy copies, and what the parabola is off by
+        errors.append(0.01 + float(np.sqrt(2 * max(1 - mid, 0.0) / (-bend * (n - top)))))
         slope = float(np.dot(orders, places) / np.dot(orders, orders))
+    order, place = np.array(orders, float), np.array(places)
+    squares = float(order @ order)
+    variance = float(order**2 @ np.square(errors)) / squares**2
     if len(orders) > 1:
-        residual = np.array(places) - slope * np.array(orders)
-        spread = residual @ residual / (len(orders) - 1)
-        error = float(np.sqrt(spread / np.dot(orders, orders)))
-    return Period(slope, error, float(rho[round(slope)]), int((n + 0.5) // slope))
+        residual = place - slope * order
+        variance = max(variance, float(residual @ residual) / (len(order) - 1) / squares)
+    return Period(slope, math.sqrt(variance), float(rho[round(slope)]), int((n + 0.5) // slope))
 
 
-def _expect_whole(found: Period) -> None:
+def _is_whole(found: Period) -> bool:
     off = abs(found.samples - found.n_samples)
-    if off > 4 * found.standard_error and off * found.n_periods > _INTEGER_TOLERANCE:
-        raise InputError(not_whole(found.samples))
+    return off <= 4 * found.standard_error or off * found.n_periods <= _INTEGER_TOLERANCE
 
 
 def not_whole(samples: float) -> str:
@@ -144,7 +153,7 @@ def not_whole(samples: float) -> str:
 
 def _whole_period(x: Real, lag: int) -> int:
     """The period: a lag at which ``x`` repeats, over the common divisor of the lines in it."""
-    n = x.shape[1]
+    n = int(x.shape[1])
     # The longest block of which there are two; its lines are the finest.
     block = max(1, n // 2 // lag) * lag
     count = n // block

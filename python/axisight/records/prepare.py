@@ -25,6 +25,7 @@ Lines = NDArray[np.int64]
 
 _DRIFT_LIMIT = 0.01  # samples over the whole record that rounding of a given period may cost
 _CLEAR_MARGIN_DB = 6.0
+_DRIFT_WORTH_SAYING = 1e-3  # of the RMS, a period
 
 
 @dataclass(frozen=True)
@@ -124,11 +125,10 @@ def prepare_records(
         cut = _cut(runs, starts, n)
         findings += _delay_findings(delays)
     findings += check_clipping(runs, start)
-    if drift:
-        cut = [_without_drift(c, e, findings) for e, c in enumerate(cut, 1)]
     wait = math.ceil(waiting_time_s / (n * sample_time_s) - 1e-9)
     last = int(np.max([*excited, *detection_lines]))
-    dropped = keep_steady(cut, wait, drop_periods, last, significance, findings)
+    judged = [_without_drift(c) for c in cut] if drift else cut
+    dropped = keep_steady(judged, wait, drop_periods, last, significance, findings)
     counts = [len(c["input"]) - dropped for c in cut]
     if min(counts) < 1:
         raise InputError(
@@ -139,6 +139,9 @@ def prepare_records(
         message = f"whole periods {counts} differ; the last {min(counts)} of each were kept"
         findings.append(RecordFinding(FindingKind.UNEQUAL, message))
     kept = [{k: v[-min(counts) :] for k, v in c.items()} for c in cut]
+    if drift:  # once more: now without the transient
+        findings += _drift_findings(kept)
+        kept = [_without_drift(c) for c in kept]
     if delays:
         kept = [
             {k: advance(v, d.samples - round(d.samples)) for k, v in c.items()}
@@ -309,21 +312,26 @@ def _delay_findings(delays: list[Delay]) -> list[RecordFinding]:
     ]
 
 
-def _without_drift(signals: Signals, e: int, findings: list[RecordFinding]) -> Signals:
+def _without_drift(signals: Signals) -> Signals:
     output = signals["output"]
-    if len(output) < 2:
-        return signals
-    slope = drift_per_period(output)
-    swing = output.std(axis=1).mean(axis=0)
-    for c in np.flatnonzero(np.abs(slope) > 1e-3 * swing):
-        message = f"linear drift of {slope[c]:.3g} a period removed ({slope[c] / swing[c]:.1%} of the RMS)"
-        findings.append(
-            RecordFinding(
-                FindingKind.DRIFT,
-                message,
-                experiment=e,
-                signal=f"output {c + 1}",
-                value=float(slope[c]),
+    return signals if len(output) < 2 else {**signals, "output": remove_drift(output)}
+
+
+def _drift_findings(kept: list[Signals]) -> list[RecordFinding]:
+    findings = []
+    for e, signals in enumerate(kept, 1):
+        output = signals["output"]
+        if len(output) < 2:
+            continue
+        slope = drift_per_period(output)
+        swing = output.std(axis=1).mean(axis=0)
+        for c in np.flatnonzero(np.abs(slope) > _DRIFT_WORTH_SAYING * swing):
+            message = (
+                f"linear drift of {slope[c]:.3g} a period removed ({slope[c] / swing[c]:.1%} of "
+                "the RMS)"
             )
-        )
-    return {**signals, "output": remove_drift(output)}
+            value = float(slope[c])
+            findings.append(
+                RecordFinding(FindingKind.DRIFT, message, False, e, f"output {c + 1}", value)
+            )
+    return findings
