@@ -23,6 +23,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.frf.plots import plot_bode, plot_response_matrix
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.logs import Case, Log, check_log, read_case, read_log
 from axisight.plots import plot_gap_map, plot_log, plot_overlay, plot_ranking, plot_simulation
@@ -60,10 +61,12 @@ __all__ = [
     "frf",
     "load_robot",
     "montecarlo",
+    "plot_bode",
     "plot_gap_map",
     "plot_log",
     "plot_overlay",
     "plot_ranking",
+    "plot_response_matrix",
     "plot_simulation",
     "read_case",
     "read_log",

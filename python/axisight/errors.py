@@ -21,6 +21,10 @@ class RobotError(InputError):
     """A robot model cannot be used."""
 
 
+class MissingExtraError(AxisightError, ImportError):
+    """A library of an optional extra is not installed; the message names the extra."""
+
+
 class ConvergenceError(AxisightError, RuntimeError):
     """An iteration that the caller demanded to converge did not."""
 

@@ -6,6 +6,8 @@ import math
 
 BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#222222"
 MUTED = "#eeeeee"
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222")
+"""Curves of equal rank, in this order (Okabe and Ito 2008)."""
 
 # Light to dark in one hue, even steps of lightness
 _STOPS = (

@@ -1,0 +1,49 @@
+"""Signals that a limit has cut."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.logs.quality import quantization
+
+Real = NDArray[np.float64]
+
+_LEAST_RUN = 3  # equal samples at the extreme
+_LEAST_TIMES = 2  # times at the same extreme
+_STEPS = 3.0  # quantization steps the slope must point beyond the extreme
+
+
+def clipped_samples(signal: Real, meant: Real | None = None) -> int:
+    """Count the samples of ``signal`` (n,) that a limit has cut; 0 if it looks whole.
+
+    Counted are runs of three or more samples equal to the largest or the smallest value whose
+    last step before the run points beyond it, by more than three steps of a quantized signal,
+    if that happens at least twice at the same extreme. The flat top of a slow or a coarsely
+    quantized signal is approached with no such slope; levels of binary signals are reached with
+    a jump from level to level. ``meant`` (n,), e.g. the reference, excuses the samples at which
+    it is itself as flat. Soft saturation is not seen.
+    """
+    found = quantization(signal)
+    threshold = _STEPS * found.step if found is not None else 1e-6 * float(np.ptp(signal))
+    flat = None if meant is None else np.diff(meant, append=meant[-1]) == 0.0
+    count = 0
+    for side in (signal, -signal):
+        top = float(side.max())
+        starts, stops = _runs(side == top)
+        hit = [
+            (a, b)
+            for a, b in zip(starts, stops, strict=True)
+            if b - a >= _LEAST_RUN
+            and a >= 2
+            and 2 * side[a - 1] - side[a - 2] - top > threshold
+            and not (flat is not None and flat[a : b - 1].all())
+        ]
+        if len(hit) >= _LEAST_TIMES:
+            count += sum(b - a for a, b in hit)
+    return count
+
+
+def _runs(mask: NDArray[np.bool_]) -> tuple[list[int], list[int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return edges[::2].tolist(), edges[1::2].tolist()

@@ -1,0 +1,43 @@
+"""Linear drift over the periods, as positions have it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+
+Real = NDArray[np.float64]
+
+
+def drift_per_period(signal: Real) -> Real:
+    """Return how far ``signal`` (..., n_periods, n_samples, channels) drifts in a period.
+
+    The slope of the period means over the period number, (..., channels): the median slope
+    over all pairs of periods (Theil 1950, Sen 1968), which a transient in the first periods
+    does not move. A straight line through the samples of a period would take part of the
+    excitation for drift; the mean over a whole period does not see it.
+
+    Raises InputError for fewer than two periods.
+    """
+    n_periods = signal.shape[-3]
+    if n_periods < 2:
+        raise InputError(f"signal: expected at least two periods to see drift, got {n_periods}")
+    means = signal.mean(axis=-2)
+    first, last = np.triu_indices(n_periods, 1)
+    slopes = (means[..., last, :] - means[..., first, :]) / (last - first)[:, None]
+    return np.asarray(np.median(slopes, axis=-2))
+
+
+def remove_drift(signal: Real) -> Real:
+    """Return ``signal`` (..., n_periods, n_samples, channels) without its linear drift.
+
+    The ramp is zero in the middle of the record, so that the operating point stays. Velocity
+    and acceleration responses then follow from the position DFT, times i w and (i w)^2.
+    Raises InputError for fewer than two periods.
+    """
+    slope = drift_per_period(signal)
+    n_periods, n_samples = signal.shape[-3:-1]
+    total = n_periods * n_samples
+    ramp = (np.arange(total) - (total - 1) / 2).reshape(n_periods, n_samples) / n_samples
+    return np.asarray(signal - ramp[..., None] * slope[..., None, None, :])

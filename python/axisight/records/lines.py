@@ -1,0 +1,101 @@
+"""Which DFT lines an excitation excites, judged by what repeats from period to period."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import f as f_distribution
+
+from axisight.errors import InputError
+
+Real = NDArray[np.float64]
+Lines = NDArray[np.int64]
+
+_HALF_WIDTH = 10  # lines on either side that share one noise level
+
+
+@dataclass(frozen=True)
+class ExcitedLines:
+    """Lines found to be excited.
+
+    lines
+        Excited lines k, ascending.
+    margin_db
+        Level of the weakest excited line over the strongest other line [dB], at most that over
+        rounding errors.
+    """
+
+    lines: Lines
+    margin_db: float
+
+
+def repeating_lines(periods: Real, significance: float = 1e-4) -> NDArray[np.bool_]:
+    """Return a mask (n_samples // 2 + 1,) of lines whose amplitude is more than noise.
+
+    ``periods`` has shape (n_periods, n_samples), at least two periods. At each line the
+    squared mean over the periods is compared with its variance by an F test: P |mean|^2 / s^2
+    follows F(2, 2 M (P - 1)) when nothing repeats, s^2 being pooled over M neighbouring lines.
+    ``significance`` is the probability of one false line among all of them (Bonferroni).
+    Line 0 is never reported.
+    """
+    n_periods = len(periods)
+    if n_periods < 2:
+        raise InputError(
+            f"periods: expected at least two to tell noise from lines, got {n_periods}"
+        )
+    spectra = np.fft.rfft(periods, axis=1)
+    mean = np.abs(spectra.mean(0)) ** 2
+    variance = np.var(spectra, axis=0, ddof=1)
+    width = min(2 * _HALF_WIDTH + 1, len(variance))
+    pooled = np.maximum(uniform_filter1d(variance, width, mode="nearest"), _rounding(mean))
+    degrees = 2 * width * (n_periods - 1)
+    limit = f_distribution.isf(significance / len(mean), 2, degrees)
+    found: NDArray[np.bool_] = n_periods * mean > limit * pooled
+    found[0] = False
+    return found
+
+
+def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
+    """Return the excited lines of a reference (or input) in whole periods.
+
+    signal
+        (n_experiments, n_periods, n_samples, n_channels); a line counts that is excited in any
+        experiment and channel.
+    floor_db
+        Lines weaker than this against the strongest line of their channel do not count:
+        distortion and quantization repeat too.
+
+    With two periods or more, a line must also be more than noise (:func:`repeating_lines`).
+    The line at Nyquist is never reported.
+
+    Raises InputError if nothing is excited.
+    """
+    n_experiments, n_periods, n_samples, n_channels = signal.shape
+    n_lines = (n_samples + 1) // 2
+    spectra = np.abs(np.fft.rfft(signal.mean(1), axis=1))[:, :n_lines]
+    spectra[:, 0] = 0.0
+    strongest = spectra.max(axis=1, keepdims=True)
+    # A channel at rest holds nothing but rounding errors and the leftovers of others.
+    overall = strongest.max()
+    active = strongest > 1e-6 * overall
+    relative = np.where(active, spectra / np.where(active, strongest, 1.0), 0.0)
+    found = relative > 10 ** (floor_db / 20)
+    if n_periods >= 2:
+        for e in range(n_experiments):
+            for c in range(n_channels):
+                found[e, :, c] &= repeating_lines(signal[e, :, :, c])[:n_lines]
+    any_found = found.any(axis=(0, 2))
+    if not any_found.any():
+        raise InputError("reference: expected an excitation, got no line above the noise")
+    level = relative.max(axis=(0, 2))
+    others = np.append(level[~any_found], 1e-15).max()
+    margin = 20 * np.log10(level[any_found].min() / max(others, 1e-15))
+    return ExcitedLines(np.flatnonzero(any_found).astype(np.int64), float(margin))
+
+
+def _rounding(power: Real) -> float:
+    """What rounding errors leave at a line of a signal with these line powers."""
+    return float((1e-13**2) * power.sum()) + np.finfo(float).tiny

@@ -1,0 +1,138 @@
+"""How long to wait for the steady state, and whether it was reached."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from axisight.errors import InputError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BAND = 8  # lines judged together
+
+
+def mode_time_constant_s(frequency_hz: float, damping_ratio: float) -> float:
+    """Return the time constant tau = 1 / (zeta w0) [s] of a mode's decay.
+
+    ``frequency_hz`` is its undamped frequency, ``damping_ratio`` lies in (0, 1]. Raises
+    InputError otherwise.
+    """
+    _positive("frequency_hz", frequency_hz)
+    _positive("damping_ratio", damping_ratio)
+    if damping_ratio > 1:
+        raise InputError(f"damping_ratio: expected at most 1, got {damping_ratio}")
+    return 1.0 / (damping_ratio * 2 * math.pi * frequency_hz)
+
+
+def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: float) -> float:
+    """Return the time to wait before a transient is below the noise [s], thesis (5.6).
+
+    ``T_w = tau / 2 ln(eps^2 tau / (2 T_tot))`` with tau the dominating time constant, T_tot the
+    length of the record, typically one period, and eps the ratio of the amplitudes of signal and
+    noise at a line (5.7); with little noise, 1 / eps is the relative error to be reached. After
+    T_w the mean square of ``exp(-t / tau)`` over the record is 1 / eps^2. Never negative.
+
+    Raises InputError unless all three are positive.
+    """
+    _positive("time_constant_s", time_constant_s)
+    _positive("record_s", record_s)
+    _positive("signal_to_noise", signal_to_noise)
+    argument = signal_to_noise**2 * time_constant_s / (2 * record_s)
+    return max(0.0, 0.5 * time_constant_s * math.log(argument))
+
+
+def _positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(f"{name}: expected a positive number, got {value}")
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """The judgement of :func:`steady_state`.
+
+    first
+        Periods to drop.
+    reached
+        False if the last period that could be tested still differs from those after it.
+    significance
+        The probability to drop a period of a record in steady state.
+    p_value
+        Of each tested period, (n_tested,): the probability of so large a difference from the
+        later periods by noise alone, corrected for the number of bands and channels.
+    excess
+        Of each tested period, (n_tested,): RMS of its difference from the later ones over the
+        RMS that noise alone gives, in the band with the largest; 1 in steady state.
+    """
+
+    first: int
+    reached: bool
+    significance: float
+    p_value: Real
+    excess: Real
+
+
+def steady_state(
+    signals: Real, last_line: int | None = None, significance: float = 0.01
+) -> SteadyState:
+    """Judge how many leading periods of ``signals`` still hold a transient.
+
+    signals
+        (n_periods, n_samples, n_channels), three periods or more: the input and output of one
+        experiment, or of several one after another along the channels.
+    last_line
+        Highest line that counts; None is all below Nyquist.
+    significance
+        Probability to drop a period of a record in steady state.
+
+    The last half of the periods, at least two, is taken to be steady; their scatter is the
+    noise. An earlier period p is compared with their mean in bands of 8 lines, excited or not:
+    the mean square of the difference over the noise follows F(2 B, 2 B (R - 1)) with R steady
+    periods; B is the number of lines in the band, lowered where few of them carry the noise
+    (Satterthwaite). The p-value of the worst band and channel counts, times their number
+    (Bonferroni). Leading periods are dropped until one passes.
+
+    Raises InputError for fewer than three periods.
+    """
+    n_periods, n_samples, _ = signals.shape
+    if n_periods < 3:
+        raise InputError(f"signals: expected three periods or more, got {n_periods}")
+    if not 0 < significance < 1:
+        raise InputError(f"significance: expected a probability, got {significance}")
+    stop = (n_samples + 1) // 2 if last_line is None else last_line + 1
+    spectra = np.fft.rfft(signals, axis=1)[:, 1:stop]
+    n_steady = max(2, (n_periods + 1) // 2)
+    steady = spectra[-n_steady:]
+    mean = steady.mean(axis=0)
+    noise = np.var(steady, axis=0, ddof=1)
+    power = np.mean(np.abs(mean) ** 2, axis=0)
+    noise = np.maximum(noise, 1e-24 * power + np.finfo(float).tiny)
+    p_values, excesses = [], []
+    for period in spectra[:-n_steady]:
+        square = np.abs(period - mean) ** 2 / (1 + 1 / n_steady)
+        p, excess = _worst_band(square, noise, n_steady)
+        p_values.append(p)
+        excesses.append(excess)
+    passed = np.flatnonzero(np.array(p_values) >= significance)
+    first = int(passed[0]) if passed.size else len(p_values)
+    return SteadyState(
+        first, bool(passed.size), significance, np.array(p_values), np.array(excesses)
+    )
+
+
+def _worst_band(square: Real, noise: Real, n_steady: int) -> tuple[float, float]:
+    """Smallest p-value over bands and channels, corrected, and the largest excess in amplitude."""
+    edges = np.arange(0, len(square), _BAND)
+    size = np.diff(np.append(edges, len(square)))[:, None]
+    level = np.add.reduceat(noise, edges, axis=0)
+    ratio = np.add.reduceat(square, edges, axis=0) / level
+    # E s^4 of a variance from R - 1 complex degrees of freedom is larger than its square.
+    spread = np.add.reduceat(noise**2, edges, axis=0) / (1 + 1 / (n_steady - 1))
+    lines = np.clip(level**2 / spread, 1.0, size)
+    p = np.asarray(f_distribution.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))
+    return min(1.0, float(p.min()) * p.size), float(np.sqrt(ratio.max()))
