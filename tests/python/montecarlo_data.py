@@ -60,12 +60,10 @@ def blocks(out: Path) -> list[Path]:
 
 
 def start(*command: str, **options) -> subprocess.Popen:
-    """A Python process in a group of its own, which Ctrl-C reaches."""
+    """A Python process in a group of its own."""
     return subprocess.Popen(
         [sys.executable, *command],
         start_new_session=True,
-        # Shells let what they start in the background ignore it, and children inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         env={**os.environ, "PYTHONWARNINGS": "default"},
         **options,
     )

@@ -31,7 +31,13 @@ def interrupted(tmp_path, sign) -> subprocess.Popen:
     study, out = tmp_path / "study.toml", tmp_path / "out"
     study.write_text(small_study(**LONG).to_toml())
     command = ["axisight", "montecarlo", str(study), "--out", str(out)]
-    code = f"import sys; sys.argv = {command!r}; from axisight.cli import main; main()"
+    # Shells let what they start in the background ignore Ctrl-C, and children inherit that.
+    code = f"""if True:
+        import signal, sys
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.argv = {command!r}
+        from axisight.cli import main
+        main()"""
     process = start("-c", code, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until(lambda: len(blocks(out)) >= 3)
     process.send_signal(sign)
