@@ -18,7 +18,8 @@ degrees_of_freedom frequency_hz, output, input   complex, of ``variance``; optio
 ================== ============================= ==========================================
 
 With a circular complex normal error the band of probability p about G is a disc of radius
-``sqrt(-ln(1 - p) * variance)``; for 95 % that is ``1.73 sqrt(variance)``.
+``sqrt(-ln(1 - p) * variance)``; for 95 % that is ``1.73 sqrt(variance)``. With few degrees of
+freedom it is wider: :func:`axisight.frf.confidence_radius`.
 
 A line that cannot be estimated is NaN and flagged; a number is never infinite.
 """
@@ -45,7 +46,8 @@ class Flag(IntEnum):
     RANK_DEFICIENT = 1
     """The experiments do not excite all inputs at this line: NaN."""
     ILL_CONDITIONED = 2
-    """The response is given, but errors are amplified more than a thousandfold."""
+    """The response is given, but errors are amplified more than a thousandfold, or the weakest
+    direction of the input is lost in its noise."""
     NO_EXCITATION = 3
     """An input has no amplitude at this line: NaN."""
 
