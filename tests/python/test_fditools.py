@@ -54,6 +54,14 @@ def test_anti_resonance_and_resonance(found):
     assert abs(a - b) < 1.96 * np.hypot(error_a, error_b)
 
 
+def test_low_frequency_is_that_of_two_masses(found, example):
+    # Also the sign of the load angle: a coupling does not turn it round.
+    assert example.two_mass_error(found) < 0.015
+    low = found.full["response"].sel(frequency_hz=slice(0, 30), input=1)
+    turn = np.angle((low.sel(output=2) / low.sel(output=1)).values, deg=True)
+    assert np.abs(turn).max() < 5
+
+
 @pytest.mark.parametrize("pole", [False, True])
 def test_mode_of_a_known_oscillator_is_found(example, pole):
     # Two masses, f_a 53.4 Hz, f_r 76.3 Hz, damping ratios 1.5 % and 2 %, on the grid of run A.
