@@ -14,8 +14,8 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
     """Radius of the disc about each element of G that holds the truth with ``probability``.
 
     The error is taken as circular complex normal. A variance estimated from nu complex
-    degrees of freedom (``degrees_of_freedom`` of the Dataset, where there is one) widens the
-    disc: |dG|^2 / variance is F(2, 2 nu), so that
+    degrees of freedom (``degrees_of_freedom``, a variable or one number among the attributes of
+    the Dataset, where there is one) widens the disc: |dG|^2 / variance is F(2, 2 nu), so that
 
         radius^2 = variance nu ((1 - probability)^(-1/nu) - 1),
 
@@ -31,8 +31,9 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
         raise InputError("dataset: expected a frequency response with variance")
     variance = dataset["variance"]
     scale = np.full(variance.shape, -np.log1p(-probability))
-    if "degrees_of_freedom" in dataset:
-        freedom = np.asarray(dataset["degrees_of_freedom"].values, float)
+    freedom = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))
+    if freedom is not None:
+        freedom = np.broadcast_to(np.asarray(freedom, float), scale.shape)
         known = np.isfinite(freedom) & (freedom > 0)
         nu = freedom[known]
         scale[known] = nu * np.expm1(-np.log1p(-probability) / nu)

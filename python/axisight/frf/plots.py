@@ -15,13 +15,13 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, MultipleLocator, NullFo
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
+from axisight.frf.confidence import confidence_radius
 from axisight.frf.response import DIMS, Flag
 from axisight.palette import SERIES
 
 Real = NDArray[np.float64]
 
-_BAND_95 = np.sqrt(-np.log(0.05))  # radius over standard deviation, circular complex normal
-_DENSE = 60  # more lines than this are drawn as a curve, fewer with dots
+_DENSE = 60  # more lines than this are drawn as a curve, fewer with dots; half of it if small
 Responses = xr.Dataset | Mapping[str, xr.Dataset]
 
 
@@ -56,7 +56,8 @@ def plot_bode(
     width_in
         Width of the figure [inches].
 
-    Bands are left out where the variance is unknown. The lower band ends where the disc of
+    Bands are those of :func:`axisight.frf.confidence_radius`, and left out where the variance is
+    unknown. The lower band ends where the disc of
     95 % holds zero: the phase is then anything. Flagged lines are marked on the frequency axis:
     with a triangle where the estimate is ill-conditioned, with a cross where there is none.
 
@@ -75,7 +76,7 @@ def plot_bode(
     curves = [_curve(d, output, input, unwrap) for d in named.values()]
     _draw(top, bottom, curves)
     unit = next(iter(named.values()))["response"].attrs.get("units", "")
-    top.set_ylabel(f"magnitude [{_decibel(unit)}]")
+    top.set_ylabel(f"magnitude\n[{_decibel(unit)}]")
     bottom.set_ylabel("phase [deg]")
     bottom.set_xlabel("frequency [Hz]")
     _dress(top, bottom, curves, unwrap)
@@ -136,9 +137,9 @@ def plot_response_matrix(
         grid[0, j].set_title(f"input {u}", fontsize=size + 0.5)
         grid[-1, j].set_xlabel("frequency [Hz]", fontsize=size)
     for i, o in enumerate(outputs):
-        grid[parts * i, 0].set_ylabel(f"output {o}\n[{_decibel(unit)}]", fontsize=size)
-        if phase:
-            grid[parts * i + 1, 0].set_ylabel("[deg]", fontsize=size)
+        grid[parts * i, 0].set_ylabel(f"output {o}", fontsize=size + 0.5)
+    quantity = f"magnitude [{_decibel(unit)}]" + (" and phase [deg]" if phase else "")
+    figure.supylabel(quantity, fontsize=size)
     figure.align_ylabels(grid[:, 0])
     _legend(figure, named, [c for curves in cells.values() for c in curves], size)
     return figure
@@ -177,8 +178,9 @@ def _curve(dataset: xr.Dataset, output: int, input_: int, unwrap: bool) -> _Curv
     response = element["response"].values
     magnitude = np.abs(response)
     nothing = np.full(len(frequency), np.nan)
-    variance = element["variance"].values if "variance" in element else nothing
-    radius = _BAND_95 * np.sqrt(variance)
+    radius = nothing
+    if "variance" in dataset:
+        radius = confidence_radius(dataset).sel(output=output, input=input_).values
     phase = np.degrees(np.angle(response))
     if unwrap:
         known = np.isfinite(phase)
@@ -202,21 +204,20 @@ def _draw(top: Axes, bottom: Axes | None, curves: list[_Curve], *, thin: bool = 
     for k, curve in enumerate(curves):
         color, style = SERIES[k % len(SERIES)], _STYLES[k // len(SERIES) % len(_STYLES)]
         f = curve.frequency_hz
-        marker, size = ("o" if len(f) <= _DENSE else ""), (2.0 if thin else 3.0)
+        dense = _DENSE // 2 if thin else _DENSE
+        marker, size = ("o" if len(f) <= dense else ""), (2.0 if thin else 3.0)
         top.plot(f, curve.db, style, color=color, lw=width, marker=marker, ms=size)
         low, high = curve.db_band
         # A disc that holds zero has no lower end in dB: the band runs to the edge of the axes.
         floor = np.where(np.isneginf(low), -1e4, low)
         top.fill_between(f, floor, high, color=color, alpha=0.25, lw=0)
         if bottom is not None:
-            shown = curve.phase.copy()
-            # No vertical strokes where the phase wraps: the line is broken there.
-            jump = np.flatnonzero(np.abs(np.diff(shown)) > 180)
-            x, y = np.insert(f, jump + 1, f[jump]), np.insert(shown, jump + 1, np.nan)
+            # No vertical strokes where the phase wraps: line and band are broken there.
+            jump = np.flatnonzero(np.abs(np.diff(curve.phase)) > 180) + 1
+            x, half = np.insert(f, jump, f[jump - 1]), np.insert(curve.phase_band, jump, np.nan)
+            y = np.insert(curve.phase, jump, np.nan)
             bottom.plot(x, y, style, color=color, lw=width, marker=marker, ms=size)
-            bottom.fill_between(
-                f, shown - curve.phase_band, shown + curve.phase_band, color=color, alpha=0.25, lw=0
-            )
+            bottom.fill_between(x, y - half, y + half, color=color, alpha=0.25, lw=0)
         for mark, chosen in (("^", curve.flag == Flag.ILL_CONDITIONED), ("x", _missing(curve))):
             if chosen.any():
                 top.plot(
@@ -265,7 +266,7 @@ def _share(
     for (i, j), _ in cells.items():
         top = grid[parts * i, j]
         top.set_ylim(low, high)
-        top.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 4, 5, 10]))
+        top.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 4, 5, 10]))
         _frequency_axis(top, everything)
         _style(top)
         top.tick_params(labelleft=j == 0)
@@ -281,7 +282,7 @@ def _frequency_axis(axes: Axes, curves: list[_Curve]) -> None:
     high = max(float(c.frequency_hz.max()) for c in curves)
     axes.set_xscale("log")
     axes.set_xlim(low / 1.03, high * 1.03)
-    if high / low < 30:  # few decades: round numbers instead of powers of ten
+    if high / low < 100:  # few decades: round numbers instead of powers of ten
         ticks = [m * 10.0**e for e in range(-6, 7) for m in (1, 2, 5)]
         inside = [t for t in ticks if low / 1.03 <= t <= high * 1.03]
         axes.xaxis.set_major_locator(FixedLocator(inside))
@@ -347,4 +348,4 @@ def _legend(
 
 
 def _decibel(unit: str) -> str:
-    return f"dB re 1 {unit}" if unit else "dB"
+    return f"dB re 1 {unit.replace('^2', '²')}" if unit else "dB"
