@@ -152,7 +152,8 @@ def different_multisines(context: Context) -> Item:
         "7.1",
         "Random initial phases and the clipping algorithm give a crest factor of about 1.55.",
         bool(abs(np.mean(crest) - 1.55) < 0.05),
-        f"{np.mean(crest):.3f} on average, {min(crest):.3f} to {max(crest):.3f} in {len(crest)} multisines of 196 lines",
+        f"{np.mean(crest):.3f} on average, {min(crest):.3f} to {max(crest):.3f} in {len(crest)} "
+        "multisines of 196 lines",
     )
     label = f"{len(each)} experiments, different multisines"
     return Item(
