@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from axisight.cli_common import OUT, errors
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.gap.result import write_bytes
 from axisight.logs import Log, read_log
 from axisight.robot import Robot, load_robot
 from axisight.simulation import Method, Model, simulate
+from axisight.storage import write_bytes
 
 # A share of the sample time by which a log may miss that of the robot.
 _SAME_RATE = 1e-4

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.gap.result import write_bytes, write_whole
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
+from axisight.storage import write_bytes, write_whole
 
 Array = NDArray[np.float64]
 

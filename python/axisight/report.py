@@ -12,7 +12,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, VerdictKind, write_whole
+from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, VerdictKind
 from axisight.palette import cell_colors
 from axisight.report_figures import (
     TOP,
@@ -21,6 +21,7 @@ from axisight.report_figures import (
     page_json,
     ranking_figure,
 )
+from axisight.storage import write_whole
 from axisight.wording import (
     NO_VALUE,
     GapMap,

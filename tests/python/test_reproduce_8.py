@@ -76,12 +76,13 @@ def test_excitation_is_that_of_section_8_2(quick):
     assert r.shape == (3, 20_000, 3)
     signs = np.array([[1, 1, 1], [1, -1, 1], [1, 1, -1]])
     assert np.allclose(r, r[0, :, :1] * signs.T[:, None, :])
-    assert np.abs(r).max() == pytest.approx(8)
+    # Between samples a sine of 40 Hz is higher by (pi 40 Hz T)^2 / 2 at most.
+    assert np.abs(r).max() == pytest.approx(8, rel=2e-3)
     spectrum = np.abs(np.fft.rfft(r[0, :, 0]))
     assert np.allclose(spectrum[lines], spectrum[lines[0]])
     assert np.delete(spectrum, lines).max() < 1e-9 * spectrum[lines[0]]
     crest = 8 / np.sqrt(np.mean(r[0, :, 0] ** 2))
-    assert crest == pytest.approx(1.56, abs=0.03)
+    assert crest == pytest.approx(1.55, abs=0.04)
 
     square = references(quick.robot, Design("T1", square=True), 0, 0)[0, :, 1]
     assert np.abs(square).max() == pytest.approx(9.6)

@@ -15,7 +15,7 @@ import scipy.io
 
 from axisight.errors import InputError
 from axisight.excitation.references import References
-from axisight.gap.result import write_bytes
+from axisight.storage import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
 _KEY = b"axisight.excitation"

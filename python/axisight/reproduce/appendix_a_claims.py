@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from axisight.frf.errors import error_variance, reference_to_input
 from axisight.frf.loop import robot_loop
 from axisight.reproduce.appendix_a import STOCHASTIC_FIGURES, stochastic_experiments
-from axisight.reproduce.chapter8_claims import poor_snr
+from axisight.reproduce.chapter8_claims_designs import poor_snr
 from axisight.reproduce.chapter8_compare import Ratio, at_square_lines, listed, rank
 from axisight.reproduce.chapter8_setting import (
     PERIOD_S,
@@ -20,10 +20,9 @@ from axisight.reproduce.chapter8_setting import (
 )
 from axisight.reproduce.chapter8_study import true_response
 from axisight.reproduce.context import Context
-from axisight.reproduce.item import Claim, Item, item
+from axisight.reproduce.item import Claim, Item, Result, item
 
 Real = NDArray[np.float64]
-Result = tuple[bool, str]
 
 _T1, _T2, _T1_SQUARE, _T2_SQUARE = STOCHASTIC_FIGURES.values()
 

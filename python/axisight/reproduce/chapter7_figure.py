@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, MultipleLocator, NullLocator
+from matplotlib.ticker import LogFormatter, MultipleLocator
 from numpy.typing import NDArray
 
 from axisight.palette import AFTER, BEFORE, MEASURED
@@ -65,10 +65,7 @@ def several(label: str, frequency_hz: Real, responses: Complex) -> list[Curve]:
 
 def matrix_figure(curves: Sequence[Curve]) -> Figure:
     """Return magnitudes of all elements, output down and input across, on common axes."""
-    figure = element_figure(curves, LABEL, ylim=_LIMITS)
-    # Five decades need no minor ticks, and they take most of the time of drawing.
-    figure.axes[0].yaxis.set_minor_locator(NullLocator())
-    return figure
+    return element_figure(curves, LABEL, ylim=_LIMITS)
 
 
 def zoom_figure(

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.frf import frequency_response, logarithmic_mean
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
@@ -47,9 +49,9 @@ def distance_db(one: Complex | Real, other: Complex | Real) -> Real:
 
 def log_mean(responses: Complex) -> Complex:
     """Return the logarithmic mean (7.8), with the phase of the arithmetic mean (7.7)."""
-    mean = responses.mean(axis=0)
-    magnitude = np.exp(np.log(np.abs(responses)).mean(axis=0))
-    return np.asarray(magnitude * mean / np.abs(mean))
+    lines = np.arange(1.0, responses.shape[1] + 1)  # frequencies take no part in the mean
+    each = [frequency_response(lines, one, estimator="mfrf") for one in responses]
+    return np.asarray(logarithmic_mean(each, phase="arithmetic")["response"].values)
 
 
 def notch_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float]) -> float:

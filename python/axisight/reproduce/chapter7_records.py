@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import ConvergenceError
-from axisight.reproduce._estimate import mfrf
+from axisight.frf import right_divide
 from axisight.reproduce.chapter7_machine import REAL, Machine
 from axisight.reproduce.chapter7_setting import (
     PERIOD_S,
     WAITING_S,
     Design,
-    period_samples,
     references,
 )
 from axisight.reproduce.context import Context
@@ -42,11 +41,11 @@ class Records:
 
     def responses(self) -> Complex:
         """Return an estimate per record, (realization, record, n_freq, output, input)."""
-        return mfrf(self.input, self.output)
+        return right_divide(self.output, self.input)[0]
 
     def averaged(self) -> Complex:
         """Return estimates of the spectra averaged over records (3.53), (realization, ...)."""
-        return mfrf(self.input.mean(axis=1), self.output.mean(axis=1))
+        return right_divide(self.output.mean(axis=1), self.input.mean(axis=1))[0]
 
 
 def periods(count: int) -> tuple[float, ...]:
@@ -79,7 +78,7 @@ def _simulate(
     machine: Machine,
 ) -> Records:
     robot = context.robot
-    n = period_samples(robot)
+    n = round(PERIOD_S / robot.sample_time_s)
     starts = [round(s / robot.sample_time_s) for s in starts_s]
     # One sample more: where the next record would begin.
     total = max(starts) + n + 1

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.reproduce._multisine import clipped_multisine
-from axisight.reproduce.chapter8_setting import DIRECTIONS
+from axisight import excitation
+from axisight.excitation import Multisine, PeriodicSignal, chirp, multisine, square
+from axisight.reproduce.chapter8_setting import clipped
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -56,46 +57,59 @@ class Design:
 
 def references(robot: Robot, design: Design, seed: int, realization: int) -> Real:
     """Return one period of velocity references [rad/s], (experiment, sample, axis)."""
-    n = period_samples(robot)
-    wave = broadband(design, n, seed, realization)
-    out = PEAK_RAD_S * np.einsum("ie,t->eti", DIRECTIONS[design.directions], wave)
-    if design.square:
-        out = out + SQUARE_RAD_S * smoothed_square(n)[None, :, None]
-    return np.asarray(design.scale * out + design.drift_rad_s)
+    step = robot.sample_time_s
+    wave = square(
+        PERIOD_S,
+        step,
+        amplitude=design.scale * SQUARE_RAD_S,
+        smoothing_samples=SMOOTHING_SAMPLES,
+    )
+    return excitation.references(
+        broadband(design, step, seed, realization).scaled(peak=design.scale * PEAK_RAD_S),
+        robot.n_axes,
+        directions=design.directions.lower(),
+        square=wave if design.square else None,
+        dc_level=design.drift_rad_s,
+    ).period
 
 
-def period_samples(robot: Robot) -> int:
-    """Return the samples of a period."""
-    return round(PERIOD_S / robot.sample_time_s)
-
-
-def broadband(design: Design, n: int, seed: int, realization: int) -> Real:
-    """Return one period (n,) of the broadband signal, largest sample one.
+def broadband(
+    design: Design, step: float, seed: int, realization: int
+) -> Multisine | PeriodicSignal:
+    """Return the broadband signal of peak one, sampled at ``step`` [s].
 
     Phases of multisines are a function of (seed, realization).
     """
-    phase = 2 * np.pi * np.arange(n) / n  # one turn per period
     if design.sinusoid_hz is not None:
-        return np.asarray(np.sin(design.lines()[0] * phase))
+        return multisine(PERIOD_S, step, lines=design.lines(), phases=[0.0])
     if design.broadband in ("chirp", "centred chirp"):
-        turns = LAST_LINE * phase + (FIRST_LINE - LAST_LINE) * phase**2 / (4 * np.pi)
+        down = LAST_LINE / PERIOD_S, FIRST_LINE / PERIOD_S
         start = 0.0
         if design.broadband == "centred chirp":
-            start = -np.arctan2(np.sin(turns).sum(), np.cos(turns).sum())
-        return np.asarray(np.sin(turns + start))
-    rng = np.random.default_rng([seed, 7, realization])
+            ends = (chirp(PERIOD_S, down, step, phase_rad=p).period for p in (0.0, np.pi / 2))
+            start = -float(np.arctan2(*(x.sum() for x in ends)))
+        return chirp(PERIOD_S, down, step, phase_rad=start)
+    full = multisine(PERIOD_S, step, lines=design.lines(), seed=seed, run=realization)
     if design.broadband != "low":
-        return clipped_multisine(design.lines(), n, rng)
-    lines = design.lines()
-    low = clipped_multisine(lines[lines <= _LOW_LINE], n, rng)
-    high = clipped_multisine(lines[lines > _LOW_LINE], n, rng)
-    both = _LOW_SHARE * low + (1 - _LOW_SHARE) * high
-    return np.asarray(both / np.abs(both).max())
+        return clipped(full).scaled(peak=1.0)
+    below = full.lines <= _LOW_LINE
+    low, high = (
+        clipped(_part(full, which)).scaled(peak=share)
+        for which, share in ((below, _LOW_SHARE), (~below, 1 - _LOW_SHARE))
+    )
+    both = replace(
+        full,
+        amplitude=np.concatenate([low.amplitude, high.amplitude]),
+        phase_rad=np.concatenate([low.phase_rad, high.phase_rad]),
+    )
+    return both.scaled(peak=1.0)
 
 
-def smoothed_square(n: int) -> Real:
-    """Return one period (n,) of the square wave of (7.3), of amplitude one."""
-    reach = SMOOTHING_SAMPLES
-    level = np.where(np.arange(n) < n // 2, 1.0, -1.0)
-    weights = (reach + 1 - np.abs(np.arange(-reach, reach + 1))) / (reach + 1) ** 2
-    return np.convolve(np.pad(level, reach, mode="wrap"), weights, mode="valid")
+def _part(signal: Multisine, which: NDArray[np.bool_]) -> Multisine:
+    """Return the multisine of some of the lines."""
+    return replace(
+        signal,
+        lines=signal.lines[which],
+        amplitude=signal.amplitude[which],
+        phase_rad=signal.phase_rad[which],
+    )

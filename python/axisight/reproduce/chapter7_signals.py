@@ -264,7 +264,7 @@ def chirp(context: Context) -> Item:
     scatter = {d: scatter_db(g) for d, g in taken.items()}
     usual = distance_db(different(context), truth)
     inside = (error[CHIRP] > 0.8 * usual.min(axis=0)) & (error[CHIRP] < 1.25 * usual.max(axis=0))
-    mean = PEAK_RAD_S * broadband(CHIRP, 10_000, context.seed, 0).mean()
+    mean = PEAK_RAD_S * broadband(CHIRP, context.robot.sample_time_s, context.seed, 0).period.mean()
     lower = scatter[CHIRP] < scatter[CENTRED_CHIRP]
     claims = (
         Claim(

@@ -17,7 +17,7 @@ from axisight.reproduce.chapter7_measures import (
 )
 from axisight.reproduce.chapter7_records import records
 from axisight.reproduce.chapter7_sets import FREQUENCY_HZ, different, linear, linear_curve
-from axisight.reproduce.chapter7_setting import PERIOD_S, Design, broadband, period_samples
+from axisight.reproduce.chapter7_setting import PERIOD_S, Design, broadband
 from axisight.reproduce.context import Context
 from axisight.reproduce.item import Claim, Item, item
 
@@ -97,9 +97,9 @@ def single_sinusoids(context: Context) -> Item:
 
 def _power(context: Context) -> tuple[float, float]:
     """Return power of sinusoid over multisine [dB], in all and at the line of the sinusoid."""
-    n = period_samples(context.robot)
+    step = context.robot.sample_time_s
     sine, multi = (
-        np.abs(np.fft.rfft(broadband(d, n, context.seed, 0))) ** 2
+        np.abs(np.fft.rfft(broadband(d, step, context.seed, 0).period)) ** 2
         for d in (Design(sinusoid_hz=SINUSOIDS_HZ[0]), Design())
     )
     line = round(SINUSOIDS_HZ[0] * PERIOD_S)

@@ -19,10 +19,19 @@ from axisight.reproduce.chapter8_setting import (
     strong_square_lines,
 )
 from axisight.reproduce.chapter8_study import experiments, true_response
+from axisight.reproduce.chapter8_tables import realizations
 from axisight.reproduce.context import Context
 
 Real = NDArray[np.float64]
 
+T1, T1_SQUARE, T2, T2_SQUARE = range(4)
+"""Places in DESIGNS."""
+DIAGONAL = np.eye(3, dtype=bool)
+COUPLING = ((0, 1), (0, 2), (1, 0), (2, 0))
+"""The coupling between axis one and axes two and three."""
+LOW_HZ = 3.0
+STANDARD_ERRORS = 3.0
+"""Beyond these an average counts as biased."""
 
 # Standard errors for a decision: nine elements are judged at a time.
 _DECIDED = 3.0
@@ -125,6 +134,23 @@ def at_square_lines(
     own = strong_square_lines(context.robot)
     others = ~square_lines(excited_lines())
     return Ratio.of(logs[:, own].mean(axis=1)), Ratio.of(logs[:, others].mean(axis=1))
+
+
+def disturbance(
+    context: Context, design: Design, at: NDArray[np.bool_] | None = None
+) -> tuple[Real, Real, Real]:
+    """Return root mean square V_u, V_y and G V_u + V_y over lines and realizations."""
+    kept = slice(None) if at is None else at
+    found = [experiments(context, design, run) for run in range(realizations(context))]
+    frequency = found[0].frequency_hz
+    velocity = true_response(context, frequency) / (2j * np.pi * frequency[:, None, None])
+    v_u = np.array([f.input_disturbance for f in found])
+    v_y = np.array([f.output_disturbance for f in found])
+
+    def size(values: NDArray[np.complex128]) -> Real:
+        return np.asarray(np.sqrt(np.mean(np.abs(values[:, kept]) ** 2, axis=(0, 1))))
+
+    return size(v_u), size(v_y), size(velocity @ v_u + v_y)
 
 
 def rank(values: Real) -> Real:

@@ -57,6 +57,8 @@ def element_figure(
     _frequency_axis(grid[0, 0], curves[0].frequency_hz)
     if every is not None:
         grid[0, 0].yaxis.set_major_locator(MultipleLocator(every))
+    # Several decades need no minor ticks, and they take most of the time of drawing.
+    grid[0, 0].yaxis.set_minor_locator(NullLocator())
     if ylim is not None:
         grid[0, 0].set_ylim(*ylim)
     for axes in grid[:, 0]:

@@ -53,6 +53,32 @@ class Item:
 
 
 Make = Callable[[Context], Item]
+Result = tuple[bool, str]
+"""Whether a statement holds, and the evidence."""
+Check = Callable[[Context], Result]
+
+
+class Statements:
+    """The statements of one section, each with the function that checks it, in order."""
+
+    def __init__(self, section: str) -> None:
+        """Begin with none."""
+        self._section = section
+        self._checks: list[tuple[str, str, Check]] = []
+
+    def claim(self, id_: str, statement: str) -> Callable[[Check], Check]:
+        """Add the decorated function as the check of a statement."""
+
+        def add(check: Check) -> Check:
+            self._checks.append((id_, statement, check))
+            return check
+
+        return add
+
+    def computed(self, context: Context) -> list[Claim]:
+        """Return all claims of the section."""
+        return [Claim(i, self._section, text, *check(context)) for i, text, check in self._checks]
+
 
 # Importing a module registers its items.
 _MODULES: tuple[str, ...] = (
