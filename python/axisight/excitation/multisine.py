@@ -76,6 +76,9 @@ class Multisine:
         for prefix, count in sizes.items():
             for name in (f"{prefix}amplitude", f"{prefix}phase_rad"):
                 object.__setattr__(self, name, numbers(name, getattr(self, name), count))
+        if np.any(self.snow_amplitude < 0):
+            least = self.snow_amplitude.min()
+            raise InputError(f"snow_amplitude: expected no negative number, got {least:g}")
         if np.any(self.amplitude <= 0):
             at = int(np.argmax(self.amplitude <= 0))
             raise InputError(

@@ -104,6 +104,13 @@ def _gather(datasets: Sequence[xr.Dataset]) -> Stack:
         same = other["response"].shape == first["response"].shape and np.allclose(
             other["frequency_hz"].values, frequency, rtol=1e-9, atol=0
         )
+        kinds = ("quantity", "input_unit", "output_unit")
+        unlike = [k for k in kinds if other.attrs.get(k) != first.attrs.get(k)]
+        if unlike:
+            raise InputError(
+                f"data: expected {unlike[0]} {first.attrs.get(unlike[0])!r} as in realization 1, "
+                f"got {other.attrs.get(unlike[0])!r} in realization {i + 1}"
+            )
         if not same:
             raise InputError(
                 f"data: expected the frequencies and channels of realization 1 everywhere, "

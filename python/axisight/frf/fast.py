@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
+from axisight.frf.confidence import with_freedom
 from axisight.frf.response import frequency_response
 from axisight.frf.robust import Complex, Real, excitation, inverse, period_variance, spectra
 from axisight.records.periodic import PeriodicRecords
@@ -97,8 +98,9 @@ def fast_method(records: PeriodicRecords) -> FastMethod:
         flag=flag,
         input_unit=records.input_unit,
         output_unit=records.output_unit,
-        attrs={"n_periods": periods, "degrees_of_freedom": periods - 1},
+        attrs={"n_periods": periods},
     )
+    result = with_freedom(result, _freedom(noise, share, periods, len(detection)))
     scale = 2 / records.n_samples
     uncorrected, amplitude = free.output[0].mean(axis=0), free.input[0].mean(axis=0)
     levels = {
@@ -108,6 +110,13 @@ def fast_method(records: PeriodicRecords) -> FastMethod:
         "input_amplitude": scale * amplitude,
     }
     return FastMethod(result, _distortion(records, detection, levels))
+
+
+def _freedom(noise: Real, share: Real, periods: int, n_detection: int) -> Real:
+    """Complex degrees of freedom of the sum of two variances (Satterthwaite 1946)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = noise**2 / (periods - 1) + share**2 / min(NEIGHBOURS, n_detection)
+        return np.asarray((noise + share) ** 2 / spread)
 
 
 def _detection_lines(records: PeriodicRecords) -> NDArray[np.int64]:

@@ -81,6 +81,8 @@ def frequency_response(
     attrs
         More provenance, e.g. numbers of experiments and periods.
 
+    A line where any element is not finite becomes NaN throughout, and is flagged.
+
     Raises InputError for shapes that do not fit.
     """
     shape = response.shape
@@ -90,6 +92,8 @@ def frequency_response(
         )
     unit = f"{output_unit}/{input_unit}"
     n = shape[0]
+    known = np.asarray(np.isfinite(response).all(axis=(1, 2)))
+    response = np.where(known[:, None, None], response, np.nan)
     variables: dict[str, Any] = {"response": (DIMS, response, {"units": unit})}
     squared = {"variance": variance, "noise_variance": noise_variance}
     if variance is None:
@@ -97,11 +101,15 @@ def frequency_response(
     for name, value in squared.items():
         if value is not None:
             _expect(name, value, shape)
+            value = np.where(np.isfinite(value) & known[:, None, None], value, np.nan)
             variables[name] = (DIMS, value, {"units": f"({unit})^2"})
     condition = np.full(n, np.nan) if condition is None else condition
     flag = np.zeros(n, np.int8) if flag is None else flag.astype(np.int8)
     _expect("condition", condition, (n,))
     _expect("flag", flag, (n,))
+    # A line without numbers is never good, whatever took them.
+    lost = ~known & np.isin(flag, (Flag.GOOD, Flag.ILL_CONDITIONED))
+    flag = np.where(lost, Flag.RANK_DEFICIENT, flag).astype(np.int8)
     variables["condition"] = (DIMS[:1], condition, {"units": "1"})
     meanings = {"flag_values": [f.value for f in Flag], "flag_meanings": _meanings()}
     variables["flag"] = (DIMS[:1], flag, meanings)

@@ -75,7 +75,10 @@ def robust_method(records: PeriodicRecords) -> xr.Dataset:
     divisor = data.input
     if data.reference is not None:
         divisor = data.reference
-        flag = np.where(flag == Flag.GOOD, excitation(divisor)[1], flag)
+        other = excitation(divisor)[1]
+        lost = (other == Flag.RANK_DEFICIENT) | (other == Flag.NO_EXCITATION)
+        worse = (flag == Flag.GOOD) | ((flag == Flag.ILL_CONDITIONED) & lost)
+        flag = np.where(worse, other, flag)
     weight = inverse(divisor.mean(axis=1), flag)
     response, weight = _divide(data, weight, flag)
     error = (data.output - response @ data.input) @ weight[:, None]

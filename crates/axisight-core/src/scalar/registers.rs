@@ -1,5 +1,4 @@
-//! Elementwise arithmetic on arrays in 256-bit registers. Registers of 512 bits were tried: runs
-//! in lock-step gained a tenth.
+//! Elementwise arithmetic on arrays in 256-bit registers.
 //!
 //! Left to itself the compiler turns only some loops over lanes into vector
 //! instructions, and moves the rest through memory.

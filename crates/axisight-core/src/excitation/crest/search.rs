@@ -9,6 +9,10 @@ use rustfft::num_complex::Complex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+/// Unknowns above which the refinement's dense normal matrices, one for each thread, pass a
+/// quarter of a gigabyte.
+const MOST_REFINED: usize = 4096;
+
 /// Where a search starts from.
 #[derive(Debug, Clone)]
 pub enum Start {
@@ -92,6 +96,11 @@ pub fn search(
 ) -> Result<Option<Found>, ExcitationError> {
     clipping.check()?;
     refinement.map_or(Ok(()), |r| r.check())?;
+    let parts = 2 * problem.lines.len() - problem.wanted();
+    if refinement.is_some() && parts > MOST_REFINED {
+        let expected = format!("none with more than {MOST_REFINED} phases and amplitudes of snow");
+        return Err(ExcitationError::new("refinement", expected, parts));
+    }
     if budget.starts == 0 {
         return Err(ExcitationError::new("starts", "at least one", 0));
     }
@@ -117,7 +126,7 @@ fn run(
 ) -> Option<Found> {
     let clipper = Clipper::new(problem, clipping);
     let refiner = refinement.map(|r| Refiner::new(problem, r));
-    let deadline = budget.time.map(|t| Instant::now() + t);
+    let deadline = budget.time.and_then(|t| Instant::now().checked_add(t));
     let late = || deadline.is_some_and(|d| Instant::now() >= d);
     let stop = || cancel.load(Ordering::Relaxed) || late();
     let effort = (AtomicU64::new(0), AtomicU64::new(0));
