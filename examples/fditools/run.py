@@ -300,8 +300,8 @@ def report(found: Findings) -> str:
             f"lines agree; at the resonance the runs differ by "
             f"{at['median_difference_percent']:.0f} %"
         )
-    # A level that is not above the noise.
-    return "\n".join(text).replace("    nan", "< noise")
+    # "noise" stands for a level that is not above it.
+    return "\n".join(text).replace("    nan", "  noise")
 
 
 def draw(found: Findings) -> Figure:
