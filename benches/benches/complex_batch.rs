@@ -1,6 +1,6 @@
 //! Batched inversion of small complex matrices, one core: 1,000 at a time, in cache.
 
-use axisight_core::signal::{SmallSolver, invert_batch};
+use axisight_core::signal::{SmallSolver, Threads, invert_batch};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Complex;
 use std::hint::black_box;
@@ -15,7 +15,7 @@ fn inversions(c: &mut Criterion) {
         let a: Vec<_> = (0..COUNT * n * n).map(|i| entry(i * i)).collect();
         let mut out = a.clone();
         group.bench_function(format!("batch {n}x{n}"), |b| {
-            b.iter(|| invert_batch(black_box(&a), n, COUNT, &mut out));
+            b.iter(|| invert_batch(black_box(&a), n, COUNT, &mut out, Threads::This));
         });
         let mut solver = SmallSolver::new(n);
         group.bench_function(format!("one by one {n}x{n}"), |b| {

@@ -161,6 +161,19 @@ def test_wrong_choices_are_named() -> None:
         frf.confidence_radius(frf.mfrf(records), 1.0)
 
 
+@pytest.mark.parametrize("n", [3, 6])
+def test_pieces_of_a_long_batch_fit_together(n: int) -> None:
+    rng = np.random.default_rng(2)
+    count = 2**18 // n**2 * 2 + 11  # the binding cuts at 2**18 numbers or so
+    a = rng.normal(size=(count, n, n)) + 1j * rng.normal(size=(count, n, n))
+    a[count - 3] = 0.0
+    inverse, singular = frf.invert(a)
+    assert np.flatnonzero(singular).tolist() == [count - 3]
+    ends = np.r_[0:20, 2**18 // n**2 - 99 : 2**18 // n**2 + 99, count - 20 : count]
+    for i in ends:
+        np.testing.assert_array_equal(frf.invert(a[i])[0], inverse[i])
+
+
 def test_matrices() -> None:
     rng = np.random.default_rng(1)
     a = rng.normal(size=(5, 7, 3, 3)) + 1j * rng.normal(size=(5, 7, 3, 3))
@@ -173,6 +186,12 @@ def test_matrices() -> None:
     np.testing.assert_allclose(inverse[~singular], truth, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(quotient[~singular], y[~singular] @ truth, rtol=1e-9, atol=1e-12)
     assert np.isnan(inverse[2, 3]).all() and np.isnan(quotient[2, 3]).all()
+    again = np.empty_like(a)
+    assert frf.invert(a, out=again, threads=2)[0] is again
+    np.testing.assert_array_equal(again, inverse)
+    for wrong in (a, again[..., :2], again.real, again.swapaxes(0, 1).copy().swapaxes(0, 1)):
+        with pytest.raises(InputError, match="out: expected a writeable"):
+            frf.invert(a, out=wrong)
     with pytest.raises(InputError, match="matrices: expected shape"):
         frf.invert(a[..., :2])
     with pytest.raises(InputError, match="u: expected shape"):

@@ -1,6 +1,8 @@
 //! The one way into the core: own inputs, release the GIL, catch panics, honour Ctrl-C.
 
 use pyo3::prelude::*;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -67,14 +69,25 @@ pub fn detached<T: Send>(
             if let Some(e) = interrupt {
                 return Err(e);
             }
-            result.map_err(|panic| {
-                let text = panic.downcast_ref::<&str>().copied();
-                let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-                let message = text.unwrap_or("no message");
-                AxisightError::new_err(format!("internal error, please report: {message}"))
-            })
+            result.map_err(|panic| panicked(panic.as_ref()))
         })
     })
+}
+
+/// Run `work` on `NumPy` memory in place, that is with the GIL; then let Ctrl-C and other
+/// threads have their turn. For pieces of a few milliseconds.
+pub fn in_place<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
+    let result = catch_unwind(AssertUnwindSafe(work));
+    py.check_signals()?;
+    py.detach(|| ());
+    result.map_err(|panic| panicked(panic.as_ref()))
+}
+
+fn panicked(panic: &(dyn Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    let message = text.unwrap_or("no message");
+    AxisightError::new_err(format!("internal error, please report: {message}"))
 }
 
 /// An input error from any core error.

@@ -1,25 +1,59 @@
 //! Frequency responses from records, and small complex matrices by the million.
 //!
-//! These calls read and write `NumPy` memory in place and therefore keep the GIL: most of the
-//! work is a single pass over it, and a copy would take as long.
+//! These calls read and write `NumPy` memory in place: copying a million 3x3 matrices takes as
+//! long as inverting them (30 ns each), copying the records as long as their spectra. Nobody
+//! may write what is read, so the GIL is kept, but for pieces of a few milliseconds only; see
+//! [`in_place`].
 
-use crate::entry::{AxisightError, InputError, input_error};
-use axisight_core::frf::{self, Channels, Extent, Layout};
-use axisight_core::signal::{invert_batch, right_divide_batch};
+use crate::entry::{AxisightError, InputError, detached, in_place, input_error};
+use axisight_core::frf::{self, Channels, Extent, Layout, LineSpectra};
+use axisight_core::signal::{Threads, invert_batch, right_divide_batch};
 use numpy::{
     Complex64, Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray3, PyReadonlyArray4, PyReadwriteArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 
-/// Run `work` on `threads` threads, 0 for every core.
-fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    let pool = pool
-        .build()
-        .map_err(|e| AxisightError::new_err(format!("threads: {e}")))?;
-    Ok(pool.install(work))
+/// Numbers of one piece of work with the GIL.
+const PIECE: usize = 1 << 18;
+
+/// The threads of a call: 0 for every core, none of its own for 1.
+struct Pool(Option<rayon::ThreadPool>);
+
+impl Pool {
+    fn new(threads: usize) -> PyResult<Self> {
+        if threads == 1 {
+            return Ok(Self(None));
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool
+            .build()
+            .map_err(|e| AxisightError::new_err(format!("threads: {e}")))?;
+        Ok(Self(Some(pool)))
+    }
+
+    fn run<T: Send>(&self, work: impl FnOnce(Threads) -> T + Send) -> T {
+        match &self.0 {
+            None => work(Threads::This),
+            Some(pool) => pool.install(|| work(Threads::Pool)),
+        }
+    }
+}
+
+/// Pieces of `count` things of `size` numbers, each a range of things.
+fn pieces(count: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
+    // Whole groups of lanes, or the kernels fill up.
+    let step = (PIECE / size.max(1)).next_multiple_of(64).max(64);
+    (0..count)
+        .step_by(step)
+        .map(move |first| first..(first + step).min(count))
+}
+
+fn of(range: &Range<usize>, size: usize) -> Range<usize> {
+    range.start * size..range.end * size
 }
 
 fn contiguous(field: &str) -> PyErr {
@@ -46,10 +80,24 @@ pub fn invert_matrices<'py>(
             "matrices: expected shape (count, n, n), got ({count}, {rows}, {n})"
         )));
     }
-    let a = matrices.as_slice().map_err(|_| contiguous("matrices"))?;
-    let out = out.as_slice_mut().map_err(|_| contiguous("out"))?;
-    let singular = on_threads(threads, || invert_batch(a, n, count, out))?;
-    Ok(singular.map_err(input_error)?.into_pyarray(py))
+    if out.shape() != matrices.shape() {
+        return Err(InputError::new_err(format!(
+            "out: expected shape {:?}, got {:?}",
+            matrices.shape(),
+            out.shape()
+        )));
+    }
+    let (pool, mut singular) = (Pool::new(threads)?, Vec::with_capacity(count));
+    for piece in pieces(count, n * n) {
+        let a = matrices.as_slice().map_err(|_| contiguous("matrices"))?;
+        let out = out.as_slice_mut().map_err(|_| contiguous("out"))?;
+        let (a, out) = (&a[of(&piece, n * n)], &mut out[of(&piece, n * n)]);
+        let found = in_place(py, || {
+            pool.run(|threads| invert_batch(a, n, piece.len(), out, threads))
+        })?;
+        singular.extend(found.map_err(input_error)?);
+    }
+    Ok(singular.into_pyarray(py))
 }
 
 /// `out = y u^-1`, true where `u` is singular.
@@ -69,50 +117,86 @@ pub fn right_divide_matrices<'py>(
              ({other}, {rows}, {columns}), got ({count}, {m}, {n})"
         )));
     }
-    let (y, u) = (
-        y.as_slice().map_err(|_| contiguous("y"))?,
-        u.as_slice().map_err(|_| contiguous("u"))?,
-    );
-    let out = out.as_slice_mut().map_err(|_| contiguous("out"))?;
-    let singular = on_threads(threads, || right_divide_batch(y, u, (rows, n), count, out))?;
-    Ok(singular.map_err(input_error)?.into_pyarray(py))
-}
-
-/// Signals of one extent with whether their drift is removed.
-struct Signals<'a> {
-    list: Vec<(Channels<'a>, bool)>,
-    extent: Extent,
+    if out.shape() != y.shape() {
+        return Err(InputError::new_err(format!(
+            "out: expected shape {:?}, got {:?}",
+            y.shape(),
+            out.shape()
+        )));
+    }
+    let (pool, mut singular) = (Pool::new(threads)?, Vec::with_capacity(count));
+    let (size, wide) = (n * n, rows * n);
+    for piece in pieces(count, size.max(wide)) {
+        let y = y.as_slice().map_err(|_| contiguous("y"))?;
+        let u = u.as_slice().map_err(|_| contiguous("u"))?;
+        let out = out.as_slice_mut().map_err(|_| contiguous("out"))?;
+        let (y, u) = (&y[of(&piece, wide)], &u[of(&piece, size)]);
+        let out = &mut out[of(&piece, wide)];
+        let found = in_place(py, || {
+            let shape = (rows, n);
+            pool.run(|threads| right_divide_batch(y, u, shape, piece.len(), out, threads))
+        })?;
+        singular.extend(found.map_err(input_error)?);
+    }
+    Ok(singular.into_pyarray(py))
 }
 
 type Records<'py> = PyReadonlyArray4<'py, f64>;
+/// Name, samples, and whether the drift is removed.
+type Given<'a, 'py> = (&'a str, &'a Records<'py>, bool);
 
-fn signals<'a>(given: &'a [(&str, &'a Records<'_>, bool)]) -> PyResult<Signals<'a>> {
-    let mut out = Signals {
-        list: Vec::new(),
-        extent: Extent {
-            experiments: 0,
-            periods: 0,
-            samples: 0,
-        },
-    };
-    for (i, (field, array, drifts)) in given.iter().enumerate() {
+/// The common extent of all signals.
+fn extent_of(given: &[Given<'_, '_>]) -> PyResult<Extent> {
+    let mut wanted: Option<[usize; 3]> = None;
+    for (field, array, _) in given {
         let shape = array.shape();
-        let extent = &mut out.extent;
-        if i == 0 {
-            (extent.experiments, extent.periods, extent.samples) = (shape[0], shape[1], shape[2]);
-        }
-        let wanted = [extent.experiments, extent.periods, extent.samples];
-        if shape[..3] != wanted {
+        let got = [shape[0], shape[1], shape[2]];
+        if *wanted.get_or_insert(got) != got {
             return Err(InputError::new_err(format!(
-                "{field}: expected (experiment, period, sample) {wanted:?}, got {:?}",
-                &shape[..3]
+                "{field}: expected (experiment, period, sample) {:?}, got {got:?}",
+                wanted.unwrap_or_default()
             )));
         }
-        let channels = Channels {
-            data: array.as_slice().map_err(|_| contiguous(field))?,
-            count: shape[3],
+    }
+    let [experiments, periods, samples] = wanted.unwrap_or_default();
+    Ok(Extent {
+        experiments,
+        periods,
+        samples,
+    })
+}
+
+/// Spectra of all signals, a few experiments at a time.
+fn spectra(
+    py: Python<'_>,
+    given: &[Given<'_, '_>],
+    extent: Extent,
+    lines: &[usize],
+    pool: &Pool,
+) -> PyResult<Vec<Complex64>> {
+    let channels: Vec<usize> = given.iter().map(|(_, a, _)| a.shape()[3]).collect();
+    let plan = LineSpectra::new(&channels, extent.samples, lines);
+    let record = extent.periods * extent.samples;
+    let size = record * channels.iter().sum::<usize>();
+    // An even number: periods are transformed in pairs.
+    let step = (PIECE / size.max(1)).max(1).next_multiple_of(2);
+    let mut out = Vec::new();
+    for first in (0..extent.experiments).step_by(step) {
+        let last = (first + step).min(extent.experiments);
+        let mut signals = Vec::with_capacity(given.len());
+        for ((field, array, drifts), count) in given.iter().zip(&channels) {
+            let all = array.as_slice().map_err(|_| contiguous(field))?;
+            let data = &all[of(&(first..last), record * count)];
+            let count = *count;
+            signals.push((Channels { data, count }, *drifts));
+        }
+        let extent = Extent {
+            experiments: last - first,
+            ..extent
         };
-        out.list.push((channels, *drifts));
+        out.extend(in_place(py, || {
+            pool.run(|threads| plan.of(&signals, extent, threads))
+        })?);
     }
     Ok(out)
 }
@@ -137,11 +221,8 @@ pub fn record_spectra<'py>(
     threads: usize,
 ) -> PyResult<Bound<'py, PyArrayDyn<Complex64>>> {
     let given = [("signal", &signal, remove_drift)];
-    let signals = signals(&given)?;
-    let out = on_threads(threads, || {
-        frf::spectra(&signals.list, signals.extent, &lines)
-    })?;
-    let extent = signals.extent;
+    let extent = extent_of(&given)?;
+    let out = spectra(py, &given, extent, &lines, &Pool::new(threads)?)?;
     let shape = [
         extent.experiments,
         extent.periods,
@@ -167,8 +248,7 @@ pub fn multivariable<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut given = vec![("input", &input, false), ("output", &output, remove_drift)];
     given.extend(reference.as_ref().map(|r| ("reference", r, false)));
-    let signals = signals(&given)?;
-    let extent = signals.extent;
+    let extent = extent_of(&given)?;
     let layout = Layout {
         experiments: extent.experiments,
         periods: extent.periods,
@@ -193,9 +273,10 @@ pub fn multivariable<'py>(
             factor.len()
         )));
     }
-    let estimate = on_threads(threads, || {
-        let spectra = frf::spectra(&signals.list, extent, &lines);
-        frf::multivariable(&spectra, layout, factor)
+    let spectra = spectra(py, &given, extent, &lines, &Pool::new(threads)?)?;
+    let factor = factor.to_vec();
+    let estimate = detached(py, &AtomicBool::new(false), || {
+        frf::multivariable(&spectra, layout, &factor)
     })?;
     let shape = [lines.len(), layout.outputs, layout.inputs];
     let out = PyDict::new(py);

@@ -13,19 +13,38 @@ from axisight.errors import InputError
 Complex = NDArray[np.complex128]
 
 
-def invert(matrices: NDArray[Any], *, threads: int = 1) -> tuple[Complex, NDArray[np.bool_]]:
+def invert(
+    matrices: NDArray[Any], *, out: Complex | None = None, threads: int = 1
+) -> tuple[Complex, NDArray[np.bool_]]:
     """Invert many small complex matrices, shape (..., n, n).
 
     Returns the inverses and where a matrix is singular to working precision or not finite,
-    shape (...,); those inverses are NaN. LU with partial pivoting as in LAPACK's gesv, four
-    matrices in lock-step; ``threads`` 0 takes every core and changes no bit of the result.
+    shape (...,); those inverses are NaN. Several matrices in lock-step: LU with partial pivoting
+    as in LAPACK's gesv, cofactors for the 3x3 where they are as accurate. ``threads`` 0 takes
+    every core and changes no bit of the result.
 
-    Raises InputError for matrices that are not square.
+    out
+        Where to put the inverses: C-contiguous complex128 of the same shape, apart from
+        ``matrices``. Used again and again it saves what new memory costs, which for 3x3 is
+        about as much as inverting.
+
+    Raises InputError for matrices that are not square and for an ``out`` that does not fit.
     """
     a = np.ascontiguousarray(matrices, np.complex128)
     if a.ndim < 2 or a.shape[-1] != a.shape[-2]:
         raise InputError(f"matrices: expected shape (..., n, n), got {a.shape}")
-    out = np.empty_like(a)
+    if out is None:
+        out = np.empty_like(a)
+    elif (
+        out.shape != a.shape
+        or out.dtype != a.dtype
+        or not (out.flags.c_contiguous and out.flags.writeable)
+        or np.may_share_memory(a, out)
+    ):
+        raise InputError(
+            f"out: expected a writeable C-contiguous complex128 array of shape {a.shape} that "
+            f"does not overlap matrices, got {out.dtype} {out.shape}"
+        )
     stack = (int(np.prod(a.shape[:-2])), *a.shape[-2:])
     singular = _core.invert_matrices(a.reshape(stack), out.reshape(stack), threads=threads)
     return out, singular.reshape(a.shape[:-2])

@@ -101,8 +101,8 @@ def frequency_response(
     for name, value in squared.items():
         if value is not None:
             _expect(name, value, shape)
-            value = np.where(np.isfinite(value) & known[:, None, None], value, np.nan)
-            variables[name] = (DIMS, value, {"units": f"({unit})^2"})
+            finite = np.where(np.isfinite(value) & known[:, None, None], value, np.nan)
+            variables[name] = (DIMS, finite, {"units": f"({unit})^2"})
     condition = np.full(n, np.nan) if condition is None else condition
     flag = np.zeros(n, np.int8) if flag is None else flag.astype(np.int8)
     _expect("condition", condition, (n,))

@@ -1,6 +1,6 @@
 //! Batched complex inversion and division: residuals, singular matrices, every size.
 
-use axisight_core::signal::{invert_batch, right_divide_batch};
+use axisight_core::signal::{Threads, invert_batch, right_divide_batch};
 use nalgebra::{Complex, DMatrix};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
@@ -14,14 +14,19 @@ fn random(rng: &mut StdRng, n: usize) -> Vec<C> {
 
 /// Matrices with condition number about `10^decades`, by scaling the singular values.
 fn conditioned(rng: &mut StdRng, n: usize, count: usize, decades: f64) -> Vec<C> {
-    let mut out = Vec::new();
+    let share = |i: usize| i as f64 / (n - 1).max(1) as f64;
+    let values: Vec<f64> = (0..n).map(|i| 10f64.powf(-decades * share(i))).collect();
+    with_singular_values(rng, &values, count)
+}
+
+fn with_singular_values(rng: &mut StdRng, values: &[f64], count: usize) -> Vec<C> {
+    let (n, mut out) = (values.len(), Vec::new());
     for _ in 0..count {
         let q = |rng: &mut StdRng| DMatrix::from_row_slice(n, n, &random(rng, n * n)).qr().q();
         let (left, right) = (q(rng), q(rng));
         let s = DMatrix::from_fn(n, n, |i, j| {
-            let share = i as f64 / (n - 1).max(1) as f64;
             if i == j {
-                C::new(10f64.powf(-decades * share), 0.0)
+                C::new(values[i], 0.0)
             } else {
                 C::default()
             }
@@ -52,7 +57,7 @@ fn residuals_are_backward_stable_at_any_condition() {
         for decades in [0.0, 4.0, 8.0, 11.0] {
             let a = conditioned(&mut rng, n, 203, decades);
             let mut x = vec![C::default(); a.len()];
-            let singular = invert_batch(&a, n, 203, &mut x).unwrap();
+            let singular = invert_batch(&a, n, 203, &mut x, Threads::Pool).unwrap();
             assert!(
                 singular.iter().all(|s| !s),
                 "size {n}, condition 1e{decades}"
@@ -60,6 +65,23 @@ fn residuals_are_backward_stable_at_any_condition() {
             // Gaussian elimination with partial pivoting is good for a few units of this.
             let worst = worst_residual(&a, &x, n);
             assert!(worst < 3.0, "size {n}, condition 1e{decades}: {worst}");
+        }
+    }
+}
+
+/// 3x3 inverses change from cofactors to elimination as the first two singular values part.
+#[test]
+fn residuals_do_not_depend_on_how_a_matrix_is_inverted() {
+    let mut rng = StdRng::seed_from_u64(5);
+    for ratio in [1.0, 2.0, 4.0, 5.0, 7.0, 20.0, 1e5] {
+        for smallest in [1e-6, 1e-10] {
+            let values = [1.0, 1.0 / ratio, smallest];
+            let a = with_singular_values(&mut rng, &values, 2000);
+            let mut x = vec![C::default(); a.len()];
+            let singular = invert_batch(&a, 3, 2000, &mut x, Threads::This).unwrap();
+            assert!(singular.iter().all(|s| !s));
+            let worst = worst_residual(&a, &x, 3);
+            assert!(worst < 1.0, "ratio {ratio}, smallest {smallest}: {worst}");
         }
     }
 }
@@ -81,7 +103,8 @@ fn division_is_multiplication_by_the_inverse() {
                 y.extend((g * u).transpose().iter());
             }
             let mut out = vec![C::default(); y.len()];
-            let singular = right_divide_batch(&y, &u, (rows, n), count, &mut out).unwrap();
+            let singular =
+                right_divide_batch(&y, &u, (rows, n), count, &mut out, Threads::Pool).unwrap();
             assert!(singular.iter().all(|s| !s));
             for (a, b) in out.iter().zip(&g) {
                 // Random matrices of this size have condition numbers up to some thousand.
@@ -111,10 +134,10 @@ fn singular_and_broken_matrices_are_flagged_where_they_stand() {
             };
         }
         let mut x = vec![C::default(); a.len()];
-        let singular = invert_batch(&a, n, count, &mut x).unwrap();
+        let singular = invert_batch(&a, n, count, &mut x, Threads::Pool).unwrap();
         let y = random(&mut rng, count * 2 * n);
         let mut g = vec![C::default(); y.len()];
-        let other = right_divide_batch(&y, &a, (2, n), count, &mut g).unwrap();
+        let other = right_divide_batch(&y, &a, (2, n), count, &mut g, Threads::Pool).unwrap();
         assert_eq!(singular, other);
         for l in 0..count {
             let expected = [1, 3, 4, 6].contains(&l);
@@ -132,13 +155,16 @@ fn units_of_rows_and_columns_do_not_matter() {
     let n = 3;
     let a = random(&mut rng, n * n);
     let mut x = vec![C::default(); n * n];
-    invert_batch(&a, n, 1, &mut x).unwrap();
+    invert_batch(&a, n, 1, &mut x, Threads::Pool).unwrap();
     let (rows, columns) = ([1e-140, 1.0, 1e90], [1e-30, 1e40, 1.0]);
     let scaled: Vec<C> = (0..n * n)
         .map(|i| a[i] * rows[i / n] * columns[i % n])
         .collect();
     let mut back = vec![C::default(); n * n];
-    assert_eq!(invert_batch(&scaled, n, 1, &mut back), Ok(vec![false]));
+    assert_eq!(
+        invert_batch(&scaled, n, 1, &mut back, Threads::Pool),
+        Ok(vec![false])
+    );
     for i in 0..n * n {
         let unscaled = back[i] * columns[i / n] * rows[i % n];
         assert!((unscaled - x[i]).norm() < 1e-12 * x[i].norm().max(1.0));
@@ -148,6 +174,6 @@ fn units_of_rows_and_columns_do_not_matter() {
 #[test]
 fn wrong_lengths_are_named() {
     let a = vec![C::default(); 8];
-    let error = invert_batch(&a, 3, 1, &mut [C::default(); 9]).unwrap_err();
+    let error = invert_batch(&a, 3, 1, &mut [C::default(); 9], Threads::Pool).unwrap_err();
     assert_eq!((error.field, error.expected, error.got), ("matrices", 9, 8));
 }

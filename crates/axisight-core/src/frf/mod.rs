@@ -17,4 +17,4 @@ pub use local_rational::{LocalModel, local_rational};
 pub use multivariable::{Layout, Multivariable, multivariable};
 pub use periodic::{Output, Spectra, response};
 pub use record_spectra::Records;
-pub use spectra::{Channels, Extent, spectra};
+pub use spectra::{Channels, Extent, LineSpectra};

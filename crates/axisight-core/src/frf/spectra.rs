@@ -1,9 +1,10 @@
 //! DFT lines of every period of every experiment.
 
-use crate::signal::{LineDft, LineDftScratch};
+use crate::signal::{LineDft, LineDftScratch, Threads};
 use nalgebra::Complex;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 type C = Complex<f64>;
 
@@ -27,63 +28,106 @@ pub struct Extent {
     pub samples: usize,
 }
 
-/// Spectra `(experiment, period, line, channel)`, the channels of all signals side by side,
-/// without scale. Works on the threads of the current pool.
-///
-/// From the channels of the signals marked `true` the linear drift is removed: one slope for
-/// each experiment and channel, from the means of its periods, none with a single period.
-pub fn spectra(signals: &[(Channels<'_>, bool)], extent: Extent, lines: &[usize]) -> Vec<C> {
-    let Extent {
-        experiments,
-        periods,
-        samples,
-    } = extent;
-    let channels: usize = signals.iter().map(|(s, _)| s.count).sum();
-    let plan = LineDft::new(samples, lines);
-    let mut out = vec![C::default(); experiments * periods * lines.len() * channels];
-    let mut sums = vec![0.0; experiments * periods * channels];
-    if lines.is_empty() || channels == 0 {
-        return out;
+/// Plans for signals of one extent and the lines wanted.
+#[derive(Debug, Clone)]
+pub struct LineSpectra {
+    lines: Vec<usize>,
+    /// By signal; signals of as many channels share one.
+    plans: Vec<Arc<LineDft>>,
+}
+
+impl LineSpectra {
+    /// For signals of these numbers of channels, periods of `samples`.
+    pub fn new(channels: &[usize], samples: usize, lines: &[usize]) -> Self {
+        let mut plans: Vec<Arc<LineDft>> = Vec::new();
+        for (i, count) in channels.iter().enumerate() {
+            let same = channels[..i].iter().position(|other| other == count);
+            plans.push(match same {
+                Some(same) => Arc::clone(&plans[same]),
+                None => Arc::new(LineDft::new(samples, *count, lines)),
+            });
+        }
+        Self {
+            lines: lines.to_vec(),
+            plans,
+        }
     }
-    out.par_chunks_mut(lines.len() * channels)
-        .zip(sums.par_chunks_mut(channels))
-        .enumerate()
-        .for_each_init(
-            || {
-                (
-                    LineDftScratch::default(),
-                    vec![C::default(); 2 * lines.len()],
-                )
-            },
-            |(scratch, pair), (record, (out, sums))| {
-                let places = signals.iter().flat_map(|(signal, _)| {
-                    let start = record * samples * signal.count;
-                    let own = &signal.data[start..start + samples * signal.count];
-                    (0..signal.count).map(move |c| (&own[c..], signal.count))
-                });
-                let places: Vec<_> = places.collect();
-                for (group, two) in places.chunks(2).enumerate() {
-                    let (a, b) = (two[0], two[two.len() - 1]);
-                    pair.fill(C::default());
-                    let (first, second) = pair.split_at_mut(lines.len());
-                    let at = |n: usize| (a.0[n * a.1], b.0[n * b.1]);
-                    let both = plan.pair(at, scratch, first, second);
-                    for (half, (values, sum)) in [(&*first, both.0), (&*second, both.1)]
-                        .into_iter()
-                        .take(two.len())
-                        .enumerate()
-                    {
-                        let channel = 2 * group + half;
-                        sums[channel] = sum;
-                        for (line, value) in values.iter().enumerate() {
-                            out[line * channels + channel] = *value;
-                        }
+
+    /// Spectra `(experiment, period, line, channel)`, the channels of all signals side by side,
+    /// without scale.
+    ///
+    /// From the channels of the signals marked `true` the linear drift is removed: one slope
+    /// for each experiment and channel, from the means of its periods, none with a single
+    /// period.
+    pub fn of(&self, signals: &[(Channels<'_>, bool)], extent: Extent, threads: Threads) -> Vec<C> {
+        let channels: usize = signals.iter().map(|(s, _)| s.count).sum();
+        let records = extent.experiments * extent.periods;
+        let record = self.lines.len() * channels;
+        let mut out = vec![C::default(); records * record];
+        let mut sums = vec![0.0; records * channels];
+        if out.is_empty() || extent.samples == 0 {
+            return out;
+        }
+        let work = |scratch: &mut LineDftScratch,
+                    (first, (out, sums)): (usize, (&mut [C], &mut [f64]))| {
+            self.two(
+                signals,
+                (2 * first, records),
+                extent.samples,
+                scratch,
+                out,
+                sums,
+            );
+        };
+        // Two periods share a transform.
+        let (two, both) = (2 * record, 2 * channels);
+        if threads == Threads::This {
+            let mut scratch = LineDftScratch::default();
+            let pairs = out.chunks_mut(two).zip(sums.chunks_mut(both));
+            pairs.enumerate().for_each(|pair| work(&mut scratch, pair));
+        } else {
+            let pairs = out.par_chunks_mut(two).zip(sums.par_chunks_mut(both));
+            pairs
+                .enumerate()
+                .for_each_init(LineDftScratch::default, work);
+        }
+        remove_drift(&mut out, &sums, signals, extent, &self.lines);
+        out
+    }
+
+    /// Lines and sums of record `one` and the next; the last of an odd number goes with itself.
+    fn two(
+        &self,
+        signals: &[(Channels<'_>, bool)],
+        (one, records): (usize, usize),
+        samples: usize,
+        scratch: &mut LineDftScratch,
+        out: &mut [C],
+        sums: &mut [f64],
+    ) {
+        let channels: usize = signals.iter().map(|(s, _)| s.count).sum();
+        let mut first = 0;
+        for ((signal, _), plan) in signals.iter().zip(&self.plans) {
+            let size = samples * signal.count;
+            let own = |record: usize| &signal.data[record * size..][..size];
+            let found = plan.pair(own(one), own((one + 1).min(records - 1)), scratch);
+            let halves = out.chunks_exact_mut(self.lines.len() * channels);
+            for (half, (out, sums)) in halves.zip(sums.chunks_exact_mut(channels)).enumerate() {
+                let pick = |both: &(C, C)| if half == 0 { both.0 } else { both.1 };
+                let (lines, total) = found.split_at(self.lines.len() * signal.count);
+                let rows = lines.chunks_exact(signal.count.max(1));
+                for (out, row) in out.chunks_exact_mut(channels).zip(rows) {
+                    for (out, both) in out[first..].iter_mut().zip(row) {
+                        *out = pick(both);
                     }
                 }
-            },
-        );
-    remove_drift(&mut out, &sums, signals, extent, lines);
-    out
+                for (sum, both) in sums[first..].iter_mut().zip(total) {
+                    *sum = pick(both).re;
+                }
+            }
+            first += signal.count;
+        }
+    }
 }
 
 /// Subtract `slope n`, whose DFT is `slope N / (exp(-2 pi i k / N) - 1)`.

@@ -7,10 +7,14 @@
 mod dual;
 mod elementary;
 mod lanes;
+mod register;
 mod registers;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod wide;
 
 pub use dual::Dual;
 pub use lanes::Lanes;
+pub(crate) use register::{MOST_LANES, Register};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
