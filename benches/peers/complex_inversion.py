@@ -80,7 +80,7 @@ def main() -> None:
                 f"{ours / len(matrices) * 1e9:9.0f} {peer / ours:6.1f}   "
                 f"{good[0]:.2f}, {good[1]:.2f}; condition 1e10: {bad[0]:.2f}, {bad[1]:.2f}"
             )
-        copies = (lambda: a.copy(), lambda: np.copyto(again, a))
+        copies = (a.copy, lambda: np.copyto(again, a))
         new, used = (shortest(c, time.process_time) / count * 1e9 for c in copies)
         print(f"{n}x{n} {"NumPy's copy":>18} {new:9.0f} {used:9.0f} (new memory, memory in use)")
 
