@@ -20,6 +20,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
 import time
+from functools import partial
 
 import numpy as np
 
@@ -80,9 +81,9 @@ def main() -> None:
                 f"{ours / len(matrices) * 1e9:9.0f} {peer / ours:6.1f}   "
                 f"{good[0]:.2f}, {good[1]:.2f}; condition 1e10: {bad[0]:.2f}, {bad[1]:.2f}"
             )
-        copies = (a.copy, lambda: np.copyto(again, a))
+        copies = (a.copy, partial(np.copyto, again, a))
         new, used = (shortest(c, time.process_time) / count * 1e9 for c in copies)
-        print(f"{n}x{n} {"NumPy's copy":>18} {new:9.0f} {used:9.0f} (new memory, memory in use)")
+        print(f"{n}x{n} {'NumPy copies':>18} {new:9.0f} {used:9.0f} (new memory, memory in use)")
 
 
 if __name__ == "__main__":
