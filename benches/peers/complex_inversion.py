@@ -83,7 +83,8 @@ def main() -> None:
             )
         copies = (a.copy, partial(np.copyto, again, a))
         new, used = (shortest(c, time.process_time) / count * 1e9 for c in copies)
-        print(f"{n}x{n} {'NumPy copies':>18} {new:9.0f} {used:9.0f} (new memory, memory in use)")
+        label = "NumPy's copy"
+        print(f"{n}x{n} {label:>18} {new:9.0f} {used:9.0f} (new memory, memory in use)")
 
 
 if __name__ == "__main__":

@@ -125,23 +125,35 @@ struct Roots {
     n: usize,
     coarse: Vec<C>,
     fine: Vec<C>,
+    /// The short table of fine steps has `2^bits` entries.
+    bits: u32,
 }
 
 impl Roots {
     fn new(n: usize) -> Self {
-        let step = n.isqrt() + 1;
+        let bits = n.ilog2().div_ceil(2);
+        let step = 1 << bits;
         let root = |k: usize| C::from_polar(1.0, -TAU * k as f64 / n as f64);
         Self {
             n,
-            coarse: (0..step).map(|i| root(i * step)).collect(),
+            coarse: (0..=n >> bits).map(|i| root(i * step)).collect(),
             fine: (0..step).map(root).collect(),
+            bits,
         }
     }
 
-    /// The root of `k d`; the product is reduced before anything is rounded.
-    fn at(&self, k: usize, d: usize) -> C {
-        let index = (k % self.n) * d % self.n;
-        self.coarse[index / self.fine.len()] * self.fine[index % self.fine.len()]
+    /// The roots of `0, k, 2 k, ...`, reduced before anything is rounded.
+    fn multiples(&self, k: usize, count: usize) -> impl Iterator<Item = C> {
+        let k = k % self.n;
+        let mut next = 0;
+        (0..count).map(move |_| {
+            let index = next;
+            next += k;
+            if next >= self.n {
+                next -= self.n;
+            }
+            self.coarse[index >> self.bits] * self.fine[index & (self.fine.len() - 1)]
+        })
     }
 }
 
@@ -205,18 +217,23 @@ impl<R: Register> Plan<R> {
         let columns = n / m * channels;
         let roots = Roots::new(n.max(1));
         let lines: Vec<usize> = lines.iter().copied().chain([0]).collect();
-        let turns = (0..columns.div_ceil(R::LANES)).flat_map(|register| {
-            let roots = &roots;
-            lines.iter().map(move |k| {
+        let halves = lines.iter().flat_map(|k| roots.multiples(*k, n / m));
+        let halves: Vec<C> = halves.map(|root| root * 0.5).collect();
+        let mut turns = Vec::with_capacity(columns.div_ceil(R::LANES) * lines.len());
+        for first in (0..columns).step_by(R::LANES) {
+            let own = R::LANES.min(columns - first);
+            let mut offset = [0; MOST_LANES];
+            for (l, offset) in offset.iter_mut().enumerate().take(own) {
+                *offset = (first + l) / channels;
+            }
+            for halves in halves.chunks_exact(n / m) {
                 let mut numbers = [C::default(); MOST_LANES];
-                let first = register * R::LANES;
-                let own = numbers.iter_mut().take(columns - first).enumerate();
-                for (l, number) in own {
-                    *number = roots.at(*k, (first + l) / channels) * 0.5;
+                for (number, offset) in numbers.iter_mut().zip(&offset[..own]) {
+                    *number = halves[*offset];
                 }
-                Pair::split(&numbers, 1)
-            })
-        });
+                turns.push(Pair::split(&numbers, 1));
+            }
+        }
         Self {
             n,
             m,
@@ -227,7 +244,7 @@ impl<R: Register> Plan<R> {
                 Transform::Lanes,
             ),
             places: lines.iter().map(|k| (k % m, (m - k % m) % m)).collect(),
-            turns: turns.collect(),
+            turns,
         }
     }
 
