@@ -255,7 +255,9 @@ impl<R: Register> Plan<R> {
             return;
         }
         // After so many registers the channels come round to the first lane again.
-        let arrangements = (1..).find(|r| r * lanes % self.channels == 0).unwrap_or(1);
+        let arrangements = (1..=self.channels)
+            .find(|r| (r * lanes).is_multiple_of(self.channels))
+            .unwrap_or(1);
         let Work {
             one,
             two,
