@@ -127,8 +127,6 @@ def check_limits(
             f"got {reference.sample_time_s} s"
         )
     bounds = _bounds(limits, robot.n_axes)
-    if not bounds:
-        raise InputError("limits: expected at least one limit, got none")
     given = reference.repeated(whole("periods", periods))
     run = simulate_batch(robot, given, effects=list(effects), start_rad=start_rad, model=model)
     step = robot.sample_time_s
