@@ -174,6 +174,6 @@ fn units_of_rows_and_columns_do_not_matter() {
 #[test]
 fn wrong_lengths_are_named() {
     let a = vec![C::default(); 8];
-    let error = invert_batch(&a, 3, 1, &mut vec![C::default(); 9], Threads::Pool).unwrap_err();
+    let error = invert_batch(&a, 3, 1, &mut [C::default(); 9], Threads::Pool).unwrap_err();
     assert_eq!((error.field, error.expected, error.got), ("matrices", 9, 8));
 }
