@@ -97,8 +97,8 @@ def chirp(
 
     T0 is ``period_s`` [s], a whole number of samples of ``sample_time_s`` [s]; A is
     ``amplitude``. ``band_hz`` is (f1, f2), both multiples of 1/T0; f1 > f2 sweeps down. The
-    repeated signal has no jump where f2 - f1 is an even multiple of 1/T0 or ``phase_rad`` one
-    of pi, which is demanded. A small mean remains that depends on
+    repeated signal has no jump where f2 - f1 is an even multiple of 1/T0, or ``phase_rad`` a
+    multiple of pi; elsewhere it jumps by up to 2 A at the end of the period. A small mean remains that depends on
     ``phase_rad``. The lines are those of the band. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
@@ -107,11 +107,6 @@ def chirp(
     if max(abs(ends[0] - first), abs(ends[1] - last)) > 1e-9 * max(ends) or first == last:
         raise InputError(
             f"band_hz: expected two different multiples of {1 / period_s:g} Hz, got {band_hz}"
-        )
-    if (last - first) % 2 and abs(np.sin(phase_rad)) > 1e-9:
-        raise InputError(
-            f"phase_rad: expected a multiple of pi, as band_hz {band_hz} spans an odd number of "
-            f"lines of {1 / period_s:g} Hz and the sweep would jump, got {phase_rad:g}"
         )
     lines = lines_below("band_hz", np.arange(min(first, last), max(first, last) + 1), n)
     positive("amplitude", amplitude)
