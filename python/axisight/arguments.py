@@ -37,6 +37,11 @@ def _array(value: object, kinds: str) -> NDArray[Any] | None:
     return array if array.dtype.kind in kinds or not array.size else None
 
 
+def real_array(value: object) -> NDArray[Any] | None:
+    """Return an array of real numbers of any shape, or None."""
+    return _array(value, "biuf")
+
+
 def number(field: str, value: object, what: str = "a finite number") -> float:
     """Return a finite number."""
     array = _array(value, "iuf")
