@@ -42,6 +42,14 @@ def real_array(value: object) -> NDArray[Any] | None:
     return _array(value, "biuf")
 
 
+def complex_array(field: str, value: object) -> Complex:
+    """Return complex numbers of any shape, finite or not."""
+    array = _array(value, "biufc")
+    if array is None:
+        raise InputError(f"{field}: expected complex numbers, got {shown(value)}")
+    return np.asarray(array, dtype=np.complex128)
+
+
 def number(field: str, value: object, what: str = "a finite number") -> float:
     """Return a finite number."""
     array = _array(value, "iuf")

@@ -223,7 +223,11 @@ def broken(**changes):
         ([experiment(n_periods=4)], {"skip_s": -1.0}, "skip_s: expected a number not below zero"),
         ([experiment(n_periods=4)], {"period_s": 5.0}, "at most the shortest"),
         ([experiment(n_periods=4)], {"period_s": float("nan")}, "period_s: expected a positive"),
-        ([experiment(n_periods=4)], {"drop_periods": -1}, "drop_periods: expected a whole number from 0"),
+        (
+            [experiment(n_periods=4)],
+            {"drop_periods": -1},
+            "drop_periods: expected a whole number from 0",
+        ),
         ([experiment(n_periods=4)], {"drop_periods": 4}, "expected to keep a period"),
         ([experiment(n_periods=4)], {"waiting_time_s": 9.0}, "expected to keep a period"),
         ([experiment(n_periods=4)], {"lines": [1, 500]}, "Nyquist"),

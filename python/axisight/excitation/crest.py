@@ -24,6 +24,7 @@ from axisight.arguments import (
 from axisight.errors import InputError
 from axisight.excitation.multisine import Multisine, response_at
 
+
 @dataclass(frozen=True)
 class Clipping:
     """Settings of the clipping algorithm, Wernholt (2004), Algorithm 5.1.

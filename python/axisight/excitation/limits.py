@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from axisight.arguments import Real, instance, one_of, several, whole
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.arguments import Real, instance, one_of, several, whole
 from axisight.excitation.checks import per_item
 from axisight.excitation.references import References
 from axisight.excitation.rigid_motion import rigid_torque
@@ -205,9 +205,7 @@ def _simulated(run: xr.Dataset, given: Real, rest: Real, step: float) -> dict[Qu
     }
 
 
-def _followed(
-    given: Real, robot: Robot, start_rad: Sequence[float] | None
-) -> dict[Quantity, Real]:
+def _followed(given: Real, robot: Robot, start_rad: Sequence[float] | None) -> dict[Quantity, Real]:
     """Signals of motors that follow the reference, which comes round after its last sample."""
     acceleration = (given - np.roll(given, 1, axis=1)) / robot.sample_time_s
     return {

@@ -134,9 +134,7 @@ class Multisine:
         """Return the signal with this peak or this effective rms; give exactly one."""
         if (peak is None) == (rms is None):
             raise InputError("peak, rms: expected exactly one of them")
-        name, target, own = (
-            ("rms", rms, self.rms) if peak is None else ("peak", peak, self.peak)
-        )
+        name, target, own = ("rms", rms, self.rms) if peak is None else ("peak", peak, self.peak)
         factor = positive(name, target) / own
         return replace(
             self,

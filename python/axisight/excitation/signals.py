@@ -23,7 +23,7 @@ from axisight.arguments import (
     whole,
 )
 from axisight.errors import InputError
-from axisight.excitation.checks import band_of, few_enough, numbers, per_item, whole_samples
+from axisight.excitation.checks import band_of, few_enough, per_item, whole_samples
 
 # Samples per sample at which the peak of a continuous formula is looked for.
 _FINE = 32

@@ -166,9 +166,7 @@ def prepare_records(
             {k: advance(v, d.samples - round(d.samples)) for k, v in c.items()}
             for c, d in zip(kept, delays, strict=True)
         ]
-    records = _records(
-        sample_time_s, _stack(kept), excited, free, (input_unit, output_unit)
-    )
+    records = _records(sample_time_s, _stack(kept), excited, free, (input_unit, output_unit))
     findings += check_repetition(records)
     return Prepared(records, period, dropped, tuple(delays), tuple(findings))
 
@@ -306,9 +304,7 @@ def _records(
     )
 
 
-def _excited(
-    cut: list[Signals], lines: Lines | None, findings: list[RecordFinding]
-) -> Lines:
+def _excited(cut: list[Signals], lines: Lines | None, findings: list[RecordFinding]) -> Lines:
     if lines is not None:
         return lines
     source = "reference" if "reference" in cut[0] else "input"
