@@ -204,7 +204,7 @@ def test_a_log_is_an_experiment():
     np.testing.assert_array_equal(got.records.output[0], run.output.reshape(6, 1000, 1)[3:])
     with pytest.raises(InputError, match="has no joint_position"):
         experiment_of_log(log, output="joint_position")
-    with pytest.raises(InputError, match="output: expected 'position'"):
+    with pytest.raises(InputError, match="output: expected one of position"):
         experiment_of_log(log, output="torque")
     with pytest.raises(InputError, match="period_s: expected one"):
         prepare_records([log, replace(log, period_s=2.0)])

@@ -10,6 +10,9 @@ from axisight.errors import InputError
 # Samples of a signal, all periods together: 1 GB. The core's own bound is higher.
 MOST_SAMPLES = 2**27
 
+# Squares, and sums of them, are still numbers.
+SMALLEST_SIZE, LARGEST_SIZE = 1e-100, 1e100
+
 
 def whole_samples(field: str, seconds: object, sample_time_s: object) -> int:
     """Return ``seconds`` in samples; decimal fractions may be a rounding error off."""
@@ -45,6 +48,16 @@ def per_item(field: str, value: object, count: int) -> Real:
     """Return one finite number per item from one number or ``count``."""
     array = reals(field, value, f"{count} finite numbers or one", (0, 1))
     return numbers(field, np.full(count, float(array)) if array.ndim == 0 else array, count)
+
+
+def size_of(field: str, value: object) -> float:
+    """Return an amplitude: positive, and neither it nor its square near the ends of numbers."""
+    size = positive(field, value)
+    if not SMALLEST_SIZE <= size <= LARGEST_SIZE:
+        raise InputError(
+            f"{field}: expected {SMALLEST_SIZE:g} to {LARGEST_SIZE:g}, got {shown(value)}"
+        )
+    return size
 
 
 def band_of(field: str, value: object) -> tuple[float, float]:

@@ -134,7 +134,7 @@ def optimize_crest_factor(
         gain = response_at(response, len(signal.lines))
         amplitude, turned = amplitude * np.abs(gain), np.angle(gain)
     steps = None
-    if refinement != "none":
+    if not (isinstance(refinement, str) and refinement == "none"):
         steps = _numbers("refinement", LpRefinement() if refinement is None else refinement)
     found = _core.optimize_crest_factor(
         signal.lines.tolist(),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from axisight.arguments import Real, instance, one_of, several, whole
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.excitation.checks import per_item
+from axisight.excitation.checks import numbers, per_item
 from axisight.excitation.references import References
 from axisight.excitation.rigid_motion import rigid_torque
 from axisight.robot import Robot
@@ -142,6 +142,8 @@ def check_limits(
     instance("robot", robot, Robot)
     one_of("model", model, get_args(Model))
     added = [instance("effects", effect, Effect) for effect in several("effects", effects)]
+    if start_rad is not None:
+        start_rad = numbers("start_rad", start_rad, robot.n_axes).tolist()
     if reference.unit != "rad/s" or reference.n_inputs != robot.n_axes:
         raise InputError(
             f"reference: expected {robot.n_axes} velocities [rad/s], got {reference.n_inputs} "

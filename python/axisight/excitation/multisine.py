@@ -21,7 +21,15 @@ from axisight.arguments import (
     whole,
 )
 from axisight.errors import InputError
-from axisight.excitation.checks import MOST_SAMPLES, numbers, per_item, whole_samples
+from axisight.excitation.checks import (
+    LARGEST_SIZE,
+    MOST_SAMPLES,
+    SMALLEST_SIZE,
+    numbers,
+    per_item,
+    size_of,
+    whole_samples,
+)
 from axisight.excitation.lines import Grid, line_set
 
 
@@ -80,8 +88,11 @@ class Multisine:
         if np.any(self.snow_amplitude < 0):
             least = self.snow_amplitude.min()
             raise InputError(f"snow_amplitude: expected no negative number, got {least:g}")
-        if np.any(self.amplitude <= 0):
-            at = int(np.argmax(self.amplitude <= 0))
+        if np.any(self.snow_amplitude > LARGEST_SIZE):
+            raise InputError(f"snow_amplitude: expected at most {LARGEST_SIZE:g}")
+        usable = (self.amplitude >= SMALLEST_SIZE) & (self.amplitude <= LARGEST_SIZE)
+        if not usable.all():
+            at = int(np.argmin(usable))
             raise InputError(
                 f"amplitude: expected positive numbers, got {self.amplitude[at]} at line "
                 f"{self.lines[at]}; leave the line out instead"
@@ -135,7 +146,7 @@ class Multisine:
         if (peak is None) == (rms is None):
             raise InputError("peak, rms: expected exactly one of them")
         name, target, own = ("rms", rms, self.rms) if peak is None else ("peak", peak, self.peak)
-        factor = positive(name, target) / own
+        factor = size_of(name, target) / own
         return replace(
             self,
             amplitude=self.amplitude * factor,

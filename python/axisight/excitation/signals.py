@@ -14,16 +14,25 @@ from axisight import _core
 from axisight.arguments import (
     Lines,
     Real,
+    instance,
     lines_below,
-    not_negative,
     number,
     positive,
     reals,
     seed_of,
     whole,
+    words,
 )
 from axisight.errors import InputError
-from axisight.excitation.checks import band_of, few_enough, per_item, whole_samples
+from axisight.excitation.checks import (
+    LARGEST_SIZE,
+    SMALLEST_SIZE,
+    band_of,
+    few_enough,
+    per_item,
+    size_of,
+    whole_samples,
+)
 
 # Samples per sample at which the peak of a continuous formula is looked for.
 _FINE = 32
@@ -57,8 +66,12 @@ class PeriodicSignal:
         """Check the numbers."""
         object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
         period = reals("period", self.period, "numbers of shape (n_samples,)", 1).copy()
+        if np.abs(period).max() > LARGEST_SIZE:
+            raise InputError(f"period: expected at most {LARGEST_SIZE:g}, got larger ones")
         object.__setattr__(self, "period", period)
-        object.__setattr__(self, "peak", not_negative("peak", self.peak))
+        object.__setattr__(self, "peak", size_of("peak", self.peak))
+        words("kind", self.kind)
+        instance("settings", self.settings, dict)
         object.__setattr__(self, "lines", lines_below("lines", self.lines, len(period)))
 
     @property
@@ -81,12 +94,15 @@ class PeriodicSignal:
 
     @property
     def crest_factor(self) -> float:
-        """Peak over effective rms."""
-        return self.peak / self.rms
+        """Peak over effective rms; raises InputError where there is no power."""
+        rms = self.rms
+        if not rms > 0:
+            raise InputError("period: expected power on the lines for a crest factor, got none")
+        return self.peak / rms
 
     def scaled(self, *, peak: float) -> PeriodicSignal:
         """Return the signal with this peak."""
-        factor = positive("peak", peak) / self.peak
+        factor = size_of("peak", peak) / self.peak
         return replace(self, period=self.period * factor, peak=float(peak))
 
 
@@ -121,7 +137,7 @@ def chirp(
             f"(Nyquist), got {band_hz}"
         )
     lines = np.arange(low, high + 1, dtype=np.int64)
-    amplitude = positive("amplitude", amplitude)
+    amplitude = size_of("amplitude", amplitude)
     phase_rad = number("phase_rad", phase_rad)
 
     def at(part: Real) -> Real:
@@ -154,7 +170,7 @@ def triangle(period_s: float, sample_time_s: float, *, amplitude: float = 1.0) -
     n = whole_samples("period_s", period_s, sample_time_s)
     if n % 4:
         raise InputError(f"period_s: expected a multiple of four samples, got {n}")
-    amplitude = positive("amplitude", amplitude)
+    amplitude = size_of("amplitude", amplitude)
     quarter = n // 4
     ramp = np.arange(quarter) / quarter
     period = amplitude * np.concatenate([ramp, 1 - ramp, -ramp, ramp - 1])
@@ -175,7 +191,7 @@ def square(
     ratio = positive("period_s", period_s) / positive("sample_time_s", sample_time_s)
     few_enough("period_s", math.ceil(min(ratio, 1e18)))
     period = _core.square_period(
-        positive("amplitude", amplitude),
+        size_of("amplitude", amplitude),
         positive("period_s", period_s),
         whole("smoothing_samples", smoothing_samples, 0),
         positive("sample_time_s", sample_time_s),
@@ -199,7 +215,7 @@ def prbs(
     autocorrelation at any other shift ``-A^2 / (2^bits - 1)``. ``bits`` 2 to 24.
     """
     bits, hold = whole("bits", bits, 2, 24), whole("hold", hold)
-    amplitude = positive("amplitude", amplitude)
+    amplitude = size_of("amplitude", amplitude)
     few_enough("bits, hold", (2**bits - 1) * hold)
     sequence, _ = max_len_seq(bits)
     period = amplitude * np.repeat(2.0 * sequence - 1.0, hold)
@@ -236,9 +252,9 @@ def discrete_interval_binary(
     if not chosen.size:
         raise InputError("lines: expected at least one line, got none")
     w = per_item("weight", weight, len(chosen))
-    if np.any(w <= 0):
-        raise InputError("weight: expected positive numbers")
-    amplitude = positive("amplitude", amplitude)
+    for one in w:
+        size_of("weight", one)
+    amplitude = size_of("amplitude", amplitude)
     best = max(
         (
             _settled(w, chosen, count, _core.random_phases(len(w), seed_of("seed", seed), run))
@@ -326,8 +342,8 @@ def stepped_sine(
         )
     chosen = lines.astype(np.int64)
     sizes = per_item("amplitude", amplitude, len(chosen))
-    if np.any(sizes <= 0):
-        at = int(np.argmax(sizes <= 0))
+    if not np.all(usable := (sizes >= SMALLEST_SIZE) & (sizes <= LARGEST_SIZE)):
+        at = int(np.argmin(usable))
         raise InputError(
             f"amplitude: expected positive numbers, got {sizes[at]:g} at "
             f"{chosen[at] / period_s:g} Hz; leave the step out instead"

@@ -87,7 +87,7 @@ def spectra(
 
 def lost_lines(flag: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Whether a line has no estimate."""
-    return (flag == Flag.RANK_DEFICIENT) | (flag == Flag.NO_EXCITATION)
+    return np.asarray((flag == Flag.RANK_DEFICIENT) | (flag == Flag.NO_EXCITATION))
 
 
 def worst_flag(flags: NDArray[np.int8]) -> NDArray[np.int8]:

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.arguments import instance
+from axisight.arguments import Complex, instance
 from axisight.errors import InputError
-from axisight.frf._lines import SMALLEST, Complex, spectra
+from axisight.frf._lines import SMALLEST, spectra
 from axisight.frf.response import Flag, estimate_of
 from axisight.records.periodic import PeriodicRecords
 

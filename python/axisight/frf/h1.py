@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from axisight.arguments import instance
+from axisight.arguments import Complex, Real, instance
 from axisight.errors import InputError
 from axisight.frf._lines import (
-    Complex,
     Quantity,
-    Real,
     condition_and_flag,
     expect_experiments,
     expect_options,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from axisight import _core
+from axisight.arguments import whole
 from axisight.frf import local_window
 from axisight.frf._lines import Quantity
 from axisight.frf.local_window import Lines, Records
@@ -73,7 +74,7 @@ def local_polynomial(
     Raises InputError for too few lines for the order, lines out of range and, for several
     periods, fewer experiments than inputs.
     """
-    order = local_window.whole_number("order", order, 0, local_window.HIGHEST_ORDER)
+    order = whole("order", order, 0, local_window.HIGHEST_ORDER)
     data = local_window.whole(
         records, lines, quantity=quantity, remove_drift=remove_drift, threads=threads
     )
@@ -90,7 +91,7 @@ def local_polynomial(
     if half_width is None:
         per_experiment = -(-local_window.DEGREES_OF_FREEDOM // records.n_experiments)
         half_width = max(order + 2, -(-(per_experiment + order + 1) // 2))
-    half_width = local_window.whole_number("half_width", half_width, 1)
+    half_width = whole("half_width", half_width, 1)
     found = _core.frf_local_periodic(
         data.input,
         data.output,

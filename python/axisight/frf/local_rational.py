@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
+from axisight.arguments import whole
 from axisight.frf import local_window
 from axisight.frf._lines import Quantity
 from axisight.frf.local_window import Lines, Records
@@ -75,7 +76,7 @@ def local_rational(
 
     Raises InputError for too few lines for the orders and lines out of range.
     """
-    order = local_window.whole_number("order", order, 0, local_window.HIGHEST_ORDER)
+    order = whole("order", order, 0, local_window.HIGHEST_ORDER)
     if denominator_order is None:
         denominator_order = order
     data = local_window.whole(
@@ -86,7 +87,7 @@ def local_rational(
         data,
         estimator="local_rational",
         order=order,
-        denominator_order=local_window.whole_number(
+        denominator_order=whole(
             "denominator_order", denominator_order, 0, local_window.HIGHEST_ORDER
         ),
         half_width=half_width,

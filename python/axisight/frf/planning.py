@@ -129,7 +129,9 @@ def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
     Columns: ``design``, ``1,1`` ... (output, input) and ``mean`` over all elements.
     """
     rows = []
-    instance("predictions", predictions, Mapping)
+    if not isinstance(predictions, Mapping):
+        kind = type(predictions).__name__
+        raise InputError(f"predictions: expected {{name: Dataset}}, got {kind}")
     for name, prediction in predictions.items():
         _predicted(f"predictions[{name!r}]", prediction)
         mean = prediction["relative_error"].mean("frequency_hz")

@@ -154,21 +154,25 @@ def frequency_response(
     )
 
 
-def estimate_of(field: str, value: object) -> xr.Dataset:
-    """Return a Dataset as described above; raises InputError for anything else."""
+def estimate_of(field: str, value: object, *, uncertain: bool = True) -> xr.Dataset:
+    """Return a Dataset as described above; raises InputError for anything else.
+
+    The variance may be absent unless ``uncertain``.
+    """
     if not isinstance(value, xr.Dataset):
         raise InputError(f"{field}: expected a frequency response, got {type(value).__name__}")
     needed: dict[str, tuple[str, ...]] = {
         "response": DIMS,
         "frequency_hz": DIMS[:1],
-        "variance": DIMS,
         "condition": DIMS[:1],
         "flag": DIMS[:1],
     }
+    if uncertain:
+        needed["variance"] = DIMS
     for name, dims in needed.items():
         if name not in value.variables or value[name].dims != dims:
             raise InputError(
-                f"{field}: expected a frequency response with {name} over {', '.join(dims)}, got "
+                f"{field}: expected a frequency response, with variable {name} over {', '.join(dims)}, got "
                 f"a Dataset with {', '.join(map(str, value.variables)) or 'nothing'}"
             )
     return value

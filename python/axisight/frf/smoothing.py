@@ -29,7 +29,8 @@ def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
     spacing = np.min(np.diff(frequency)) if len(frequency) > 1 else 1.0
     # One spacing beyond the outermost line: there a single line is left.
     room = np.minimum(frequency - frequency[0], frequency[-1] - frequency) + spacing
-    width = np.minimum(bandwidth_hz, room) * (1 - 1e-9)
+    # Far below the spacing a line stands alone, however narrow the window.
+    width = np.minimum(max(bandwidth_hz, 1e-3 * spacing), room) * (1 - 1e-9)
     first = np.searchsorted(frequency, frequency - width, side="right")
     count = np.searchsorted(frequency, frequency + width, side="left") - first
     start = np.concatenate([[0], np.cumsum(count)])

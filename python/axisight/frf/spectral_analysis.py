@@ -10,14 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from axisight.arguments import one_of
+from axisight.arguments import Complex, Real, one_of
 from axisight.errors import InputError
 from axisight.frf._lines import (
     LARGE_CONDITION,
     SMALLEST,
-    Complex,
     Quantity,
-    Real,
     expect_options,
     output_unit,
     provenance,

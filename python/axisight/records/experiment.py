@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from axisight.arguments import Real, instance, positive, real_array, words
+from axisight.arguments import Real, instance, one_of, positive, real_array, words
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.records.signal_checks import recorded
@@ -67,12 +67,8 @@ def experiment_of_log(
     the log does not have it, or has it on some axes only.
     """
     instance("log", log, Log)
-    words("output", output)
+    one_of("output", output, ("position", "velocity", "joint_position"))
     field = {"velocity": "velocity_rad_s"}.get(output, f"{output}_rad")
-    if field not in ("position_rad", "velocity_rad_s", "joint_position_rad"):
-        raise InputError(
-            f"output: expected 'position', 'velocity' or 'joint_position', got {output!r}"
-        )
     values = getattr(log, field)
     if values is None:
         raise InputError(f"output: log {log.name!r} has no {output}")
