@@ -31,7 +31,7 @@ def run(
         progress(one, k, len(names))
         made = items[one](context)
         if out is not None:
-            write_item(made, out)
+            write_item(made, out, quick=context.quick)
         done.append(made)
     progress("done", len(names), len(names))
     claims = [claim for made in done for claim in made.claims]
@@ -40,8 +40,11 @@ def run(
     return done
 
 
-def write_item(made: Item, out: Path) -> list[Path]:
-    """Write tables as CSV (full precision) and figures as PDF and PNG; return the paths."""
+def write_item(made: Item, out: Path, *, quick: bool = False) -> list[Path]:
+    """Write tables as CSV (full precision) and figures as PDF and PNG; return the paths.
+
+    ``quick`` leaves out the PDF and draws the PNG with half the dots.
+    """
     out.mkdir(parents=True, exist_ok=True)
     paths = []
     for suffix, table in made.tables.items():
@@ -49,11 +52,14 @@ def write_item(made: Item, out: Path) -> list[Path]:
         table.to_csv(path, index=False, lineterminator="\n")
         paths.append(path)
     for suffix, figure in made.figures.items():
-        for kind in ("pdf", "png"):
+        # Laid out once, not for every file.
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        for kind in ("png",) if quick else ("pdf", "png"):
             path = out / f"{_stem(made, suffix)}.{kind}"
             # no creation date: the same study gives the same bytes
             metadata = {"CreationDate": None} if kind == "pdf" else None
-            figure.savefig(path, dpi=200, metadata=metadata)
+            figure.savefig(path, dpi=100 if quick else 200, metadata=metadata)
             paths.append(path)
     return paths
 
@@ -63,7 +69,7 @@ def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     claims = sorted(claims, key=lambda c: c.section)
     columns = ["id", "section", "statement", "holds", "evidence"]
-    rows = [[getattr(c, name) for name in columns] for c in claims]
+    rows = [[c.id, c.section, c.statement, c.verdict, c.evidence] for c in claims]
     table = out / "claims.csv"
     pd.DataFrame(rows, columns=columns).to_csv(table, index=False, lineterminator="\n")
     page = out / "claims.md"
@@ -72,11 +78,13 @@ def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
 
 
 def _page(claims: list[Claim]) -> str:
-    held = sum(c.holds for c in claims)
-    lines = ["# Claims", "", f"{held} of {len(claims)} hold on this robot.", ""]
+    count = {v: sum(c.verdict == v for c in claims) for v in ("yes", "no", "undecided")}
+    undecided = f", {count['undecided']} are undecided" if count["undecided"] else ""
+    summary = f"{count['yes']} of {len(claims)} hold on this robot{undecided}."
+    lines = ["# Claims", "", summary, ""]
     lines += ["| section | statement | holds | evidence |", "|---|---|---|---|"]
     for c in claims:
-        cells = (c.section, c.statement, "yes" if c.holds else "**no**", c.evidence)
+        cells = (c.section, c.statement, "yes" if c.holds else f"**{c.verdict}**", c.evidence)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 
