@@ -116,7 +116,8 @@ def optimize_crest_factor(
         ``snow_limit`` times the root mean square of the signal's.
     snow_limit : see there.
     response : complex (n_lines,), response at the lines: the crest factor of the output
-        ``G u`` is made small instead of that of the signal. Not together with snow.
+        ``G u`` is made small instead of that of the signal. Not together with snow, at whose
+        lines the response is not known.
     threads : 0 takes every core. The result does not depend on it.
 
     Raises InputError naming the field.
@@ -130,7 +131,11 @@ def optimize_crest_factor(
     amplitude, turned = signal.amplitude, np.zeros(len(signal.lines))
     if response is not None:
         if snow.size:
-            raise InputError("response, snow_lines: expected at most one of them")
+            raise InputError(
+                "response, snow_lines: expected at most one of them: the response is known at the "
+                "excited lines only, so what snow does to the output is not; optimize the output "
+                "without snow, or the signal with it"
+            )
         gain = response_at(response, len(signal.lines))
         amplitude, turned = amplitude * np.abs(gain), np.angle(gain)
     steps = None

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from axisight.arguments import Complex, Real
 from axisight.errors import InputError
-from axisight.frf._lines import Quantity, expect_options, output_unit, provenance, spectra
+from axisight.frf._lines import (
+    Quantity,
+    expect_options,
+    line_factor,
+    output_unit,
+    provenance,
+    spectra,
+)
 from axisight.frf.confidence import with_freedom
 from axisight.frf.response import frequency_response
 from axisight.frf.robust import by_realization, excitation, inverse, period_variance
@@ -46,7 +53,8 @@ def fast_method(
         ``records.detection_lines`` are used; without any, all lines free of excitation
         between the first and the last excited one.
     quantity, remove_drift, threads
-        As for `mfrf`; the distortion is then that of the velocity or acceleration, too.
+        As for `mfrf`. Everything is found from the recorded output, then multiplied by i w or
+        (i w)^2: response, variances and distortion alike.
 
     ``response``, the Dataset of every estimator, is ``Y U^-1`` at the excited lines.
     ``noise_variance`` is from the scatter over the periods (P - 1 complex degrees of
@@ -89,7 +97,9 @@ def fast_method(
     detection = _detection_lines(records)
 
     def of(lines: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        found = spectra(records, quantity, remove_drift=remove_drift, threads=threads, lines=lines)
+        found = spectra(
+            records, "position", remove_drift=remove_drift, threads=threads, lines=lines
+        )
         u, y = (by_realization(signal, n) for signal in found)
         return u, y
 
@@ -106,12 +116,13 @@ def fast_method(
     level, level_noise = error.mean(axis=0), period_variance(error[None])[0]
     power = _at_excited(records.lines, detection, np.abs(level) ** 2 - level_noise)
     share = power @ np.abs(weight) ** 2
+    factor = line_factor(records.frequency_hz, quantity)[:, None, None]
     result = frequency_response(
         records.frequency_hz,
-        response,
+        response * factor,
         estimator="fast_method",
-        variance=noise + share,
-        noise_variance=noise,
+        variance=(noise + share) * np.abs(factor) ** 2,
+        noise_variance=noise * np.abs(factor) ** 2,
         condition=condition,
         flag=flag,
         input_unit=records.input_unit,
@@ -120,11 +131,13 @@ def fast_method(
     )
     result = with_freedom(result, _freedom(noise, share, periods, len(detection)))
     scale = 2 / records.n_samples
+    free_hz = detection / (records.n_samples * records.sample_time_s)
+    derived = scale * line_factor(free_hz, quantity)[:, None, None]
     uncorrected, amplitude = free_y.mean(axis=0), free_u.mean(axis=0)
     levels = {
-        "distortion": scale * level,
-        "noise_variance": scale**2 * level_noise,
-        "uncorrected": scale * uncorrected,
+        "distortion": derived * level,
+        "noise_variance": np.abs(derived) ** 2 * level_noise,
+        "uncorrected": derived * uncorrected,
         "input_amplitude": scale * amplitude,
     }
     return FastMethod(result, _distortion(records, quantity, detection, levels))

@@ -33,7 +33,7 @@ from axisight.reproduce.chapter7_setting import (
     broadband,
 )
 from axisight.reproduce.context import Context
-from axisight.reproduce.decision import positive
+from axisight.reproduce.decision import interval, positive
 from axisight.reproduce.item import Claim, Item, item
 
 Real = NDArray[np.float64]
@@ -89,9 +89,9 @@ def same_excitation(context: Context) -> Item:
             "Spectra of records that are not synchronized must not be averaged: half a period "
             "apart only noise is left. Responses may.",
             positive(np.log(apart / together)),
-            f"at odd lines {spread(left, '.0f')} dB of the input are left ({len(left)} "
-            f"realizations, 95 %); the estimate is random by {spread(apart, '.2f')} dB, the average "
-            f"of the two estimates by {spread(together, '.2f')} dB",
+            f"at odd lines {interval(left, '.0f')} dB of the input are left ({len(left)} "
+            f"realizations, 95 %); the estimate is random by {interval(apart, '.2f')} dB, the average "
+            f"of the two estimates by {interval(together, '.2f')} dB",
         ),
         Claim(
             "7.2.7-order",

@@ -36,7 +36,7 @@ from axisight.reproduce.chapter7_sets import (
 )
 from axisight.reproduce.chapter7_setting import PEAK_RAD_S, Design, broadband, references
 from axisight.reproduce.context import Context
-from axisight.reproduce.decision import all_of, positive, spread
+from axisight.reproduce.decision import all_of, interval, positive
 from axisight.reproduce.item import Claim, Item, item
 
 Complex = NDArray[np.complex128]
@@ -240,8 +240,8 @@ def permutation(context: Context) -> Item:
             "7.2.5",
             "With T2 the notch is higher in (1,1) and lower in (3,3).",
             all_of([positive(higher[0]), positive(-higher[1])]),
-            f"T2 less T1 in {higher.shape[1]} realizations: (1,1) {spread(higher[0])} Hz, (3,3) "
-            f"{spread(higher[1])} Hz (95 %); of the log means: (1,1) {one[0]:.2f} Hz with T1, "
+            f"T2 less T1 in {higher.shape[1]} realizations: (1,1) {interval(higher[0])} Hz, (3,3) "
+            f"{interval(higher[1])} Hz (95 %); of the log means: (1,1) {one[0]:.2f} Hz with T1, "
             f"{two[0]:.2f} Hz with T2; (3,3) {one[2]:.2f} and {two[2]:.2f} Hz",
         ),
         Claim(

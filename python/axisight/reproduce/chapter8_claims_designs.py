@@ -26,7 +26,7 @@ from axisight.reproduce.chapter8_setting import DESIGNS, PERIOD_S, excited_lines
 from axisight.reproduce.chapter8_study import experiments, true_response
 from axisight.reproduce.chapter8_tables import THESIS_8_2, mean_errors, realizations, snr
 from axisight.reproduce.context import Context
-from axisight.reproduce.decision import all_of, positive, spread
+from axisight.reproduce.decision import all_of, interval, positive
 from axisight.reproduce.item import Result, Statements
 
 CLAIMS = Statements("8.3.1")
@@ -56,7 +56,7 @@ def _small_elements(context: Context) -> Result:
         ]
     )
     text = f"rank correlation of mean |G| and error in {len(runs)} realizations (95 %): "
-    text += ", ".join(f"{spread(r)} ({d})" for r, d in zip(ranks, DESIGNS, strict=True))
+    text += ", ".join(f"{interval(r)} ({d})" for r, d in zip(ranks, DESIGNS, strict=True))
     return all_of([positive(-r) for r in ranks]), text
 
 

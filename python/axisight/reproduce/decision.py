@@ -30,7 +30,7 @@ def all_of(verdicts: Sequence[bool | None]) -> bool | None:
     return None if any(v is None for v in verdicts) else True
 
 
-def spread(values: ArrayLike, form: str = "+.2f") -> str:
+def interval(values: ArrayLike, form: str = "+.2f") -> str:
     """Return mean and 95 % interval in words."""
     middle, half = _interval(values)
     return f"{middle:{form}} ± {half:{form.lstrip('+')}}"

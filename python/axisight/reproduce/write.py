@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from axisight.reproduce.context import Context
 from axisight.reproduce.item import Claim, Item, item_names, registered
@@ -52,16 +54,21 @@ def write_item(made: Item, out: Path, *, quick: bool = False) -> list[Path]:
         table.to_csv(path, index=False, lineterminator="\n")
         paths.append(path)
     for suffix, figure in made.figures.items():
-        # Laid out once, not for every file.
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        for kind in ("png",) if quick else ("pdf", "png"):
-            path = out / f"{_stem(made, suffix)}.{kind}"
-            # no creation date: the same study gives the same bytes
-            metadata = {"CreationDate": None} if kind == "pdf" else None
-            figure.savefig(path, dpi=100 if quick else 200, metadata=metadata)
-            paths.append(path)
+        paths += _draw(figure, out / _stem(made, suffix), quick)
     return paths
+
+
+def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
+    """Write a figure as PNG and PDF; laying it out takes most of the time and is done once."""
+    png, pdf = path.with_name(f"{path.name}.png"), path.with_name(f"{path.name}.pdf")
+    figure.set_dpi(100 if quick else 200)
+    FigureCanvasAgg(figure).print_png(str(png))
+    if quick:
+        return [png]
+    figure.set_layout_engine("none")
+    # No creation date: the same study gives the same bytes.
+    figure.savefig(pdf, metadata={"CreationDate": None})
+    return [pdf, png]
 
 
 def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
