@@ -71,6 +71,7 @@ CASES = {
             "condition": np.ones(3),
             "flag": np.zeros(3, np.int8),
             "coherence": np.ones((3, 2)),
+            "degrees_of_freedom": np.ones((3, 2, 2)),
             "input_unit": "Nm",
             "output_unit": "rad",
             "attrs": {},

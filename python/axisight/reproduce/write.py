@@ -62,7 +62,7 @@ def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
     """Write a figure as PNG and PDF; laying it out takes most of the time and is done once."""
     png, pdf = path.with_name(f"{path.name}.png"), path.with_name(f"{path.name}.pdf")
     figure.set_dpi(100 if quick else 200)
-    FigureCanvasAgg(figure).print_png(str(png))
+    FigureCanvasAgg(figure).print_png(str(png))  # type: ignore[no-untyped-call]
     if quick:
         return [png]
     figure.set_layout_engine("none")
