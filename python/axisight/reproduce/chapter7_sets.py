@@ -46,8 +46,8 @@ def different(
 
 
 def many(context: Context, design: Design = STANDARD, machine: Machine = REAL) -> Complex:
-    """Return estimates of twenty realizations (quick: four), (realization, n_freq, 3, 3)."""
-    return different(context, design, machine, 4 if context.quick else 20)
+    """Return estimates of twenty realizations (quick: six), (realization, n_freq, 3, 3)."""
+    return different(context, design, machine, 6 if context.quick else 20)
 
 
 def linear(context: Context) -> Complex:

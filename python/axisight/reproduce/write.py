@@ -62,6 +62,11 @@ def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
     """Write a figure as PNG and PDF; laying it out takes most of the time and is done once."""
     png, pdf = path.with_name(f"{path.name}.png"), path.with_name(f"{path.name}.pdf")
     figure.set_dpi(100 if quick else 200)
+    if quick:  # good enough for a look, and twice as fast
+        figure.set_layout_engine(None)
+        width, height = figure.get_size_inches()
+        edges = 0.65 / width, 0.5 / height, 1 - 0.1 / width, 1 - 0.55 / height
+        figure.subplots_adjust(*edges, wspace=0.08, hspace=0.22)
     FigureCanvasAgg(figure).print_png(str(png))  # type: ignore[no-untyped-call]
     if quick:
         return [png]
