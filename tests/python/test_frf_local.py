@@ -238,7 +238,7 @@ def test_misuse_is_named():
         (lambda: local_rational(good, order=-1), "order"),
         (lambda: local_rational(good, order=9), "order: expected a whole number 0 to 8, got 9"),
         (lambda: local_rational(good, denominator_order=9), "denominator_order"),
-        (lambda: local_rational(good, lines=[50]), "lines: expected lines from 1 to 49"),
+        (lambda: local_rational(good, lines=[50]), "lines: expected lines from 1 to below 50"),
         (lambda: local_rational(good, lines=[4, 3]), "lines: expected ascending"),
         (lambda: local_rational(good, lines=[]), "lines"),
         (lambda: local_polynomial(two, lines=[7]), "lines: expected excited"),
