@@ -35,7 +35,7 @@ def random_chain(seed: int, n_joints: int = 6, elastic: bool = True) -> str:
     joints: list[dict[str, Any]] = []
     for i in range(n_joints):
         last = i == n_joints - 1
-        kind = "elastic" if elastic and 0 < i and rng.random() < 0.3 else "driven"
+        kind = "elastic" if elastic and i > 0 and rng.random() < 0.3 else "driven"
         axis = rng.normal(size=3)
         if rng.random() < 0.5:
             axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])

@@ -47,7 +47,7 @@ class MotorCoupling:
 
     def joint_motion(self, motor: ArrayLike) -> Array:
         """Return joint angles [rad] (or rates) of motor angles, shape (n, n_axes) or (n_axes,)."""
-        return np.linalg.solve(self.position, self._rows("motor", motor).T).T
+        return _solve(self.position, self._rows("motor", motor))
 
     def motor_motion(self, joint: ArrayLike) -> Array:
         """Return motor angles [rad] (or rates) of joint angles, shape (n, n_axes) or (n_axes,)."""
@@ -59,7 +59,7 @@ class MotorCoupling:
 
     def motor_torque(self, joint_nm: ArrayLike) -> Array:
         """Return motor torques [Nm] of joint torques, shape (n, n_axes) or (n_axes,)."""
-        return np.linalg.solve(self.torque, self._rows("joint_nm", joint_nm).T).T
+        return _solve(self.torque, self._rows("joint_nm", joint_nm))
 
     def _rows(self, field: str, value: ArrayLike) -> Array:
         x = np.asarray(value, dtype=np.float64)
@@ -73,6 +73,10 @@ class MotorCoupling:
 def gear_coupling(robot: Robot) -> MotorCoupling:
     """Return the coupling of the gear ratios in the robot file, each motor on its own joint."""
     return MotorCoupling(np.diag(1.0 / robot.core.gear_ratio))
+
+
+def _solve(matrix: Array, rows: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, rows.T).T, dtype=np.float64)
 
 
 def _matrix(field: str, value: ArrayLike) -> Array:

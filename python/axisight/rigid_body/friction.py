@@ -78,7 +78,7 @@ class DriveTerms:
             raise InputError(
                 f'{kind}: expected None, "motor", "joint" or ("motor", "joint"), got {given!r}'
             )
-        return tuple(side for side in ("motor", "joint") if side in sides)  # type: ignore[misc]
+        return tuple(side for side in ("motor", "joint") if side in sides)
 
     def settings(self, kind: str) -> tuple[float, float]:
         """Dead band and smoothing of a kind, zero where they have no place."""

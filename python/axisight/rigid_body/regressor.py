@@ -30,6 +30,7 @@ class TorqueModel:
 
     Motions are always those of all joints, (n, n_joints) [rad, rad/s, rad/s^2]; on a
     prismatic joint rad reads m and Nm reads N. Motors and gears count as rigid.
+
     """
 
     def __init__(
@@ -57,7 +58,8 @@ class TorqueModel:
         identity = np.eye(self.robot.n_joints)
         if self.side == "joint":
             return identity
-        rows = np.linalg.solve(self.coupling.torque, identity[self.robot.core.axis_joints])
+        driven = identity[self.robot.core.axis_joints]
+        rows: Array = np.linalg.solve(self.coupling.torque, driven).astype(np.float64)
         rows[np.abs(rows) < 1e-14 * np.abs(rows).max()] = 0.0
         return rows
 
