@@ -2,16 +2,23 @@
 
 from axisight.rigid_body.base import BaseParameters, base_parameters
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
+from axisight.rigid_body.estimate import identify_rigid_body
+from axisight.rigid_body.findings import FindingKind, IdentificationFinding
 from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
 from axisight.rigid_body.regressor import TorqueModel, torque_regressor
+from axisight.rigid_body.result import RigidBodyEstimate
 
 __all__ = [
     "USUAL_TERMS",
     "BaseParameters",
     "DriveTerms",
+    "FindingKind",
+    "IdentificationFinding",
     "MotorCoupling",
+    "RigidBodyEstimate",
     "TorqueModel",
     "base_parameters",
     "gear_coupling",
+    "identify_rigid_body",
     "torque_regressor",
 ]

@@ -175,7 +175,7 @@ def base_parameters(
 
 def combination(names: list[str], coefficients: Array, first: int) -> str:
     """Return a linear combination in symbols, ``first`` in front."""
-    order = [first, *(i for i in np.flatnonzero(coefficients) if i != first)]
+    order = [first, *(int(i) for i in np.flatnonzero(coefficients) if i != first)]
     text = ""
     for i in order:
         c = coefficients[i]
@@ -190,14 +190,14 @@ def combination(names: list[str], coefficients: Array, first: int) -> str:
 
 def free_columns(model: TorqueModel, known: Iterable[str]) -> NDArray[np.intp]:
     """Return the indices of all parameters but the known ones."""
-    known = set(known)
-    unknown = known - set(model.names)
+    left_out = set(known)
+    unknown = left_out - set(model.names)
     if unknown:
         raise InputError(
             f"known: expected names of parameters, got {', '.join(sorted(unknown))}; "
             f"there are {', '.join(model.names)}"
         )
-    free = np.flatnonzero([name not in known for name in model.names])
+    free = np.flatnonzero([name not in left_out for name in model.names])
     if len(free) == 0:
         raise InputError("known: expected at least one parameter left to estimate, got all fixed")
     return free
