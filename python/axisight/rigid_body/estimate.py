@@ -102,14 +102,16 @@ def identify_rigid_body(
     if eliminate is not None and not (np.isfinite(eliminate) and eliminate > 0):
         raise InputError(f"eliminate: expected a positive number, got {eliminate!r}")
     model = as_model(robot, terms, side, coupling)
-    known = _numbers("known", known)
-    base = _base(model, base, known)
+    known = numbers("known", known)
+    base = known_base(model, base, known)
     motion = model.motion(q, v, a)
     torque = rows("torque_nm", torque_nm, model.n_rows)
     weight = _weights(sample_weight, (len(motion[0]), model.n_rows))
     if len(torque) != len(motion[0]):
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
-    factors = _factors(base, motion, torque, known, weight, _blocks(blocks, len(torque)), threads)
+    factors = _factors(
+        base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
+    )
 
     shares = reversals(model, base.columns, motion[1])
     findings = reversal_findings(shares)
@@ -204,9 +206,10 @@ def _least_certain(solution: Solution, covariance: Array, limit: float | None) -
     return worst if excess[worst] > limit else None
 
 
-def _base(
+def known_base(
     model: TorqueModel, base: BaseParameters | None, known: Mapping[str, float]
 ) -> BaseParameters:
+    """Return the base parameters given, after a check that they fit, or find them."""
     if base is None:
         return base_parameters(model, known=known)
     if base.model.names != model.names or base.model.side != model.side:
@@ -258,7 +261,7 @@ def _column_noise(
 ) -> Array:
     """Error of each column over that of the torque."""
     if given is not None:
-        given = _numbers("column_noise", given)
+        given = numbers("column_noise", given)
         unknown = set(given) - set(base.names)
         if unknown or not given or min(given.values()) <= 0:
             raise InputError(
@@ -277,7 +280,8 @@ def _column_noise(
     return np.asarray(noise, dtype=np.float64)
 
 
-def _numbers(field: str, values: Mapping[str, float] | None) -> dict[str, float]:
+def numbers(field: str, values: Mapping[str, float] | None) -> dict[str, float]:
+    """Return named values as finite floats."""
     out = {}
     for name, value in (values or {}).items():
         try:
@@ -301,9 +305,10 @@ def _weights(value: ArrayLike | None, shape: tuple[int, int]) -> Array | None:
     return np.ascontiguousarray(np.broadcast_to(full, shape))
 
 
-def _blocks(blocks: int | None, n: int) -> int:
+def default_blocks(blocks: int | None, n: int, least: int = 20) -> int:
+    """Return the number of blocks asked for, or the default, of ``least`` samples or more each."""
     if blocks is None:
-        return max(2, min(BLOCKS, n // 20)) if n > 1 else 1
+        return max(2, min(BLOCKS, n // least)) if n > 1 else 1
     if isinstance(blocks, bool) or not isinstance(blocks, (int, np.integer)):
         raise InputError(f"blocks: expected an integer, got {blocks!r}")
     if not 2 <= blocks <= n:
