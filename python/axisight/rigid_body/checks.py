@@ -92,7 +92,7 @@ def gear_sign(
 def _axis_alone(factors: Factors, row: int, direction: Array) -> tuple[float, float]:
     """Value and standard error of a combination, from one row only, of least norm."""
     k = factors.k
-    r = factors.rows()[row]
+    r = factors.rows[row]
     size = np.linalg.norm(r[:, :k], axis=0)
     scale = np.where(size > 0, size, 1.0)
     u, s, vt = np.linalg.svd(r[:, :k] / scale, full_matrices=False)
