@@ -126,9 +126,7 @@ def parse(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def smooth_motion(
-    robot: Robot, n: int, step_s: float, seed: int = 0
-) -> tuple[Array, Array, Array]:
+def smooth_motion(robot: Robot, n: int, step_s: float, seed: int = 0) -> tuple[Array, Array, Array]:
     """Sums of five sines per joint, with exact derivatives."""
     rng = np.random.default_rng(seed)
     t = step_s * np.arange(n)[:, None, None]
