@@ -72,6 +72,23 @@ def test_deflected_arm_is_where_its_springs_are_in_balance(robot):
         assert deflection > 1e-4
 
 
+def test_payload_is_a_weight(robot):
+    q = configurations(5, 1)
+    extra = load_torque(robot, q, np.full(5, 20.0), LOADS) - robot.gravity(q)
+    for row, angles in enumerate(q):
+        step = 1e-6
+
+        def height(at):
+            rotation, origin = robot.pose(at)
+            return (origin + rotation @ LOADS.payload_com_m)[2]
+
+        slope = [
+            (height(angles + step * e) - height(angles - step * e)) / (2 * step) for e in np.eye(6)
+        ]
+        # Rounding of heights near 2 m over the step, times the weight.
+        assert np.abs(extra[row] - 20 * 9.81 * np.array(slope)).max() < 1e-7
+
+
 def test_wrong_geometry_is_placed_as_pinocchio_places_it(robot):
     errors, theta = truth(robot)
     wrong = errors.geometry(20 * theta)

@@ -341,7 +341,7 @@ def left_jacobian(vector: Array) -> Array:
     b = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
-    c = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (1.0 - np.sinc(safe / np.pi)) / safe**2)
+    c = np.where(small, 1.0 / 6.0, (1.0 - np.sinc(safe / np.pi)) / safe**2)
     return np.asarray(np.eye(3) + b * k + c * (k @ k), dtype=np.float64)
 
 
