@@ -1,0 +1,203 @@
+"""Bodies that can exist: closed forms, SciPy, recovery, misuse."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from axisight.errors import InputError
+from axisight.rigid_body.consistent import consistent_parameters, pseudo_inertia
+
+LINK = np.arange(10)
+
+
+def body(seed, mass=8.0, points=30):
+    """Parameters of a cloud of point masses: a body that exists."""
+    rng = np.random.default_rng(seed)
+    m = rng.uniform(0.5, 1.5, points)
+    m *= mass / m.sum()
+    x = np.array([0.1, -0.2, 0.3]) + rng.normal(0, 0.2, (points, 3))
+    inertia = (m[:, None, None] * ((x**2).sum(1)[:, None, None] * np.eye(3))).sum(0)
+    inertia -= np.einsum("n,na,nb->ab", m, x, x)
+    terms = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return np.array([mass, *(m @ x), *terms]), np.einsum("n,na,nb->ab", m, x, x)
+
+
+def flat(matrix):
+    """Entries of a symmetric matrix such that sums of squares are Frobenius norms."""
+    rows, columns = np.triu_indices(4)
+    return np.array(
+        [matrix[i, j] * (1 if i == j else np.sqrt(2)) for i, j in zip(rows, columns, strict=True)]
+    )
+
+
+def as_matrix():
+    """The linear map from link parameters to ``flat`` of the pseudo-inertia."""
+    return np.array([flat(pseudo_inertia(e)) for e in np.eye(10)]).T
+
+
+def test_pseudo_inertia_is_that_of_the_points():
+    theta, second_moments = body(0)
+    j = pseudo_inertia(theta)
+    assert np.abs(j[:3, :3] - second_moments).max() < 1e-14
+    assert np.array_equal(j[:3, 3], theta[1:4]) and j[3, 3] == theta[0]
+    assert np.linalg.eigvalsh(j)[0] > 0
+    # Of a body that cannot be: the triangle inequality of its principal moments is broken.
+    assert np.linalg.eigvalsh(pseudo_inertia([1, 0, 0, 0, 1, 1, 3, 0, 0, 0]))[0] < 0
+
+
+def test_consistent_fit_is_left_as_it_is():
+    theta, _ = body(1)
+    factor = np.random.default_rng(0).normal(size=(14, 11))
+    theta = np.append(theta, 0.3)
+    found = consistent_parameters(
+        factor, factor @ theta, links=[LINK], nonnegative=[10], prior=1.1 * theta
+    )
+    assert found.status == "already_consistent" and found.iterations == 0
+    # The prior weighs 1e-12 of the best direction; the condition number is near ten.
+    assert np.abs(found.theta - theta).max() < 1e-9
+    assert found.boundary_links == () and found.boundary_parameters == ()
+
+
+def test_projection_is_the_clipping_of_eigenvalues():
+    # In the Frobenius norm the nearest positive semidefinite matrix has its negative
+    # eigenvalues set to zero (Higham 1988); here to the margin.
+    for seed in range(5):
+        theta, _ = body(seed)
+        j = pseudo_inertia(theta)
+        middle = np.linalg.eigvalsh(j)[1:3].mean()
+        j = j - middle * np.eye(4)
+        values, vectors = np.linalg.eigh(j)
+        assert values[1] < 0 < values[2]
+        margin = 1e-6 * 10.0  # of the typical mass; the typical length makes 2.5
+        found = consistent_parameters(
+            as_matrix(), flat(j), links=[LINK], prior=np.zeros(10), margin=1e-6
+        )
+        assert (found.mass, found.length_m) == (10.0, 0.5)
+        want = vectors @ np.diag(np.maximum(values, 0.0)) @ vectors.T
+        assert found.status == "solved"
+        # The margin moves the solution by itself; the solver's tolerance is 1e-10 of 10.
+        assert np.abs(pseudo_inertia(found.theta) - want).max() < 2 * margin
+        assert found.boundary_links == (0,)
+        assert found.loss == pytest.approx((values[values < 0] ** 2).sum(), rel=1e-3)
+
+
+def test_agrees_with_a_general_optimiser():
+    rng = np.random.default_rng(4)
+    theta, _ = body(4)
+    factor = rng.normal(size=(12, 11))
+    target = factor @ np.append(theta, -0.5) + rng.normal(0, 2.0, 12)
+    found = consistent_parameters(factor, target, links=[LINK], nonnegative=[10], margin=1e-9)
+    assert found.status == "solved"
+    assert found.boundary_parameters == (10,)
+
+    def parameters(x):
+        """Any body as a Cholesky factor, any coefficient as a square."""
+        low = np.zeros((4, 4))
+        low[np.tril_indices(4)] = x[:10]
+        return np.append(np.linalg.solve(as_matrix(), flat(low @ low.T)), x[10] ** 2)
+
+    best = min(
+        minimize(
+            lambda x: np.sum((factor @ parameters(x) - target) ** 2),
+            np.random.default_rng(run).normal(0, 1, 11),
+            method="BFGS",
+            options={"gtol": 1e-10, "maxiter": 4000},
+        ).fun
+        for run in range(4)
+    )
+    # A local search from above: it may stop a little short of the minimum.
+    assert found.loss == pytest.approx(best, rel=1e-4)
+    assert found.loss < best * (1 + 1e-6)
+
+
+def test_prior_decides_what_data_leave_open():
+    # Only three combinations are measured, exactly: those must hold, the rest is CAD.
+    theta, _ = body(2)
+    cad, _ = body(3)
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(3, 10))
+    found = consistent_parameters(factor, factor @ theta, links=[LINK], prior=cad)
+    assert np.abs(factor @ (found.theta - theta)).max() < 1e-5
+    # The nearest to CAD that fits, if it exists: a projection in typical units.
+    scale = np.array([found.mass] + [found.mass * found.length_m] * 3)
+    scale = np.append(scale, [found.mass * found.length_m**2] * 6)
+    want = cad + scale * (np.linalg.pinv(factor * scale) @ (factor @ (theta - cad)))
+    if found.status == "already_consistent":
+        assert np.abs(found.theta - want).max() < 1e-5
+    else:
+        assert np.linalg.eigvalsh(pseudo_inertia(want))[0] < 0
+    # With standard deviations the prior is a measurement like any other.
+    std = np.full(10, 0.5)
+    bayes = consistent_parameters(factor, factor @ theta, links=[LINK], prior=cad, prior_std=std)
+    both = np.concatenate([factor, np.diag(1 / std)])
+    least = np.linalg.lstsq(both, np.concatenate([factor @ theta, cad / std]), rcond=None)[0]
+    assert bayes.status == "already_consistent"
+    assert np.abs(bayes.theta - least).max() < 1e-10
+
+
+def test_noisy_links_become_possible_and_come_nearer_to_the_truth():
+    rng = np.random.default_rng(11)
+    truth = np.concatenate([body(k)[0] for k in range(4)] + [[0.2, 0.0, 1.0]])
+    links = np.arange(40).reshape(4, 10)
+    better = 0
+    for run in range(10):
+        factor = np.random.default_rng((5, run)).normal(size=(60, 43))
+        noise = rng.normal(0, 3.0, 60)
+        free = np.linalg.lstsq(factor, factor @ truth + noise, rcond=None)[0]
+        q, r = np.linalg.qr(factor)
+        found = consistent_parameters(
+            r, q.T @ (factor @ truth + noise), links=links, nonnegative=[40, 41, 42]
+        )
+        assert found.status == "solved"
+        assert np.all(found.least_eigenvalue > 0.99e-6)
+        assert np.all(found.theta[40:] > -1e-8)
+        assert found.loss >= found.loss_unconstrained
+        better += np.linalg.norm(r @ (found.theta - truth)) < np.linalg.norm(r @ (free - truth))
+    # Projection onto a convex set that holds the truth, in the metric of the fit: always.
+    assert better == 10
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"factor": np.full((12, 11), np.nan)}, "factor: expected finite"),
+        ({"factor": np.zeros(11)}, "factor: expected finite real numbers in 2"),
+        ({"factor": np.ones((12, 11)) * 1j}, "factor: expected finite real"),
+        ({"target": np.zeros(5)}, r"target: expected shape \(12,\)"),
+        ({"links": [np.arange(9)]}, "links: expected positions"),
+        ({"links": [np.arange(2, 12)]}, "links: expected positions from 0 to 10"),
+        ({"links": [LINK, LINK]}, "links: expected positions"),
+        ({"links": [LINK * 1.0]}, "links: expected positions"),
+        ({"nonnegative": [-1]}, "nonnegative: expected positions"),
+        ({"nonnegative": [10, 10]}, "nonnegative: expected positions"),
+        ({"prior": np.zeros(3)}, r"prior: expected shape \(11,\)"),
+        ({"prior": np.full(11, np.inf)}, "prior: expected finite"),
+        ({"prior_std": 0.0}, "prior_std: expected one positive"),
+        ({"prior_std": np.ones(4)}, "prior_std: expected one positive"),
+        ({"prior_std": np.nan}, "prior_std: expected one positive"),
+        ({"margin": -1e-6}, "margin: expected a positive"),
+        ({"margin": np.inf}, "margin: expected a positive"),
+        ({"max_iterations": 0}, "max_iterations: expected a positive"),
+        ({"max_iterations": 2.5}, "max_iterations: expected a positive"),
+    ],
+)
+def test_misuse_is_named(change, message):
+    rng = np.random.default_rng(0)
+    given = {
+        "factor": rng.normal(size=(12, 11)),
+        "target": np.ones(12),
+        "links": [LINK],
+        "nonnegative": [10],
+    } | change
+    with pytest.raises(InputError, match=message):
+        consistent_parameters(given.pop("factor"), given.pop("target"), **given)
+
+
+def test_a_solver_that_is_cut_short_says_so():
+    rng = np.random.default_rng(4)
+    factor = rng.normal(size=(12, 11))
+    found = consistent_parameters(
+        factor, rng.normal(size=12) * 10, links=[LINK], nonnegative=[10], max_iterations=2
+    )
+    assert found.status == "inaccurate"
+    assert "solver" in found.advice
