@@ -135,6 +135,19 @@ def test_prior_decides_what_data_leave_open():
     assert np.abs(bayes.theta - least).max() < 1e-10
 
 
+def test_prior_counts_like_a_measurement_on_the_boundary_too():
+    theta, _ = body(6)
+    target = flat(pseudo_inertia(theta) - 0.4 * np.eye(4))
+    prior, std = 1.5 * theta, np.linspace(0.2, 2.0, 10)
+    one = consistent_parameters(as_matrix(), target, links=[LINK], prior=prior, prior_std=std)
+    stacked = np.concatenate([as_matrix(), np.diag(1 / std)])
+    two = consistent_parameters(stacked, np.concatenate([target, prior / std]), links=[LINK])
+    assert one.status == two.status == "solved"
+    # Typical sizes differ, so do the margins: 1e-6 of some 10 kg.
+    assert np.abs(one.theta - two.theta).max() < 1e-4
+    assert np.abs(one.theta - theta).max() > 0.1
+
+
 def test_noisy_links_become_possible_and_come_nearer_to_the_truth():
     rng = np.random.default_rng(11)
     truth = np.concatenate([body(k)[0] for k in range(4)] + [[0.2, 0.0, 1.0]])
