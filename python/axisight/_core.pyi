@@ -25,11 +25,13 @@ __all__ = [
     "__version__",
     "directions",
     "effect_table",
+    "energy_regressor",
     "failure_kinds",
     "fit_inverse_dynamics",
     "fit_simulation",
     "frf_local_model",
     "frf_local_periodic",
+    "inertial_parameters",
     "invert_matrices",
     "measurement_noise",
     "multisine_peak",
@@ -37,10 +39,12 @@ __all__ = [
     "optimize_crest_factor",
     "random_phases",
     "record_spectra",
+    "regression_factors",
     "right_divide_matrices",
     "simulate",
     "simulate_batch",
     "square_period",
+    "torque_regressor",
 ]
 
 __version__: str
@@ -718,4 +722,53 @@ def optimize_crest_factor(
     ``clipping``: iterations, first level, last level, relaxation, oversampling.
     ``refinement``: first exponent, last exponent, iterations, oversampling. ``phase`` [rad]
     is the one start in the place of random ones.
+    """
+
+# Signal, coefficient of each joint, coefficient in each row, dead band, smoothing.
+_Extra: TypeAlias = tuple[str, Sequence[float], Sequence[float], float, float]
+
+def torque_regressor(
+    robot: Robot,
+    q: _Array,
+    v: _Array,
+    a: _Array,
+    *,
+    rows: _Array,
+    extras: Sequence[_Extra],
+    threads: int = 0,
+) -> _Array:
+    """Regressor, shape (n, n_rows, n_parameters), of ``rows`` (n_rows, n_joints) times torques.
+
+    Columns: ten for each link with mass, then one for each extra: a signal (position,
+    velocity, acceleration, direction, constant) of a combination of joints, felt in fixed
+    proportions by the rows.
+    """
+
+def energy_regressor(robot: Robot, q: _Array, v: _Array, *, threads: int = 0) -> _Array:
+    """Energy of the links per unit of each link parameter, shape (n, 10 n_links)."""
+
+def regression_factors(
+    robot: Robot,
+    q: _Array,
+    v: _Array,
+    a: _Array,
+    torque: _Array,
+    *,
+    rows: _Array,
+    extras: Sequence[_Extra],
+    columns: Sequence[int],
+    known: Sequence[float],
+    weight: _Array | None,
+    blocks: int,
+    threads: int = 0,
+) -> tuple[_Array, list[int]]:
+    """Upper triangular factors of ``[Phi[:, columns] | torque - Phi known]`` and block lengths.
+
+    Shape (blocks, n_rows, k + 1, k + 1): one for each block of samples and each row.
+    """
+
+def inertial_parameters(robot: Robot) -> tuple[list[int], _Array]:
+    """Joints (from 0) whose links have mass, and ten parameters of each link.
+
+    Mass, first moments x y z, inertia about the link frame xx yy zz xy xz yz.
     """

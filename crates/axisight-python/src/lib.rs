@@ -11,6 +11,7 @@ mod fit;
 mod frf;
 mod local_models;
 mod montecarlo;
+mod regressor;
 mod robot;
 mod simulation;
 
@@ -54,5 +55,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::torque_regressor, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::regression_factors, module)?)?;
     Ok(())
 }
