@@ -137,8 +137,8 @@ def test_prior_decides_what_data_leave_open():
 
 def test_prior_counts_like_a_measurement_on_the_boundary_too():
     theta, _ = body(6)
-    target = flat(pseudo_inertia(theta) - 0.4 * np.eye(4))
-    prior, std = 1.5 * theta, np.linspace(0.2, 2.0, 10)
+    target = flat(pseudo_inertia(theta) - 3.0 * np.eye(4))
+    prior, std = 0.5 * theta, np.linspace(1.0, 3.0, 10)
     one = consistent_parameters(as_matrix(), target, links=[LINK], prior=prior, prior_std=std)
     stacked = np.concatenate([as_matrix(), np.diag(1 / std)])
     two = consistent_parameters(stacked, np.concatenate([target, prior / std]), links=[LINK])
