@@ -133,6 +133,24 @@ class TorqueModel:
         )
 
 
+def as_model(
+    robot: Robot | TorqueModel,
+    terms: DriveTerms | None,
+    side: Side | None,
+    coupling: MotorCoupling | None,
+) -> TorqueModel:
+    """Return the torque model of a robot and options, or the model given in its place."""
+    if isinstance(robot, TorqueModel):
+        if not (terms is None and side is None and coupling is None):
+            raise InputError(
+                "terms, side, coupling: expected none of them with a TorqueModel, which holds them"
+            )
+        return robot
+    if not isinstance(robot, Robot):
+        raise InputError(f"robot: expected a Robot or a TorqueModel, got {type(robot).__name__}")
+    return TorqueModel(robot, terms=terms, side=side or "joint", coupling=coupling)
+
+
 def torque_regressor(
     robot: Robot,
     q: ArrayLike,
