@@ -347,29 +347,14 @@ class _Problem:
         first = x
         done, count = False, 0
         for norm in _NORMS:
-            memory: dict[bytes, tuple[float, Array, Array, Array]] = {}
-
-            def at(
-                y: Array,
-                norm: float = norm,
-                memory: dict[bytes, tuple[float, Array, Array, Array]] = memory,
-            ) -> tuple[float, Array, Array, Array]:
-                key = y.tobytes()
-                if key not in memory:
-                    memory.clear()
-                    memory[key] = self.evaluate(y, norm)
-                return memory[key]
-
+            memory = _Memory(self, norm)
+            constraint: Any = {"type": "ineq", "fun": memory.limits, "jac": memory.limits_slope}
             found = minimize(
-                lambda y, at=at: at(y)[0],
+                memory.cost,
                 x,
-                jac=lambda y, at=at: at(y)[1],
+                jac=memory.slope,
                 method="SLSQP",
-                constraints={
-                    "type": "ineq",
-                    "fun": lambda y, at=at: at(y)[2],
-                    "jac": lambda y, at=at: at(y)[3],
-                },
+                constraints=constraint,
                 options={"maxiter": iterations, "ftol": 1e-6},
             )
             x, done, count = np.array(found.x), bool(found.success), count + int(found.nit)
@@ -390,13 +375,13 @@ class _Problem:
     def start(self, rng: np.random.Generator) -> Array:
         """Random coefficients, drawn together until they keep to the limits."""
         n = len(self.joints)
-        x = rng.normal(0.0, 1.0, self.basis.shape[1])
-        coefficients = (self.basis @ x).reshape(n, -1)
+        drawn = rng.normal(0.0, 1.0, self.basis.shape[1])
+        coefficients = (self.basis @ drawn).reshape(n, -1)
         coefficients[:, 0] = self.bounds["middle"]
         x = np.linalg.lstsq(self.basis, coefficients.ravel(), rcond=None)[0]
-        middle = coefficients * 0.0
+        middle = np.zeros_like(coefficients)
         middle[:, 0] = self.bounds["middle"]
-        rest = np.linalg.lstsq(self.basis, middle.ravel(), rcond=None)[0]
+        rest = np.linalg.lstsq(self.basis, middle.ravel(), rcond=None)[0].astype(np.float64)
         size = 1.0
         for _ in range(30):
             if self.evaluate(rest + size * (x - rest), _NORMS[0])[2].min() >= 0.05:
@@ -484,6 +469,33 @@ class _Problem:
             columns=tuple(int(c) for c in self.columns),
             design=design,
         )
+
+
+class _Memory:
+    """The last evaluation: the optimiser asks for value, gradient and limits one by one."""
+
+    def __init__(self, problem: _Problem, norm: float) -> None:
+        self.problem, self.norm = problem, norm
+        self.key = b""
+        self.found: tuple[float, Array, Array, Array] | None = None
+
+    def at(self, x: Array) -> tuple[float, Array, Array, Array]:
+        key = x.tobytes()
+        if self.found is None or key != self.key:
+            self.key, self.found = key, self.problem.evaluate(x, self.norm)
+        return self.found
+
+    def cost(self, x: Array) -> float:
+        return self.at(x)[0]
+
+    def slope(self, x: Array) -> Array:
+        return self.at(x)[1]
+
+    def limits(self, x: Array) -> Array:
+        return self.at(x)[2]
+
+    def limits_slope(self, x: Array) -> Array:
+        return self.at(x)[3]
 
 
 def _p_norm(x: Array, norm: float) -> tuple[Array, Array]:
