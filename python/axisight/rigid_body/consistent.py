@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from axisight import _core
 from axisight.errors import InputError
+from axisight.rigid_body.regressor import TorqueModel, rows
 
 Array = NDArray[np.float64]
 Status = Literal["already_consistent", "solved", "inaccurate", "failed"]
@@ -165,6 +167,88 @@ def consistent_parameters(
     weight = _prior_weight(prior_std, r * scale, scale)
     problem = _Problem(r * scale, y, before / scale, weight, where, signs, margin, scale)
     return problem.result(mass, length, max_iterations)
+
+
+def identify_consistent(
+    model: TorqueModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    torque_nm: ArrayLike,
+    *,
+    torque_std_nm: ArrayLike = 1.0,
+    prior: ArrayLike | None = None,
+    prior_std: ArrayLike | None = None,
+    margin: float = 1e-6,
+    max_iterations: int = 200,
+    threads: int = 0,
+) -> ConsistentParameters:
+    """Estimate all parameters of a torque model so that every body can exist.
+
+    Parameters
+    ----------
+    model : robot, drive terms, side and couplings.
+    q, v, a, torque_nm : as for :func:`identify_rigid_body`.
+    torque_std_nm : standard deviation of the residual of each row, one number or (n_rows,) [Nm],
+        as ``residual_std_nm`` of an unconstrained estimate gives it.
+    prior : (n_parameters,) what to stay close to; by default the values in the robot file.
+    prior_std, margin, max_iterations : as for :func:`consistent_parameters`.
+    threads : threads to use, 0 for all.
+
+    Rotor inertias, friction, stiffness and damping are held at zero or above. Memory does not
+    grow with the number of samples. Raises InputError naming the field.
+
+    """
+    motion = model.motion(q, v, a)
+    torque = rows("torque_nm", torque_nm, model.n_rows)
+    if len(torque) != len(motion[0]):
+        raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
+    std = np.asarray(torque_std_nm, dtype=np.float64)
+    if std.shape not in {(), (model.n_rows,)} or not (np.isfinite(std) & (std > 0)).all():
+        raise InputError(
+            f"torque_std_nm: expected positive numbers, one or ({model.n_rows},), "
+            f"got shape {std.shape}"
+        )
+    p = model.n_parameters
+    factors, _ = _core.regression_factors(
+        model.robot.core,
+        *motion,
+        torque,
+        rows=model.row_map,
+        extras=model.extras,
+        columns=list(range(p)),
+        known=[0.0] * p,
+        weight=None,
+        blocks=1,
+        threads=threads,
+    )
+    stacked = (factors[0] / np.broadcast_to(std, (model.n_rows,))[:, None, None]).reshape(-1, p + 1)
+    both = np.linalg.qr(stacked, mode="r")
+    return consistent_parameters(
+        both[:, :p],
+        both[:, p],
+        links=link_positions(model),
+        nonnegative=nonnegative_positions(model),
+        prior=model.nominal if prior is None else prior,
+        prior_std=prior_std,
+        margin=margin,
+        max_iterations=max_iterations,
+    )
+
+
+def link_positions(model: TorqueModel) -> NDArray[np.int64]:
+    """Return the positions (n_links, 10) of the links' parameters in those of the model."""
+    count = sum(column.extra is None for column in model.columns)
+    return np.arange(count, dtype=np.int64).reshape(-1, LINK_PARAMETERS)
+
+
+def nonnegative_positions(model: TorqueModel) -> list[int]:
+    """Return the positions of rotors, friction and springs, which cannot be negative."""
+    return [
+        k
+        for k, column in enumerate(model.columns)
+        if column.extra is not None and column.extra[0] != "constant"
+    ]
 
 
 class _Problem:
