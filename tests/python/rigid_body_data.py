@@ -124,3 +124,34 @@ def motion(robot: Robot, n: int, seed: int = 0) -> tuple[Array, Array, Array]:
 
 def parse(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
+
+
+def smooth_motion(robot: Robot, n: int, step_s: float, seed: int = 0) -> tuple[Array, Array, Array]:
+    """Sums of five sines per joint, with exact derivatives."""
+    rng = np.random.default_rng(seed)
+    t = step_s * np.arange(n)[:, None, None]
+    shape = (robot.n_joints, 5)
+    w = 2 * np.pi * rng.uniform(0.1, 0.8, shape)
+    amplitude, phase = rng.uniform(0.2, 0.6, shape), rng.uniform(0, 2 * np.pi, shape)
+    angle = w * t + phase
+    q = (amplitude * np.sin(angle)).sum(axis=2)
+    v = (amplitude * w * np.cos(angle)).sum(axis=2)
+    a = -(amplitude * w**2 * np.sin(angle)).sum(axis=2)
+    return q, v, a
+
+
+def three_axes() -> str:
+    """The first three axes of the arm."""
+    data = parse(wrist_arm())
+    return description(data["joint"][:3], data["gravity"])
+
+
+def drive_values(names: list[str], nominal: Array) -> Array:
+    """Nominal parameters with friction and offsets that a robot file does not hold."""
+    values = nominal.copy()
+    for i, name in enumerate(names):
+        if name.endswith("coulomb_friction"):
+            values[i] = 0.4
+        elif name.endswith("torque_offset"):
+            values[i] = -0.07
+    return values

@@ -61,23 +61,23 @@ def gear_sign(
     the others say.
     """
     model = result.model
+    joints = model.robot.core.axis_joints
     q = motion[0][:: max(1, len(motion[0]) // LOOKS)]
-    zero = np.zeros_like(q)
+    # Unit acceleration of each motor (or joint) alone, and none at all.
+    units = np.zeros((len(joints) + 1, model.robot.n_joints))
+    alone = np.linalg.inv(model.coupling.position).T
+    units[:-1, joints] = alone if model.side == "motor" else np.eye(len(joints))
+    at = np.tile(q, (len(units), 1))
+    still = np.zeros_like(at)
+    looks = model.matrix(at, still, np.repeat(units, len(q), axis=0))
+    looks = looks.reshape(len(units), len(q), model.n_rows, model.n_parameters).mean(axis=1)
     held = np.array([result.known.get(name, 0.0) for name in model.names])
-    # Joint motion of each motor alone.
-    motors = np.linalg.inv(model.coupling.position)
-    at_rest = model.matrix(q, zero, zero)
     out = []
-    for axis, joint in enumerate(model.robot.core.axis_joints):
+    for axis, joint in enumerate(joints):
         row = axis if model.side == "motor" else joint
-        unit = np.zeros(model.robot.n_joints)
-        unit[joint] = 1.0
-        if model.side == "motor":
-            unit[model.robot.core.axis_joints] = motors[:, axis]
-        inertia = (model.matrix(q, zero, zero + unit) - at_rest)[:, row, :]
-        known_part = float((inertia @ held).mean())
-        direction = inertia.mean(axis=0)[result.base.columns]
-        value, error = _axis_alone(factors, row, direction)
+        inertia = (looks[axis] - looks[-1])[row]
+        known_part = float(inertia @ held)
+        value, error = _axis_alone(factors, row, inertia[result.base.columns])
         if value + known_part < -CLEARLY * error:
             name = model.robot.joint_names[joint]
             text = (
@@ -92,7 +92,7 @@ def gear_sign(
 def _axis_alone(factors: Factors, row: int, direction: Array) -> tuple[float, float]:
     """Value and standard error of a combination, from one row only, of least norm."""
     k = factors.k
-    r = factors.rows()[row]
+    r = factors.rows[row]
     size = np.linalg.norm(r[:, :k], axis=0)
     scale = np.where(size > 0, size, 1.0)
     u, s, vt = np.linalg.svd(r[:, :k] / scale, full_matrices=False)

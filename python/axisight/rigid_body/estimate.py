@@ -115,7 +115,7 @@ def identify_rigid_body(
 
     shares = reversals(model, base.columns, motion[1])
     findings = reversal_findings(shares)
-    found = group(factors.rows().reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
+    found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
     if len(found.independent) < len(base):
         message = rank_message(base, found, shares, motion)
         if deficient == "raise":
@@ -269,7 +269,7 @@ def _column_noise(
                 f"got {dict(given)}"
             )
         return np.array([given.get(name, 0.0) for name in base.names])
-    stacked = factors.rows().reshape(-1, factors.k + 1)
+    stacked = factors.rows.reshape(-1, factors.k + 1)
     size = np.linalg.norm(stacked, axis=0)
     noise = size[:-1] / size[-1]
     for i, column in enumerate(base.columns):

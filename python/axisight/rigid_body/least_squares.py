@@ -7,6 +7,7 @@ and costs the same for a thousand samples or a billion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -33,8 +34,9 @@ class Factors:
         """Number of parameters."""
         return int(self.blocks.shape[-1]) - 1
 
+    @cached_property
     def rows(self) -> Array:
-        """Return one factor per row, shape (n_rows, k + 1, k + 1)."""
+        """One factor per row, shape (n_rows, k + 1, k + 1)."""
         stacked = self.blocks.swapaxes(0, 1).reshape(self.blocks.shape[1], -1, self.k + 1)
         return triangle(stacked)
 
@@ -94,7 +96,7 @@ def triangle(stack: Array) -> Array:
 
 def solve_weighted(factors: Factors, weight: Array) -> Solution:
     """Least squares with a weight per row (4.5)."""
-    k, rows = factors.k, factors.rows()
+    k, rows = factors.k, factors.rows
     r = triangle((weight[:, None, None] * rows).reshape(-1, k + 1))
     values = _back(r[:k, :k], r[:k, k])
     residual = rows[..., :k] @ values - rows[..., k]
@@ -141,7 +143,7 @@ def solve_total(factors: Factors, start: Solution, noise: Array) -> Solution | N
     for columns without error (mixed problem, Van Huffel and Vandewalle 1991). Rows are
     weighted as in ``start``. None if no solution exists.
     """
-    k, rows, weight = factors.k, factors.rows(), start.weight
+    k, rows, weight = factors.k, factors.rows, start.weight
     noisy = noise > 0
     order = np.concatenate([np.flatnonzero(~noisy), np.flatnonzero(noisy)])
     scale = np.where(noisy, noise, 1.0)[order]
@@ -178,7 +180,7 @@ def solve_total(factors: Factors, start: Solution, noise: Array) -> Solution | N
 def white_covariance(factors: Factors, solution: Solution) -> Array:
     """Covariance for residuals that are white, of each row its own variance."""
     k = factors.k
-    scaled = (solution.weight**2 * solution.sigma)[:, None, None] * factors.rows()[..., :k]
+    scaled = (solution.weight**2 * solution.sigma)[:, None, None] * factors.rows[..., :k]
     root = _right_divide(scaled.reshape(-1, k), solution.normal)
     inverse = _back(solution.normal, np.eye(k))
     half = root @ inverse.T
