@@ -1,11 +1,21 @@
 """Bodies that can exist: closed forms, SciPy, recovery, misuse."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 from axisight.errors import InputError
-from axisight.rigid_body.consistent import consistent_parameters, pseudo_inertia
+from axisight.rigid_body import (
+    USUAL_TERMS,
+    TorqueModel,
+    consistent_parameters,
+    identify_consistent,
+    identify_rigid_body,
+    pseudo_inertia,
+)
+from three_axes import robot
 
 LINK = np.arange(10)
 
@@ -103,7 +113,7 @@ def test_agrees_with_a_general_optimiser():
             method="BFGS",
             options={"gtol": 1e-10, "maxiter": 4000},
         ).fun
-        for run in range(4)
+        for run in range(2)
     )
     # A local search from above: it may stop a little short of the minimum.
     assert found.loss == pytest.approx(best, rel=1e-4)
@@ -214,3 +224,81 @@ def test_a_solver_that_is_cut_short_says_so():
     )
     assert found.status == "inaccurate"
     assert "solver" in found.advice
+
+
+@pytest.fixture(scope="module")
+def three_axes():
+    return TorqueModel(robot(), terms=USUAL_TERMS, side="motor")
+
+
+def motion(n, seed):
+    return np.random.default_rng(seed).normal(size=(3, n, 3)) * [[[1.0]], [[2.0]], [[5.0]]]
+
+
+def true_parameters(model):
+    theta = model.nominal
+    for name, value in (("coulomb_friction", 0.1), ("torque_offset", -0.05)):
+        for k, full in enumerate(model.names):
+            if full.endswith(name):
+                theta[k] = value
+    return theta
+
+
+def test_true_robot_comes_back_from_its_torques(three_axes):
+    theta = true_parameters(three_axes)
+    q, v, a = motion(300, 0)
+    torque = three_axes.matrix(q, v, a) @ theta
+    found = identify_consistent(three_axes, q, v, a, torque, torque_std_nm=0.1)
+    # The robot's own file is the prior, and what it lacks is identifiable.
+    assert found.status == "already_consistent"
+    assert np.abs(found.theta - theta).max() < 1e-6
+    # A wrong prior changes what cannot be seen, and nothing that can.
+    wrong = np.where(np.arange(len(theta)) < 30, 1.2 * theta, theta)
+    other = identify_consistent(three_axes, q, v, a, torque, torque_std_nm=0.1, prior=wrong)
+    assert np.abs(other.theta - theta).max() > 0.1
+    q, v, a = motion(100, 1)
+    predicted = three_axes.matrix(q, v, a) @ other.theta
+    assert np.abs(predicted - three_axes.matrix(q, v, a) @ theta).max() < 1e-4
+
+
+def test_short_noisy_record_is_predicted_better_by_bodies_that_exist(three_axes):
+    theta = true_parameters(three_axes)
+    t = np.linspace(0, 2, 80)[:, None]
+    w = np.array([2.0, 3.0, 4.0])
+    q, v, a = 0.5 * np.sin(w * t), 0.5 * w * np.cos(w * t), -0.5 * w**2 * np.sin(w * t)
+    held = motion(300, 5)
+    exact = three_axes.matrix(*held) @ theta
+    errors = []
+    for run in range(5):
+        noise = np.random.default_rng((9, run)).normal(0, 0.05, (80, 3))
+        torque = three_axes.matrix(q, v, a) @ theta + noise
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            free = identify_rigid_body(three_axes, q, v, a, torque, deficient="group")
+        found = identify_consistent(
+            three_axes, q, v, a, torque, torque_std_nm=0.05, prior=1.3 * theta
+        )
+        assert found.status == "solved"
+        errors.append(
+            [
+                np.std(free.predict(*held) - exact),
+                np.std(three_axes.matrix(*held) @ found.theta - exact),
+            ]
+        )
+    plain, possible = np.mean(errors, axis=0)
+    assert possible < 0.5 * plain
+
+
+def test_misuse_of_a_motion_is_named(three_axes):
+    q, v, a = motion(50, 0)
+    torque = np.zeros((50, 3))
+    for given, options, message in (
+        ((q, v, a, torque[:9]), {}, "torque_nm: expected 50 rows"),
+        ((q, v, a, torque * np.nan), {}, "torque_nm: expected finite"),
+        ((q[:, :2], v, a, torque), {}, "q: expected shape"),
+        ((q, v, a, torque), {"torque_std_nm": 0.0}, "torque_std_nm: expected positive"),
+        ((q, v, a, torque), {"torque_std_nm": [1.0, 2.0]}, "torque_std_nm: expected positive"),
+        ((q, v, a, torque), {"prior": np.zeros(4)}, "prior: expected shape"),
+    ):
+        with pytest.raises(InputError, match=message):
+            identify_consistent(three_axes, *given, **options)
