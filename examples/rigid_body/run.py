@@ -32,6 +32,7 @@ from axisight.rigid_body import (
     estimate_motion,
     identify_consistent,
     identify_rigid_body,
+    prior_spread,
 )
 
 HERE = Path(__file__).resolve().parent
@@ -213,7 +214,11 @@ def analyse(
         }
     estimate = fits["least squares"]
     consistent = identify_consistent(
-        with_friction, *train.motion, train.torque_nm, torque_std_nm=estimate.residual_std_nm
+        with_friction,
+        *train.motion,
+        train.torque_nm,
+        torque_std_nm=estimate.residual_std_nm,
+        prior_std=prior_spread(with_friction),
     )
     predicted = {}
     for part in (train, *held_out):

@@ -13,6 +13,7 @@ from axisight.rigid_body import (
     consistent_parameters,
     identify_consistent,
     identify_rigid_body,
+    prior_spread,
     pseudo_inertia,
 )
 from three_axes import robot
@@ -259,6 +260,20 @@ def test_true_robot_comes_back_from_its_torques(three_axes):
     q, v, a = motion(100, 1)
     predicted = three_axes.matrix(q, v, a) @ other.theta
     assert np.abs(predicted - three_axes.matrix(q, v, a) @ theta).max() < 1e-4
+
+
+def test_spread_of_a_prior_is_that_of_its_links(three_axes):
+    spread = dict(zip(three_axes.names, prior_spread(three_axes, 0.5), strict=True))
+    nominal = dict(zip(three_axes.names, three_axes.nominal, strict=True))
+    assert spread["turn.mass"] == pytest.approx(10.0)
+    # m L^2 is the sum of second moments, half the trace of the inertia.
+    trace = sum(nominal[f"turn.inertia_{k}"] for k in ("xx", "yy", "zz"))
+    assert spread["turn.inertia_xy"] == pytest.approx(0.5 * 0.5 * trace)
+    assert spread["turn.mass_x"] == pytest.approx(0.5 * np.sqrt(20.0 * 0.5 * trace))
+    assert spread["turn.motor_inertia"] == pytest.approx(0.5 * nominal["turn.motor_inertia"])
+    assert np.isinf(spread["turn.coulomb_friction"])
+    with pytest.raises(InputError, match="share: expected a positive"):
+        prior_spread(three_axes, 0.0)
 
 
 def test_short_noisy_record_is_predicted_better_by_bodies_that_exist(three_axes):

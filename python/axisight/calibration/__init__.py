@@ -9,6 +9,7 @@ from axisight.calibration.measurements import (
     Poses,
     Positions,
     SamePoint,
+    load_torque,
 )
 
 __all__ = [
@@ -22,5 +23,6 @@ __all__ = [
     "Positions",
     "SamePoint",
     "calibrate",
+    "load_torque",
     "nominal_geometry",
 ]

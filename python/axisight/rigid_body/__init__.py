@@ -5,6 +5,7 @@ from axisight.rigid_body.consistent import (
     ConsistentParameters,
     consistent_parameters,
     identify_consistent,
+    prior_spread,
     pseudo_inertia,
 )
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
@@ -50,6 +51,7 @@ __all__ = [
     "identify_consistent",
     "identify_rigid_body",
     "optimize_trajectory",
+    "prior_spread",
     "pseudo_inertia",
     "torque_regressor",
 ]

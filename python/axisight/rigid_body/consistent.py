@@ -236,6 +236,27 @@ def identify_consistent(
     )
 
 
+def prior_spread(model: TorqueModel, share: float = 1.0) -> Array:
+    """Return standard deviations (n_parameters,) of the values in the robot file, as a prior.
+
+    ``share`` of each link's own mass m, of m times its radius of gyration about the link frame
+    for first moments, of m times that squared for inertias; ``share`` of each nominal rotor
+    inertia; infinite where ``model`` has no nominal value, as for friction and offsets. Raises
+    InputError.
+    """
+    if not (np.isfinite(share) and share > 0):
+        raise InputError(f"share: expected a positive number, got {share!r}")
+    nominal = model.nominal
+    out = np.full(model.n_parameters, np.inf)
+    rotor = np.array([c.extra is not None and c.extra[0] == "acceleration" for c in model.columns])
+    known = rotor & (nominal > 0)
+    out[known] = share * nominal[known]
+    for link in link_positions(model):
+        mass, length = _typical(nominal[link][None])
+        out[link] = share * _link_scale(mass, length)
+    return out
+
+
 def link_positions(model: TorqueModel) -> NDArray[np.int64]:
     """Return the positions (n_links, 10) of the links' parameters in those of the model."""
     count = sum(column.extra is None for column in model.columns)
@@ -393,9 +414,13 @@ def _scales(r: Array, y: Array, links: NDArray[np.int64], mass: float, length: f
     size = np.linalg.norm(r, axis=0)
     reach = float(np.linalg.norm(y)) or 1.0
     scale = np.where(size > 0, reach / np.where(size > 0, size, 1.0), 1.0)
-    one = mass * np.array([1.0, *[length] * 3, *[length**2] * 6])
-    scale[links] = one
+    scale[links] = _link_scale(mass, length)
     return scale
+
+
+def _link_scale(mass: float, length: float) -> Array:
+    """Sizes of the ten parameters of a link of some mass and length."""
+    return mass * np.array([1.0, *[length] * 3, *[length**2] * 6])
 
 
 def _prior_weight(prior_std: ArrayLike | None, scaled: Array, scale: Array) -> Array:
