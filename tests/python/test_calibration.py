@@ -372,6 +372,14 @@ def test_requests_that_make_no_sense(robot):
     ):
         with pytest.raises(InputError, match=message):
             calibrate(robot, given, **options)
+    for given, message in (
+        ((q[:, :5],), r"joint_angle_rad: expected shape \(n, 6\)"),
+        ((q, np.ones(4)), "payload_kg: expected one number"),
+        ((q, np.nan), "payload_kg: expected finite"),
+        ((q, 1.0, dataclasses.replace(LOADS, payload_com_m=(1.0, 2.0))), "payload_com_m: expected"),
+    ):
+        with pytest.raises(InputError, match=message):
+            load_torque(robot, *given)
     with pytest.raises(InputError, match="base_rotation: expected rotation"):
         nominal_geometry(robot, base_rotation=2 * np.eye(3))
     with pytest.raises(InputError, match="tool_position_m: expected shape"):

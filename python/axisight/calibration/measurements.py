@@ -234,20 +234,36 @@ def _target(measurement: Measurement, n: int, where: str) -> Array:
     return point
 
 
-def load_torque(robot: Robot, joint_angle: Array, payload: Array, loads: Loads) -> Array:
-    """Return the torques (n, n_joints) [Nm] that joints hold at rest.
+def load_torque(
+    robot: Robot,
+    joint_angle_rad: ArrayLike,
+    payload_kg: ArrayLike = 0.0,
+    loads: Loads | None = None,
+) -> Array:
+    """Return the torques (n, n_joints) [Nm] that the joints hold at rest.
 
-    They are taken at the undeflected angles: the error is of second order in the deflection.
+    ``joint_angle_rad`` (n, n_axes) are the angles of the driven joints; ``payload_kg`` one number
+    or (n,), where ``loads`` (gravity on the links by default) says. Torques are taken at the
+    undeflected angles: the error is of second order in the deflection. Raises InputError.
     """
-    q = np.zeros((len(joint_angle), robot.n_joints))
-    q[:, robot.core.axis_joints] = joint_angle
-    torque = robot.gravity(q) if loads.gravity else np.zeros_like(q)
+    held = loads or Loads()
+    angle = real("joint_angle_rad", joint_angle_rad)
+    if angle.ndim != 2 or angle.shape[1] != robot.n_axes or not len(angle):
+        raise InputError(f"joint_angle_rad: expected shape (n, {robot.n_axes}), got {angle.shape}")
+    payload = real("payload_kg", payload_kg)
+    if payload.shape not in {(), (len(angle),)}:
+        raise InputError(
+            f"payload_kg: expected one number or ({len(angle)},), got shape {payload.shape}"
+        )
+    q = np.zeros((len(angle), robot.n_joints))
+    q[:, robot.core.axis_joints] = angle
+    torque = robot.gravity(q) if held.gravity else np.zeros_like(q)
     if np.any(payload):
         gravity = np.array(_gravity(robot))
-        point = real("loads.payload_com_m", loads.payload_com_m)
+        point = real("loads.payload_com_m", held.payload_com_m)
         if point.shape != (3,):
             raise InputError(f"loads.payload_com_m: expected shape (3,), got {point.shape}")
-        for row, mass in enumerate(payload):
+        for row, mass in enumerate(np.broadcast_to(payload, (len(angle),))):
             lift = robot.jacobian(q[row], -1, tuple(point))[:3].T @ gravity
             torque[row] -= mass * lift
     return torque

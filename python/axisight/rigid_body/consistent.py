@@ -223,7 +223,7 @@ def identify_consistent(
         threads=threads,
     )
     stacked = (factors[0] / np.broadcast_to(std, (model.n_rows,))[:, None, None]).reshape(-1, p + 1)
-    both = np.linalg.qr(stacked, mode="r")
+    both: Array = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
     return consistent_parameters(
         both[:, :p],
         both[:, p],
