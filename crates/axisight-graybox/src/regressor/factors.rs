@@ -6,7 +6,7 @@
 //! residuals are coloured.
 
 use super::evaluate::{LANES, Motion, Regressor};
-use super::householder::{PIECE, Triangle};
+use super::householder::{Column, EMPTY, PIECE, Triangle};
 use super::{RegressorError, check_rows};
 use axisight_core::scalar::Scalar;
 use rayon::prelude::*;
@@ -130,13 +130,13 @@ impl Regressor {
             .iter()
             .map(|plan| Triangle::new(plan.kept.len() + 1))
             .collect();
-        let mut pieces: Vec<Vec<f64>> = plans
+        let mut pieces: Vec<Vec<Column>> = plans
             .iter()
-            .map(|plan| vec![0.0; (plan.kept.len() + 1) * PIECE])
+            .map(|plan| vec![EMPTY; plan.kept.len() + 1])
             .collect();
         for start in (from..to).step_by(PIECE) {
             let end = to.min(start + PIECE);
-            pieces.iter_mut().for_each(|piece| piece.fill(0.0));
+            pieces.iter_mut().for_each(|piece| piece.fill(EMPTY));
             for first in (start..end).step_by(LANES) {
                 let lanes = LANES.min(end - first);
                 self.sweep(&mut scratch, motion, first);
@@ -154,15 +154,12 @@ impl Regressor {
                             *rest = (-value).mul_add(column.lane(lane), *rest);
                         }
                     }
-                    let columns = piece.chunks_exact_mut(PIECE);
-                    let at = first - start;
-                    let values = plan
-                        .kept
-                        .iter()
-                        .map(|(_, i)| self.rows[r][*i].value(&scratch).0);
-                    for (column, value) in columns.zip(values.chain([rest])) {
+                    let row = &self.rows[r];
+                    let values = plan.kept.iter().map(|(_, i)| row[*i].value(&scratch).0);
+                    let at = (first - start) / LANES;
+                    for (column, value) in piece.iter_mut().zip(values.chain([rest])) {
                         for lane in 0..lanes {
-                            column[at + lane] = value[lane] * weight(lane);
+                            column[at][lane] = value[lane] * weight(lane);
                         }
                     }
                 }

@@ -1,10 +1,16 @@
 //! Triangular factor of tall matrices that come in pieces.
 
+use super::evaluate::LANES;
+
 /// Rows of a piece; a piece of 40 columns fits in the second-level cache.
 pub(super) const PIECE: usize = 256;
 /// Reflections applied together.
 const PANEL: usize = 4;
-const WIDE: usize = 8;
+
+/// One column of a piece, by groups of lanes, so that no length needs a check.
+pub(super) type Column = [[f64; LANES]; PIECE / LANES];
+/// A column of zeros.
+pub(super) const EMPTY: Column = [[0.0; LANES]; PIECE / LANES];
 
 /// The triangular factor R of rows seen so far.
 #[derive(Debug, Clone)]
@@ -22,36 +28,40 @@ impl Triangle {
         }
     }
 
-    /// Take in a piece: `n` columns of `PIECE` rows each, zero rows are nothing. Destroys it.
+    /// Take in a piece of `n` columns; zero rows are nothing. Destroys it.
     ///
     /// Householder reflections on a triangle over a full block touch one row of the triangle
     /// each, so nothing below its diagonal fills in. They are applied `PANEL` at a time, as
     /// `1 - V T^T V^T` (Schreiber and Van Loan 1989), so that every number fetched is used
     /// that often.
-    pub(super) fn update(&mut self, piece: &mut [f64]) {
-        let n = self.n;
-        for first in (0..n).step_by(PANEL) {
-            let width = PANEL.min(n - first);
-            let (head, rest) = piece.split_at_mut((first + width) * PIECE);
-            let panel = &mut head[first * PIECE..];
-            let reflections = self.reflect_panel(first, width, panel);
-            for (i, column) in rest.chunks_exact_mut(PIECE).enumerate() {
-                let place = first + width + i;
-                self.apply(&reflections, first, width, panel, column, place);
+    pub(super) fn update(&mut self, piece: &mut [Column]) {
+        let mut first = 0;
+        let mut rest = piece;
+        while rest.len() >= PANEL {
+            let all = std::mem::take(&mut rest);
+            let Some((panel, columns)) = all.split_first_chunk_mut::<PANEL>() else {
+                return;
+            };
+            let reflections = self.reflect_panel(first, panel);
+            for (i, column) in columns.iter_mut().enumerate() {
+                self.apply(&reflections, first, panel, column, first + PANEL + i);
             }
+            first += PANEL;
+            rest = columns;
         }
+        self.reflect_panel(first, rest);
     }
 
     /// Reflect the columns of a panel one after the other.
-    fn reflect_panel(&mut self, first: usize, width: usize, panel: &mut [f64]) -> Reflections {
+    fn reflect_panel(&mut self, first: usize, panel: &mut [Column]) -> Reflections {
         let n = self.n;
         let mut out = Reflections {
             leading: [0.0; PANEL],
             t: [[0.0; PANEL]; PANEL],
         };
-        for j in 0..width {
-            let (head, rest) = panel.split_at_mut((j + 1) * PIECE);
-            let v = &head[j * PIECE..];
+        for j in 0..panel.len() {
+            let (head, rest) = panel.split_at_mut(j + 1);
+            let (v, before) = (&head[j], &head[..j]);
             let row = &mut self.factor[(first + j) * n..(first + j + 1) * n];
             let below = dot(v, v);
             if below == 0.0 {
@@ -64,7 +74,7 @@ impl Triangle {
             let leading = pivot + signed;
             let scale = 2.0 / leading.mul_add(leading, below);
             row[first + j] = -signed;
-            for (i, column) in rest.chunks_exact_mut(PIECE).enumerate() {
+            for (i, column) in rest.iter_mut().enumerate() {
                 let place = first + j + 1 + i;
                 let s = leading.mul_add(row[place], dot(v, column)) * scale;
                 row[place] -= s * leading;
@@ -73,8 +83,8 @@ impl Triangle {
             out.leading[j] = leading;
             out.t[j][j] = scale;
             let mut overlap = [0.0; PANEL];
-            for (i, other) in head.chunks_exact(PIECE).enumerate().take(j) {
-                overlap[i] = dot(other, v);
+            for (overlap, other) in overlap.iter_mut().zip(before) {
+                *overlap = dot(other, v);
             }
             for i in 0..j {
                 let sum: f64 = (i..j).map(|k| out.t[i][k] * overlap[k]).sum();
@@ -84,41 +94,27 @@ impl Triangle {
         out
     }
 
-    /// Apply the reflections of a panel to one column.
+    /// Apply the reflections of a panel to the column at `place`.
     #[inline(always)]
     fn apply(
         &mut self,
         reflections: &Reflections,
         first: usize,
-        width: usize,
-        panel: &[f64],
-        column: &mut [f64],
+        panel: &[Column; PANEL],
+        column: &mut Column,
         place: usize,
     ) {
         let n = self.n;
-        let mut sums = [0.0; PANEL];
-        if width == PANEL {
-            sums = dots(panel, column);
-        } else {
-            for (sum, v) in sums.iter_mut().zip(panel.chunks_exact(PIECE)) {
-                *sum = dot(v, column);
-            }
-        }
-        for (j, sum) in sums.iter_mut().enumerate().take(width) {
+        let mut sums = dots(panel, column);
+        for (j, sum) in sums.iter_mut().enumerate() {
             *sum += reflections.leading[j] * self.factor[(first + j) * n + place];
         }
         let mut steps = [0.0; PANEL];
-        for j in 0..width {
+        for j in 0..PANEL {
             steps[j] = (0..=j).map(|i| reflections.t[i][j] * sums[i]).sum();
             self.factor[(first + j) * n + place] -= steps[j] * reflections.leading[j];
         }
-        if width == PANEL {
-            subtract_all(panel, steps, column);
-        } else {
-            for (step, v) in steps.iter().zip(panel.chunks_exact(PIECE)) {
-                subtract(v, *step, column);
-            }
-        }
+        subtract_all(panel, steps, column);
     }
 }
 
@@ -129,31 +125,26 @@ struct Reflections {
 }
 
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 2 * WIDE];
-    for (x, y) in a.chunks_exact(2 * WIDE).zip(b.chunks_exact(2 * WIDE)) {
-        for i in 0..2 * WIDE {
-            sums[i] = x[i].mul_add(y[i], sums[i]);
+fn dot(a: &Column, b: &Column) -> f64 {
+    // Two sums, as a multiply-add takes four cycles and two start in each.
+    let mut sums = [[0.0; LANES]; 2];
+    for (x, y) in a.chunks_exact(2).zip(b.chunks_exact(2)) {
+        for half in 0..2 {
+            for i in 0..LANES {
+                sums[half][i] = x[half][i].mul_add(y[half][i], sums[half][i]);
+            }
         }
     }
-    sums.iter().sum()
-}
-
-/// The panel's columns, one by one.
-#[inline(always)]
-fn split(panel: &[f64]) -> [&[f64]; PANEL] {
-    std::array::from_fn(|j| &panel[j * PIECE..(j + 1) * PIECE])
+    sums.as_flattened().iter().sum()
 }
 
 #[inline(always)]
-fn dots(panel: &[f64], column: &[f64]) -> [f64; PANEL] {
-    let v = split(panel);
-    let mut sums = [[0.0; WIDE]; PANEL];
-    for (k, x) in column.chunks_exact(WIDE).enumerate() {
+fn dots(panel: &[Column; PANEL], column: &Column) -> [f64; PANEL] {
+    let mut sums = [[0.0; LANES]; PANEL];
+    for (k, x) in column.iter().enumerate() {
         for j in 0..PANEL {
-            let v = &v[j][k * WIDE..(k + 1) * WIDE];
-            for i in 0..WIDE {
-                sums[j][i] = x[i].mul_add(v[i], sums[j][i]);
+            for i in 0..LANES {
+                sums[j][i] = x[i].mul_add(panel[j][k][i], sums[j][i]);
             }
         }
     }
@@ -161,20 +152,20 @@ fn dots(panel: &[f64], column: &[f64]) -> [f64; PANEL] {
 }
 
 #[inline(always)]
-fn subtract(v: &[f64], s: f64, a: &mut [f64]) {
-    for (x, a) in v.iter().zip(a) {
-        *a = (-s).mul_add(*x, *a);
+fn subtract(v: &Column, s: f64, column: &mut Column) {
+    for (x, v) in column.iter_mut().zip(v) {
+        for i in 0..LANES {
+            x[i] = (-s).mul_add(v[i], x[i]);
+        }
     }
 }
 
 #[inline(always)]
-fn subtract_all(panel: &[f64], steps: [f64; PANEL], column: &mut [f64]) {
-    let v = split(panel);
-    for (k, x) in column.chunks_exact_mut(WIDE).enumerate() {
+fn subtract_all(panel: &[Column; PANEL], steps: [f64; PANEL], column: &mut Column) {
+    for (k, x) in column.iter_mut().enumerate() {
         for j in 0..PANEL {
-            let v = &v[j][k * WIDE..(k + 1) * WIDE];
-            for i in 0..WIDE {
-                x[i] = (-steps[j]).mul_add(v[i], x[i]);
+            for i in 0..LANES {
+                x[i] = (-steps[j]).mul_add(panel[j][k][i], x[i]);
             }
         }
     }
@@ -183,6 +174,7 @@ fn subtract_all(panel: &[f64], steps: [f64; PANEL], column: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::array::from_fn;
 
     #[test]
     fn normal_equations_are_those_of_the_rows() {
@@ -199,9 +191,8 @@ mod tests {
                     entry(piece * PIECE + i, j)
                 }
             };
-            let mut block: Vec<f64> = (0..n * PIECE)
-                .map(|k| value(k % PIECE, k / PIECE))
-                .collect();
+            let column = |j: usize| from_fn(|k| from_fn(|i| value(k * LANES + i, j)));
+            let mut block: Vec<Column> = (0..n).map(column).collect();
             for i in 0..n {
                 for j in 0..n {
                     gram[i * n + j] += (0..PIECE).map(|k| value(k, i) * value(k, j)).sum::<f64>();
