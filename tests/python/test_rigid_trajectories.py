@@ -13,7 +13,7 @@ from axisight.rigid_body.sensitivity import regressor_sensitivity
 from axisight.rigid_body.trajectories import MotionLimits, _bounds, _Problem, optimize_trajectory
 from three_axes import robot
 
-LIMITS = MotionLimits([(-2, 2), (-1, 1), (-1.5, 0.5)], 2.0, [6.0, 5.0, 8.0], [4.0, 4.0, 1.5])
+LIMITS = MotionLimits([(-2, 2), (-1, 1), (-1.5, 0.5)], 2.0, [6.0, 5.0, 8.0], [0.8, 1.4, 0.25])
 QUICK = {"fundamental_hz": 0.2, "harmonics": 3, "starts": 2, "max_iterations": 25}
 
 
@@ -76,8 +76,8 @@ def test_limits_hold_between_the_samples_too(design, model):
     assert float(margins.sel(quantity="velocity", axis=1)) == pytest.approx(
         np.abs(v[:, 0]).max() / 2, rel=1e-4
     )
-    # Something limits it: a larger motion determines more.
-    assert float(margins.max()) > 0.9
+    # Something limits it, torque among others: a larger motion determines more.
+    assert float(margins.sel(quantity="torque").max()) > 0.9
 
 
 def test_motion_starts_at_rest_and_is_its_own_derivative(design):
