@@ -262,6 +262,30 @@ def test_true_robot_comes_back_from_its_torques(three_axes):
     assert np.abs(predicted - three_axes.matrix(q, v, a) @ theta).max() < 1e-4
 
 
+def test_factors_are_those_of_the_weighted_regression(three_axes):
+    q, v, a = motion(60, 3)
+    phi = three_axes.matrix(q, v, a)
+    noise = np.random.default_rng(0).normal(0, 1.0, (60, 3))
+    torque = phi @ true_parameters(three_axes) + noise
+    std = np.array([0.1, 1.0, 3.0])
+    spread = prior_spread(three_axes)
+    found = identify_consistent(three_axes, q, v, a, torque, torque_std_nm=std, prior_std=spread)
+    dense = consistent_parameters(
+        (phi / std[:, None]).reshape(180, -1),
+        (torque / std).ravel(),
+        links=np.arange(30).reshape(3, 10),
+        nonnegative=[30, 31, 32, 34, 35, 36, 38, 39, 40],
+        prior=three_axes.nominal,
+        prior_std=spread,
+    )
+    assert found.status == dense.status
+    # The solver ends within 1e-9 of the squared target, and the loss is flat at its minimum.
+    assert np.abs(found.theta - dense.theta).max() < 1e-3
+    # Both gaps are 1e-9 of the squared target at most; the loss is twice the objective.
+    assert abs(dense.loss - found.loss) < 4e-9 * np.sum((torque / std) ** 2)
+    assert dense.loss_unconstrained == pytest.approx(found.loss_unconstrained, rel=1e-9)
+
+
 def test_spread_of_a_prior_is_that_of_its_links(three_axes):
     spread = dict(zip(three_axes.names, prior_spread(three_axes, 0.5), strict=True))
     nominal = dict(zip(three_axes.names, three_axes.nominal, strict=True))
