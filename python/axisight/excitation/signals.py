@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.signal import max_len_seq
 
 from axisight import _core
 from axisight.arguments import (
@@ -217,7 +217,7 @@ def prbs(
     bits, hold = whole("bits", bits, 2, 24), whole("hold", hold)
     amplitude = size_of("amplitude", amplitude)
     few_enough("bits, hold", (2**bits - 1) * hold)
-    sequence, _ = max_len_seq(bits)
+    sequence, _ = scipy.signal.max_len_seq(bits)
     period = amplitude * np.repeat(2.0 * sequence - 1.0, hold)
     settings = {"bits": bits, "amplitude": amplitude, "hold": hold}
     return PeriodicSignal("prbs", sample_time_s, period, float(amplitude), settings=settings)

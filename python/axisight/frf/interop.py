@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import signal
 
 from axisight.arguments import complex_array, path_of, positive, reals, whole
 from axisight.errors import InputError, MissingExtraError
@@ -129,7 +129,7 @@ def from_scipy(
 
 
 def evaluate(
-    system: signal.lti | signal.dlti,
+    system: scipy.signal.lti | scipy.signal.dlti,
     frequency_hz: Real,
     *,
     input_unit: str = "Nm",
@@ -152,7 +152,7 @@ def evaluate(
     frequency = reals("frequency_hz", frequency_hz, "frequencies of shape (n_freq,)", 1)
     if not np.all(np.diff(frequency) > 0):
         raise InputError("frequency_hz: expected ascending frequencies")
-    if isinstance(system, signal.dlti):
+    if isinstance(system, scipy.signal.dlti):
         if system.dt is True or not system.dt:
             raise InputError("system: expected a discrete system with its sample time, got dt=True")
         if frequency.size and frequency[-1] > 0.5 / system.dt * (1 + 1e-12):
@@ -160,7 +160,7 @@ def evaluate(
                 f"frequency_hz: expected at most {0.5 / system.dt:g} Hz (Nyquist), got {frequency[-1]:g}"
             )
         at = np.exp(2j * np.pi * frequency * system.dt)
-    elif isinstance(system, signal.lti):
+    elif isinstance(system, scipy.signal.lti):
         at = 2j * np.pi * frequency
     else:
         raise InputError(
@@ -179,7 +179,7 @@ def evaluate(
 
 def _evaluated(system: Any, at: Complex) -> Complex:
     with np.errstate(divide="ignore", invalid="ignore"):
-        if isinstance(system, signal.StateSpace):
+        if isinstance(system, scipy.signal.StateSpace):
             a, b, c, d = system.A, system.B, system.C, system.D
             response = np.full((len(at), *d.shape), np.nan, complex)
             for k, s in enumerate(at):
@@ -187,7 +187,7 @@ def _evaluated(system: Any, at: Complex) -> Complex:
                     response[k] = c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d
                 except np.linalg.LinAlgError:
                     continue  # on a pole: stays NaN
-        elif isinstance(system, signal.ZerosPolesGain):
+        elif isinstance(system, scipy.signal.ZerosPolesGain):
             factors = system.gain * np.prod(at[:, None] - np.atleast_1d(system.zeros), axis=1)
             poles = np.prod(at[:, None] - np.atleast_1d(system.poles), axis=1)
             response = (factors / poles)[:, None, None]

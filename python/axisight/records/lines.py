@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.stats import f as f_distribution
 
 from axisight.arguments import Lines, Real, between, number, reals
 from axisight.errors import InputError
@@ -52,7 +52,7 @@ def repeating_lines(periods: Real, significance: float = 1e-4) -> NDArray[np.boo
     width = min(2 * _HALF_WIDTH + 1, len(variance))
     pooled = np.maximum(uniform_filter1d(variance, width, mode="nearest"), _rounding(mean))
     degrees = 2 * width * (n_periods - 1)
-    limit = f_distribution.isf(significance / len(mean), 2, degrees)
+    limit = scipy.stats.f.isf(significance / len(mean), 2, degrees)
     found: NDArray[np.bool_] = n_periods * mean > limit * pooled
     found[0] = False
     return found

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import fftconvolve
+import scipy
 
 from axisight.arguments import Real, reals
 from axisight.errors import InputError
@@ -48,7 +48,7 @@ def autocorrelation(x: Real) -> Real:
     ``2 sum x(n) x(n + L) / sum (x(n)^2 + x(n + L)^2)`` over the overlap (McLeod and Wyvill,
     2005): within [-1, 1], and 1 only where the signal repeats exactly.
     """
-    products = fftconvolve(x, x[::-1])[len(x) - 1 :]
+    products = scipy.signal.fftconvolve(x, x[::-1])[len(x) - 1 :]
     energy = np.concatenate(([0.0], np.cumsum(x * x)))
     lags = np.arange(len(x))
     both = energy[len(x) - lags] + (energy[-1] - energy[lags])

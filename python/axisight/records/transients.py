@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
 
 from axisight.arguments import Real, between, positive, reals, whole
 from axisight.errors import InputError
@@ -139,5 +139,5 @@ def _worst_band(square: Real, noise: Real, n_steady: int) -> tuple[float, float]
     # E s^4 of a variance from R - 1 complex degrees of freedom is larger than its square.
     spread = np.add.reduceat(noise**2, edges, axis=0) / (1 + 1 / (n_steady - 1))
     lines = np.clip(level**2 / spread, 1.0, size)
-    p = np.asarray(f_distribution.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))
+    p = np.asarray(scipy.stats.f.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))
     return min(1.0, float(p.min()) * p.size), float(np.sqrt(ratio.max()))
