@@ -1,6 +1,6 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
-from axisight import excitation, frf, montecarlo, records
+from axisight import calibration, excitation, frf, montecarlo, records, rigid_body
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -51,6 +51,7 @@ __all__ = [
     "StoreError",
     "StudyError",
     "Weighting",
+    "calibration",
     "check_log",
     "diagnose",
     "effect_info",
@@ -71,6 +72,7 @@ __all__ = [
     "read_case",
     "read_log",
     "records",
+    "rigid_body",
     "robot_parameter",
     "robot_parameters",
     "simulate",

@@ -141,6 +141,8 @@ def identify_by_energy(
 def energy_regressor(model: TorqueModel, q: ArrayLike, v: ArrayLike) -> Array:
     """Return stored energy per unit of each parameter, shape (n, n_parameters) [J].
 
+    ``q`` and ``v`` are joint angles [rad] and velocities [rad/s], (n, n_joints).
+
     Kinetic and potential energy of the links, kinetic energy of rotors, elastic energy of
     springs; zero in the columns of friction and offsets, which store nothing. With the
     parameters of the robot it gives the energy of :meth:`axisight.Robot` up to a constant.
