@@ -3,8 +3,8 @@
 //! The states are the deflections of the springs and the speeds of the masses, so that a
 //! turning axis has no state that drifts; the motor angle is carried where something needs it.
 
+use super::jet::Number;
 use super::layout::AxisModel;
-use axisight_core::scalar::Scalar;
 use std::array::from_fn;
 
 /// State of a chain of `N` masses, or its rate.
@@ -16,7 +16,7 @@ pub(super) struct State<S, const N: usize> {
     pub speed: [S; N],
 }
 
-impl<S: Scalar, const N: usize> State<S, N> {
+impl<S: Number, const N: usize> State<S, N> {
     /// From motor angle, deflections and speeds, one after the other.
     pub fn new(entry: impl Fn(usize) -> S) -> Self {
         Self {
@@ -25,12 +25,19 @@ impl<S: Scalar, const N: usize> State<S, N> {
         }
     }
 
-    /// `self + h * rate`.
+    /// `self + h * rate`; the motor angle of a chain that is not extended stays.
     #[inline(always)]
-    pub fn moved(&self, rate: &Self, h: f64) -> Self {
+    pub fn moved<const EXTENDED: bool>(&self, rate: &Self, h: f64) -> Self {
+        let place = |i: usize| {
+            if EXTENDED || i > 0 {
+                rate.place[i].times_plus(h, self.place[i])
+            } else {
+                self.place[i]
+            }
+        };
         Self {
-            place: from_fn(|i| rate.place[i].fma(S::constant(h), self.place[i])),
-            speed: from_fn(|i| rate.speed[i].fma(S::constant(h), self.speed[i])),
+            place: from_fn(place),
+            speed: from_fn(|i| rate.speed[i].times_plus(h, self.speed[i])),
         }
     }
 
@@ -76,6 +83,8 @@ pub(super) struct Chain<S, const N: usize> {
     plain_ratio: f64,
     backlash: S,
     excess: S,
+    /// Whether there is an excess, or could be one.
+    humped: bool,
     inverse_stribeck_speed: S,
     asymmetry: S,
     offset: S,
@@ -87,7 +96,7 @@ pub(super) struct Chain<S, const N: usize> {
 /// The edge of the gap is rounded over this share of its half width, as in the effect `backlash`.
 const EDGE: f64 = 0.05;
 
-impl<S: Scalar, const N: usize> Chain<S, N> {
+impl<S: Number, const N: usize> Chain<S, N> {
     /// Chain with the parameters that `value` gives by their place.
     pub fn new(model: &AxisModel, value: impl Fn(usize) -> S) -> Self {
         let layout = model.layout();
@@ -100,7 +109,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
                 }
             })
         };
-        let ratio = value(layout.ratio());
+        let (ratio, excess) = (value(layout.ratio()), value(layout.excess()));
         let harmonic = |(i, order): (usize, &f64)| {
             (*order, value(layout.ripple(i)), value(layout.ripple(i) + 1))
         };
@@ -114,7 +123,8 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
             ratio,
             plain_ratio: ratio.lane(0),
             backlash: value(layout.backlash()),
-            excess: value(layout.excess()),
+            excess,
+            humped: excess.lane(0) != 0.0 || (0..S::PARTIALS).any(|i| excess.partial(i, 0) != 0.0),
             inverse_stribeck_speed: value(layout.stribeck_speed()).recip(),
             asymmetry: value(layout.asymmetry()),
             offset: value(layout.offset()),
@@ -135,6 +145,16 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
             x * self.ratio
         } else {
             x * self.plain_ratio
+        }
+    }
+
+    /// `onto` minus `x` times the gear ratio.
+    #[inline(always)]
+    fn less_geared<const EXTENDED: bool>(&self, x: S, onto: S) -> S {
+        if EXTENDED {
+            onto - x * self.ratio
+        } else {
+            x.times_plus(-self.plain_ratio, onto)
         }
     }
 
@@ -165,7 +185,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
     /// Torque on the motor but for the friction, and the torque of the gear spring on it.
     #[inline(always)]
     fn drive<const EXTENDED: bool>(&self, x: &State<S, N>, gear: S, torque: f64) -> S {
-        let mut drive = -self.geared::<EXTENDED>(gear) + torque;
+        let mut drive = self.less_geared::<EXTENDED>(gear, S::constant(torque));
         if EXTENDED {
             drive += self.offset;
             for (order, cosine, sine) in &self.ripple {
@@ -180,7 +200,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
     #[inline(always)]
     fn friction<const EXTENDED: bool>(&self, speed: S, regime: Regime) -> S {
         let mut level = self.coulomb;
-        if EXTENDED {
+        if EXTENDED && self.humped {
             let hump = (-(speed * self.inverse_stribeck_speed).square()).exp();
             level = self.excess.fma(hump, level);
         }
@@ -240,7 +260,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
 }
 
 /// Deflection beyond a gap of half width `b`, and its slope.
-fn dead_zone<S: Scalar>(delta: S, b: S) -> (S, S) {
+fn dead_zone<S: Number>(delta: S, b: S) -> (S, S) {
     let (zero, one) = (S::zero(), S::one());
     let edge = b * EDGE;
     let over = delta.abs() - b;
