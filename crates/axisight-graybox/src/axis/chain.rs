@@ -28,17 +28,14 @@ impl<S: Number, const N: usize> State<S, N> {
     /// `self + h * rate`; the motor angle of a chain that is not extended stays.
     #[inline(always)]
     pub fn moved<const EXTENDED: bool>(&self, rate: &Self, h: f64) -> Self {
-        let place = |i: usize| {
+        let mut out = *self;
+        for i in 0..N {
             if EXTENDED || i > 0 {
-                rate.place[i].times_plus(h, self.place[i])
-            } else {
-                self.place[i]
+                out.place[i] = rate.place[i].times_plus(h, self.place[i]);
             }
-        };
-        Self {
-            place: from_fn(place),
-            speed: from_fn(|i| rate.speed[i].times_plus(h, self.speed[i])),
+            out.speed[i] = rate.speed[i].times_plus(h, self.speed[i]);
         }
+        out
     }
 
     /// `self + h * rate` where `h` carries derivatives.
@@ -161,15 +158,15 @@ impl<S: Number, const N: usize> Chain<S, N> {
     /// Rates of the deflections and torques of the springs.
     #[inline(always)]
     fn springs<const EXTENDED: bool>(&self, x: &State<S, N>) -> ([S; N], [S; N]) {
-        let rates = from_fn(|i| match i {
-            0 => S::zero(),
-            1 => self.geared::<EXTENDED>(x.speed[0]) - x.speed[1],
-            _ => x.speed[i - 1] - x.speed[i],
-        });
-        let torques = from_fn(|i| {
-            if i == 0 {
-                return S::zero();
-            }
+        // Loops, because the closures of `from_fn` are not always inlined.
+        let (mut rates, mut torques) = ([S::zero(); N], [S::zero(); N]);
+        for i in 1..N {
+            let before = if i == 1 {
+                self.geared::<EXTENDED>(x.speed[0])
+            } else {
+                x.speed[i - 1]
+            };
+            rates[i] = before - x.speed[i];
             let (deflection, rate) = if EXTENDED && i == 1 {
                 let (loaded, slope) = dead_zone(x.place[1], self.backlash);
                 (loaded, slope * rates[1])
@@ -177,8 +174,8 @@ impl<S: Number, const N: usize> Chain<S, N> {
                 (x.place[i], rates[i])
             };
             let stiffness = self.cubic[i].fma(deflection.square(), self.linear[i]);
-            stiffness.fma(deflection, self.damping[i] * rate)
-        });
+            torques[i] = stiffness.fma(deflection, self.damping[i] * rate);
+        }
         (rates, torques)
     }
 
@@ -229,17 +226,18 @@ impl<S: Number, const N: usize> Chain<S, N> {
         if EXTENDED {
             place[0] = x.speed[0];
         }
-        let speed = from_fn(|i| {
-            let net = if i == 0 {
-                self.drive::<EXTENDED>(x, springs[1], torque)
-                    - self.friction::<EXTENDED>(x.speed[0], regime)
-            } else if i + 1 < N {
+        let mut speed = [S::zero(); N];
+        let drive = self.drive::<EXTENDED>(x, springs[1], torque);
+        let friction = self.friction::<EXTENDED>(x.speed[0], regime);
+        speed[0] = (drive - friction) * self.inverse_inertia[0];
+        for i in 1..N {
+            let net = if i + 1 < N {
                 springs[i] - springs[i + 1]
             } else {
                 springs[i]
             };
-            net * self.inverse_inertia[i]
-        });
+            speed[i] = net * self.inverse_inertia[i];
+        }
         let mut rate = State { place, speed };
         if regime == Regime::Stick {
             rate.speed[0] = S::zero();
