@@ -3,6 +3,7 @@
 // PyO3 hands over owned values and names the lifetime of the interpreter.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
+mod axis_fit;
 mod convert;
 mod effects;
 mod entry;
@@ -59,5 +60,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::regression_factors, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_linearize, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_simulate, module)?)?;
     Ok(())
 }
