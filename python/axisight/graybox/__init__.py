@@ -1,0 +1,1 @@
+"""Gray-box identification: physical parameters from motor-side data."""
