@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.signal import find_peaks
 
 from axisight.errors import InputError
-from axisight.graybox.collocated import Collocated, collocated
+from axisight.graybox.collocated import Collocated, collocated, sandwich
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 
 Real = NDArray[np.float64]
@@ -33,8 +33,8 @@ class ChainFit:
     chain
         Masses, springs, dampers.
     inertia_standard_error, stiffness_standard_error, damping_standard_error
-        In the units and shapes of the chain's values; from the scatter about the model, which
-        errors of the model enlarge.
+        In the units and shapes of the chain's values; from the scatter of every line about the
+        model (:func:`axisight.graybox.collocated.sandwich`), which errors of the model enlarge.
     viscous_friction_nm_s_rad
         Of the motor, motor side, with its standard error.
     delay_s
@@ -318,10 +318,7 @@ def _polish(
     )
     inertia, stiffness, damping, friction, late = problem.parts(found.x)
     n, ratio = problem.n, start.gear_ratio
-    freedom = max(len(found.fun) - len(found.x), 1)
-    slope = problem.jacobian(found.x)
-    normal = np.diag(np.linalg.pinv(slope.T @ slope, hermitian=True))
-    deviation = np.sqrt(2 * found.cost / freedom * np.maximum(normal, 0.0))
+    deviation = np.sqrt(np.diag(sandwich(problem.jacobian(found.x), found.fun)))
     error = 20 / np.log(10) * float(np.median(np.abs(problem.error(found.x))))
     converged = found.status > 0
     if not converged:

@@ -97,3 +97,18 @@ def collocated(
             f"response: expected at least {_FEWEST_LINES} lines that can be used, got {kept.sum()}"
         )
     return Collocated(frequency[kept], value[kept], variance[kept])
+
+
+def sandwich(slope: Real, residual: Real) -> Real:
+    """Covariance of a least-squares estimate from the scatter of each line (White 1980).
+
+    ``slope`` and ``residual`` hold the real parts of all lines, then the imaginary ones; a line's
+    two belong together. Right whatever the weights, which here are a compromise between noise
+    and the errors of simple models. Scaled by n / (n - p) for the parameters fitted.
+    """
+    lines = len(residual) // 2
+    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    scores = slope[:lines] * residual[:lines, None] + slope[lines:] * residual[lines:, None]
+    scale = len(residual) / max(len(residual) - slope.shape[1], 1)
+    covariance = scale * inverse @ (scores.T @ scores) @ inverse
+    return np.asarray((covariance + covariance.T) / 2)

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks, medfilt
 
 from axisight.errors import InputError
-from axisight.graybox.collocated import Collocated
+from axisight.graybox.collocated import Collocated, sandwich
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -228,8 +228,8 @@ def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
         bounds=([omega[0], 1e-6], [omega[-1], 1.0]),
         x_scale=np.array([spacing, 0.01]),
     )
-    freedom = max(2 * (len(omega) - _SURROUNDINGS) - 2, 1)
-    covariance = np.linalg.inv(found.jac.T @ found.jac) * 2 * found.cost / freedom
-    error = np.sqrt(np.diag(covariance))
+    # The surroundings take parameters too: three complex ones.
+    taken = np.sqrt(len(omega) / max(len(omega) - _SURROUNDINGS - 1, 1))
+    error = taken * np.sqrt(np.diag(sandwich(found.jac, found.fun)))
     frequency, damping = (float(v) for v in found.x)
     return Landmark(frequency, damping, float(error[0]), float(error[1]), len(omega))
