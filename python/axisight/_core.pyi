@@ -719,3 +719,52 @@ def optimize_crest_factor(
     ``refinement``: first exponent, last exponent, iterations, oversampling. ``phase`` [rad]
     is the one start in the place of random ones.
     """
+
+class _AxisModelSpec(Protocol):
+    masses: int
+    output: str
+    hold: str
+    smoothing: float
+    ripple_orders: list[float]
+    substeps: int
+
+def axis_fit(
+    model: _AxisModelSpec,
+    sets: Sequence[tuple[_Array, _Array, float, float]],
+    parameters: Sequence[tuple[float, float, float, float, bool]],
+    *,
+    whitening: Sequence[float],
+    predicts: bool,
+    max_iterations: int,
+    loss_tolerance: float,
+    step_tolerance: float,
+    cancel: CancelToken | None = None,
+) -> tuple[str, _Array, float, float, int, int, _Array]:
+    """Minimize the prediction error of an axis from one start.
+
+    ``sets``: torque, output, sample time, weight. ``parameters``: initial, lower, upper, scale,
+    free. Returns status, parameters, loss, initial loss, iterations, evaluations and the normal
+    matrix of the free parameters.
+    """
+
+def axis_linearize(
+    model: _AxisModelSpec,
+    sets: Sequence[tuple[_Array, _Array, float, float]],
+    theta: Sequence[float],
+    free: Sequence[int],
+    *,
+    whitening: Sequence[float],
+    predicts: bool,
+    cancel: CancelToken | None = None,
+) -> tuple[_Array, _Array]:
+    """Residuals, model minus measurement, and derivatives (n_free, n), record after record."""
+
+def axis_simulate(
+    model: _AxisModelSpec,
+    set: tuple[_Array, _Array, float, float],
+    theta: Sequence[float],
+    *,
+    predicts: bool,
+    cancel: CancelToken | None = None,
+) -> tuple[_Array, _Array]:
+    """Output (n,) and states (n, 2 masses) of one record."""

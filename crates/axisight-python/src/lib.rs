@@ -3,6 +3,7 @@
 // PyO3 hands over owned values and names the lifetime of the interpreter.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
+mod axis_fit;
 mod convert;
 mod effects;
 mod entry;
@@ -54,5 +55,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_linearize, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_simulate, module)?)?;
     Ok(())
 }
