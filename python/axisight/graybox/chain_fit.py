@@ -24,6 +24,7 @@ _ROOM = 0.05
 _POOR_DB = 3.0
 _UNCERTAIN = 0.5
 _SPAN = 1e3
+_BEYOND = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,18 +116,18 @@ def fit_chain(
 
 def _start(data: Collocated, pairs: int, ratio: float, findings: list[str]) -> SpringMassChain:
     """Chain of the poles and zeros of a rational fit, or of peaks and notches."""
-    level = float(np.median(np.abs(data.acceleration)))
     try:
         zeros, poles, gain = _rational(data, pairs)
-        return _reconstruct(poles, zeros, 1 / gain, ratio)
+        if poles[0][-1] <= _BEYOND * data.angular_rad_s[-1]:
+            return _reconstruct(poles, zeros, 1 / gain, ratio)
+        why = "has a resonance beyond the band"
     except InputError:
-        findings.append(
-            "poles and zeros of the rational fit do not alternate; started from peaks and notches"
-        )
+        why = "has poles and zeros that do not alternate"
+    findings.append(f"the rational fit {why}; started from peaks and notches")
     peaks, notches = _peaks(data, pairs)
     damping = np.full(pairs, _START_DAMPING)
     above = np.abs(data.acceleration)[data.angular_rad_s > peaks[-1]]
-    gain = float(np.median(above)) if len(above) else level
+    gain = float(np.median(above)) if len(above) else float(np.median(np.abs(data.acceleration)))
     return _reconstruct((peaks, damping), (notches, damping), 1 / gain, ratio)
 
 
@@ -320,6 +321,7 @@ def _polish(
     n, ratio = problem.n, start.gear_ratio
     deviation = np.sqrt(np.diag(sandwich(problem.jacobian(found.x), found.fun)))
     error = 20 / np.log(10) * float(np.median(np.abs(problem.error(found.x))))
+    found_chain = SpringMassChain(inertia, stiffness, damping, ratio)
     converged = found.status > 0
     if not converged:
         findings.append("the fit stopped before it converged: try fewer masses or another start")
@@ -327,11 +329,17 @@ def _polish(
         findings.append(f"half of the lines are more than {error:.1f} dB off the chain: other masses, or noise")
     uncertain = np.flatnonzero(deviation[: 2 * n - 1] > _UNCERTAIN)
     names = [f"inertia {i + 1}" for i in range(n)] + [f"spring {i + 1}" for i in range(n - 1)]
+    beyond = found_chain.poles_rad_s > _BEYOND * data.angular_rad_s[-1]
+    if beyond.any():
+        findings.append(
+            f"resonance {found_chain.poles_rad_s[beyond][0]:.3g} rad/s lies beyond the band: its mass "
+            "and spring are guesses; fit fewer masses"
+        )
     if len(uncertain):
         listed = ", ".join(names[i] for i in uncertain)
         findings.append(f"{listed}: hardly seen in this band; fit fewer masses")
     return ChainFit(
-        chain=SpringMassChain(inertia, stiffness, damping, ratio),
+        chain=found_chain,
         inertia_standard_error=inertia * deviation[:n],
         stiffness_standard_error=stiffness * deviation[n : 2 * n - 1],
         damping_standard_error=problem.damper * deviation[2 * n - 1 : 3 * n - 2],
