@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from axisight.errors import ConvergenceError
 from axisight.excitation import multisine, square, triangle
+from axisight.frf import etfe
 from axisight.graybox import AxisData, AxisFit, AxisModel, FitSettings, fit_axis
 from axisight.graybox.procedure import InitialModel, initial_model
+from axisight.records import PeriodicRecords
 from axisight.reproduce.chapter8_setting import clipped
 from axisight.reproduce.chapter9_machine import GEAR_RATIO, Machine, chain
 from axisight.reproduce.context import Context
@@ -122,6 +124,22 @@ def initial(context: Context, machine: Machine, scale: float = 1.0) -> InitialMo
         return replace(found, parameters={**found.parameters, "d": 0.0})
 
     return context.shared(("chapter 9 initial", machine, scale), make)
+
+
+def responses(context: Context, machine: Machine, scale: float = 1.0) -> dict[int, xr.Dataset]:
+    """Return torque to motor acceleration of sets 2 and 3, from the steady period."""
+
+    def make() -> dict[int, xr.Dataset]:
+        found = {}
+        for number, data in records(context, machine, scale).periodic.items():
+            steady = round(PERIOD_S / SAMPLE_TIME_S)
+            parts = [np.asarray(v)[steady:] for v in (data.torque_nm, data.position_rad)]
+            inputs, outputs = (part.reshape(1, 1, -1, 1) for part in parts)
+            taken = PeriodicRecords(SAMPLE_TIME_S, inputs, outputs, LINES)
+            found[number] = etfe(taken, quantity="acceleration")
+        return found
+
+    return context.shared(("chapter 9 responses", machine, scale), make)
 
 
 def fitted(
