@@ -20,7 +20,9 @@ RATIO = 1 / 224.3
 
 def chain(n: int, rng: np.random.Generator) -> SpringMassChain:
     """Masses and springs within a factor three."""
-    inertia, stiffness, damping = (10 ** rng.uniform(-0.25, 0.25, size) for size in (n, n - 1, n - 1))
+    inertia, stiffness, damping = (
+        10 ** rng.uniform(-0.25, 0.25, size) for size in (n, n - 1, n - 1)
+    )
     return SpringMassChain(1e3 * inertia, 1e6 * stiffness, 2e3 * damping, RATIO)
 
 

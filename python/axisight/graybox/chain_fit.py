@@ -144,9 +144,7 @@ def _reconstruct(
     )
 
 
-def _rational(
-    data: Collocated, pairs: int
-) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
+def _rational(data: Collocated, pairs: int) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
     """Zeros and poles (frequencies, damping ratios) and gain of a rational fit."""
     scale = float(np.sqrt(data.angular_rad_s[0] * data.angular_rad_s[-1]))
     s = 1j * data.angular_rad_s / scale
@@ -303,9 +301,7 @@ class _Problem:
         return np.vstack([slope.real, slope.imag])
 
 
-def _polish(
-    data: Collocated, start: SpringMassChain, delay: bool, findings: list[str]
-) -> ChainFit:
+def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: list[str]) -> ChainFit:
     problem = _Problem(data, start, delay)
     found: OptimizeResult = least_squares(
         problem.residual,
@@ -326,7 +322,9 @@ def _polish(
     if not converged:
         findings.append("the fit stopped before it converged: try fewer masses or another start")
     if error > _POOR_DB:
-        findings.append(f"half of the lines are more than {error:.1f} dB off the chain: other masses, or noise")
+        findings.append(
+            f"half of the lines are more than {error:.1f} dB off the chain: other masses, or noise"
+        )
     uncertain = np.flatnonzero(deviation[: 2 * n - 1] > _UNCERTAIN)
     names = [f"inertia {i + 1}" for i in range(n)] + [f"spring {i + 1}" for i in range(n - 1)]
     beyond = found_chain.poles_rad_s > _BEYOND * data.angular_rad_s[-1]
@@ -344,9 +342,7 @@ def _polish(
         stiffness_standard_error=stiffness * deviation[n : 2 * n - 1],
         damping_standard_error=problem.damper * deviation[2 * n - 1 : 3 * n - 2],
         viscous_friction_nm_s_rad=float(friction * ratio**2),
-        viscous_friction_standard_error=float(
-            problem.friction * ratio**2 * deviation[3 * n - 2]
-        ),
+        viscous_friction_standard_error=float(problem.friction * ratio**2 * deviation[3 * n - 2]),
         delay_s=late,
         error_db=error,
         status="converged" if converged else "not_converged",

@@ -252,7 +252,9 @@ def cubic_spring(
     )
 
 
-def _amplitudes(stiffness: Sequence[float], deflection: Sequence[ArrayLike]) -> tuple[Real, list[Real]]:
+def _amplitudes(
+    stiffness: Sequence[float], deflection: Sequence[ArrayLike]
+) -> tuple[Real, list[Real]]:
     values = np.asarray(stiffness, dtype=np.float64)
     sets = [np.asarray(x, dtype=np.float64).ravel() for x in deflection]
     if values.ndim != 1 or len(sets) != len(values) or len(sets) < 2:
@@ -289,7 +291,9 @@ def simulate_deflection(
 
     Raises InputError for arrays that differ in length or are not finite.
     """
-    torque, velocity = (np.asarray(v, dtype=np.float64).ravel() for v in (torque_nm, velocity_rad_s))
+    torque, velocity = (
+        np.asarray(v, dtype=np.float64).ravel() for v in (torque_nm, velocity_rad_s)
+    )
     if torque.shape != velocity.shape or not torque.size:
         raise InputError(
             f"velocity_rad_s: expected {torque.size} samples as torque_nm, got {velocity.size}"
@@ -297,12 +301,13 @@ def simulate_deflection(
     if not (np.isfinite(torque).all() and np.isfinite(velocity).all()):
         raise InputError("torque_nm, velocity_rad_s: expected finite numbers")
     r, k, d = gear_ratio, stiffness_nm_rad, damping_nm_s_rad
-    motor = np.array([-r * k, -viscous_friction_nm_s_rad - r * d * r, r * d]) / motor_inertia_kg_m2
-    arm = np.array([k, d * r, -d]) / arm_inertia_kg_m2
+    motor, arm = motor_inertia_kg_m2, arm_inertia_kg_m2
     # Held input as a fourth state: one exponential gives both matrices.
     system = np.zeros((4, 4))
-    system[:3, :3] = [[0.0, r, -1.0], motor, arm]
-    system[1, 3] = 1 / motor_inertia_kg_m2
+    system[0, :3] = 0.0, r, -1.0
+    system[1, :3] = np.array([-r * k, -viscous_friction_nm_s_rad - r * d * r, r * d]) / motor
+    system[2, :3] = np.array([k, d * r, -d]) / arm
+    system[1, 3] = 1 / motor
     step = expm(system * sample_time_s)
     values, vectors = np.linalg.eig(step[:3, :3])
     drive = np.linalg.solve(vectors, step[:3, 3])

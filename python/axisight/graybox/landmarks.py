@@ -175,7 +175,7 @@ def _level_db(data: Collocated) -> Real:
 def _relative_deviation(data: Collocated) -> Real:
     known = np.isfinite(data.variance)
     noise = np.where(known, data.variance, 0.0) / np.abs(data.acceleration) ** 2
-    return np.sqrt(noise + _MODEL_FLOOR**2)
+    return np.asarray(np.sqrt(noise + _MODEL_FLOOR**2))
 
 
 def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
@@ -183,7 +183,8 @@ def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
     solution, _, _, _ = np.linalg.lstsq(basis, target, rcond=None)
     left = target - basis @ solution
     freedom = max(len(target) - basis.shape[1], 1)
-    return solution, np.linalg.inv(basis.T @ basis) * float(left @ left) / freedom
+    covariance = np.linalg.inv(basis.T @ basis) * float(left @ left) / freedom
+    return np.asarray(solution, np.float64), np.asarray(covariance, np.float64)
 
 
 def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
@@ -230,6 +231,6 @@ def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
     )
     # The surroundings take parameters too: three complex ones.
     taken = np.sqrt(len(omega) / max(len(omega) - _SURROUNDINGS - 1, 1))
-    error = taken * np.sqrt(np.diag(sandwich(found.jac, found.fun)))
+    error = taken * np.sqrt(np.diag(sandwich(slope(found.x), found.fun)))
     frequency, damping = (float(v) for v in found.x)
     return Landmark(frequency, damping, float(error[0]), float(error[1]), len(omega))

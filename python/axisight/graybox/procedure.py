@@ -50,7 +50,7 @@ class InitialModel:
         gave.
     spring
         k1 and k3 by (9.14); None with one amplitude.
-    parameters
+    start
         Start of step 3 by the names of the model.
     findings
         What to know.
@@ -60,7 +60,7 @@ class InitialModel:
     responses: tuple[xr.Dataset, ...]
     flexibilities: tuple[Flexibility, ...]
     spring: CubicSpring | None
-    parameters: Mapping[str, float]
+    start: Mapping[str, float]
     findings: tuple[str, ...]
 
 
@@ -180,7 +180,9 @@ def initial_model(
     stiffness = np.array([arm * f.notch.frequency_rad_s**2 for f in flexibilities])
     spring = None
     if len(records) > 1:
-        spring = _spring(records, flexibilities, stiffness, motor, arm, found, gear_ratio, spring_method)
+        spring = _spring(
+            records, flexibilities, stiffness, motor, arm, found, gear_ratio, spring_method
+        )
         findings += list(spring.findings)
     else:
         findings.append("one broadband record only: k3 starts at zero; measure a second amplitude")
@@ -195,7 +197,9 @@ def initial_model(
         "F_c": max(found.coulomb_friction_nm, 0.0),
     }
     if n_masses > 2:
-        quiet = min(range(len(records)), key=lambda i: float(np.std(records[i].torque_nm)))
+        quiet = min(
+            range(len(records)), key=lambda i: float(np.std(np.asarray(records[i].torque_nm)))
+        )
         parameters |= _chain(responses[quiet], n_masses, gear_ratio, findings)
     return InitialModel(
         found, responses, flexibilities, spring, parameters, tuple(dict.fromkeys(findings))
@@ -271,7 +275,7 @@ def identify_axis(
         )
     )
     known = set(model.parameter_names)
-    start = {name: value for name, value in initial.parameters.items() if name in known}
+    start = {name: value for name, value in initial.start.items() if name in known}
     fit = fit_axis(
         model, data, start, fixed=fixed, bounds=bounds, noise_model=noise_model, settings=settings
     )

@@ -24,7 +24,7 @@ def report(found: AxisIdentification) -> str:
     units = {p.name: p.unit for p in found.model.parameters}
     deviation = np.sqrt(np.diag(found.fit.sandwich))
     for name, value, own in zip(found.fit.free, found.fit.values, deviation, strict=True):
-        start = found.initial.parameters.get(name)
+        start = found.initial.start.get(name)
         was = "" if start is None else f"   start {start:.4g}"
         lines.append(_row(name, float(value), float(own), units[name]) + was)
     lines.append(f"  status: {found.fit.status}, {found.fit.iterations} iterations")

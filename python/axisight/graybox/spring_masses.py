@@ -8,7 +8,6 @@ Vibration, chapters 3 and 4; for robots Berglund and Hovland 2000, thesis sectio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -183,7 +182,7 @@ def _ascending(name: str, value: ArrayLike) -> Real:
     array = np.atleast_1d(np.asarray(value, dtype=np.float64))
     good = array.ndim == 1 and array.size and np.isfinite(array).all()
     if not good or array[0] <= 0 or np.any(np.diff(array) <= 0):
-        raise InputError(f"{name}: expected positive, ascending frequencies, got {value}")
+        raise InputError(f"{name}: expected positive, ascending frequencies, got {array}")
     return array
 
 
@@ -257,13 +256,3 @@ def _dampers(chain: SpringMassChain, poles: ArrayLike | None, zeros: ArrayLike |
         rows.append(chain._natural(held)[1] / (2 * frequency)[:, None])
         targets.append(ratio)
     return np.asarray(nnls(np.vstack(rows), np.concatenate(targets))[0])
-
-
-def masses_of(chain: SpringMassChain) -> Sequence[tuple[str, float, str]]:
-    """Return name, value and unit of everything in a chain, for tables."""
-    listed = [("J_m", chain.motor_inertia_kg_m2, "kg m^2")]
-    listed += [(f"J_{i}", float(j), "kg m^2") for i, j in enumerate(chain.inertia_kg_m2[1:], 1)]
-    listed += [(f"k_{i}", float(k), "Nm/rad") for i, k in enumerate(chain.stiffness_nm_rad, 1)]
-    return listed + [
-        (f"d_{i}", float(d), "Nm s/rad") for i, d in enumerate(chain.damping_nm_s_rad, 1)
-    ]

@@ -137,7 +137,7 @@ def residual_tests(
     e, u = e - e.mean(), u - u.mean()
     if not (e.any() and u.any()):
         raise InputError("residual, input_: expected values that vary, got a constant")
-    auto, cross, own, power = _covariances(e, u)
+    auto, cross, power = _covariances(e, u)
     at = lag_step * np.arange(-lags, lags + 1)
     r_auto = auto[np.abs(at)] / auto[0]
     scale = np.sqrt(auto[0] * power[0])
@@ -164,8 +164,8 @@ def residual_tests(
     )
 
 
-def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real, Real]:
-    """R_e, R_eu (negative lags from the end), and R_e, R_u without sign, by FFT."""
+def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real]:
+    """R_e, R_eu and R_u by FFT, negative lags from the end."""
     n = len(e)
     size = next_fast_len(2 * n, real=True)
     fe, fu = np.fft.rfft(e, size), np.fft.rfft(u, size)
@@ -173,7 +173,7 @@ def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real, Real]:
     power = np.fft.irfft(np.abs(fu) ** 2, size) / n
     # sum over t of e(t) u(t - lag)
     cross = np.fft.irfft(fe * fu.conj(), size) / n
-    return auto, cross, auto, power
+    return auto, cross, power
 
 
 def _spread(auto: Real, power: Real, window: int, count: int) -> Real:

@@ -114,9 +114,11 @@ def _importance(context: Context, case: Case) -> Importance:
         initial(context, case.machine, case.scale)
     except InputError:
         # Strongly bent springs leave no clear notch or plateau: start as the standard machine.
-        start = initial(context, STANDARD).parameters
+        start = initial(context, STANDARD).start
     with_cubic, without = (
-        fitted(context, case.machine, scale=case.scale, cubic=cubic, start=start, max_iterations=100)
+        fitted(
+            context, case.machine, scale=case.scale, cubic=cubic, start=start, max_iterations=100
+        )
         for cubic in (True, False)
     )
     data = records(context, case.machine, case.scale).data

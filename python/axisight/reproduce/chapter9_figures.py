@@ -84,7 +84,7 @@ def figure_9_2(context: Context) -> Item:
         lines.append(
             _Line(f"set_{number}", label, 2 * np.pi * frequency, np.abs(value), _STYLES[number])
         )
-    drawing = _figure(lines, "|G| [rad s$^{-2}$/Nm]", (4.0, 400.0))
+    drawing = _figure(lines, "|G| [rad s$^{-2}$/Nm]", (1.0, 600.0))
     title = "Response from motor torque to motor acceleration, data sets 2 and 3"
     return Item("figure-9.2", title, {"": _table(lines)}, {"": drawing})
 
@@ -104,7 +104,7 @@ def figure_9_3(context: Context) -> Item:
     grid = np.geomspace(1.0, 40.0, 400)
     model = np.abs(two_mass_velocity(models(context, STANDARD)["m3"], grid))
     lines.append(_Line("m3", "model m3 without k$_3$ and F$_c$", 2 * np.pi * grid, model, _MODEL))
-    drawing = _figure(lines, "|G| [rad s$^{-1}$/Nm]", (0.1, 10.0))
+    drawing = _figure(lines, "|G| [rad s$^{-1}$/Nm]", (0.02, 12.0))
     title = "Response from motor torque to motor velocity, data sets 2 and 3, and model m3"
     return Item("figure-9.3", title, {"": _table(lines)}, {"": drawing})
 
@@ -134,8 +134,7 @@ def _figure(lines: Sequence[_Line], label: str, limits: tuple[float, float]) -> 
 def _table(lines: Sequence[_Line]) -> pd.DataFrame:
     """Return curves by frequency; those on other frequencies take part where they are given."""
     parts = [
-        pd.Series(line.magnitude, np.round(line.angular_rad_s, 9), name=line.name)
-        for line in lines
+        pd.Series(line.magnitude, np.round(line.angular_rad_s, 9), name=line.name) for line in lines
     ]
     table = pd.concat(parts, axis=1).sort_index()
     return table.rename_axis("angular_frequency_rad_s").reset_index()

@@ -121,7 +121,7 @@ def initial(context: Context, machine: Machine, scale: float = 1.0) -> InitialMo
             drop_periods=1,
             spring_method="samples",
         )
-        return replace(found, parameters={**found.parameters, "d": 0.0})
+        return replace(found, start={**found.start, "d": 0.0})
 
     return context.shared(("chapter 9 initial", machine, scale), make)
 
@@ -156,7 +156,7 @@ def fitted(
     key = "chapter 9 fit", machine, sets, scale, cubic, start is None, max_iterations
 
     def make() -> AxisFit:
-        begin = dict(start or initial(context, machine, scale).parameters)
+        begin = dict(start or initial(context, machine, scale).start)
         taken = records(context, machine, scale)
         return fit_axis(
             MODEL,
@@ -198,7 +198,7 @@ def measured(data: AxisData) -> Real:
 
 def models(context: Context, machine: Machine) -> dict[str, Mapping[str, float]]:
     """Return parameters of m0 to m3."""
-    found: dict[str, Mapping[str, float]] = {"m0": initial(context, machine).parameters}
+    found: dict[str, Mapping[str, float]] = {"m0": initial(context, machine).start}
     for name, sets in MODELS.items():
         found[name] = fitted(context, machine, sets).parameters
     return found

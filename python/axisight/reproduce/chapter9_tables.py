@@ -118,7 +118,9 @@ def table_9_3(context: Context) -> Item:
     for name in NAMES:
         row: dict[str, float | str] = {"parameter": name}
         for n, old in zip(SETS, TABLE_9_3[name], strict=True):
-            for sign, change, was in zip(("plus", "minus"), found["change"].values, old, strict=True):
+            for sign, change, was in zip(
+                ("plus", "minus"), found["change"].values, old, strict=True
+            ):
                 value = found.sel(parameter=name, change=change, data_set=str(n))
                 row[f"set_{n}_{sign}"] = float(value)
                 row[f"thesis_set_{n}_{sign}"] = was
