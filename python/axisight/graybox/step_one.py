@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, fftconvolve, sosfiltfilt
 
 from axisight.errors import InputError
 
@@ -17,6 +17,8 @@ Real = NDArray[np.float64]
 
 _FILTER_ORDER = 4
 _FEWEST = 50
+_EDGE_PERIODS = 2.5
+_LAG_PERIODS = 3.0
 _LEAST_SHARE = 0.02
 _LARGEST_CONDITION = 1e3
 
@@ -76,8 +78,8 @@ def rigid_body_friction(
     Position and torque pass the same zero-phase low-pass filter (Butterworth of order 4,
     forward and backward), velocity and acceleration are central differences of the filtered
     position, and the sign of that velocity passes the filter too: all columns and the torque
-    are then seen through one filter, which costs no bias where the model holds. Half a second
-    at either end, or two periods of the cutoff if longer, is left out.
+    are then seen through one filter, which costs no bias where the model holds. Two and a half periods
+    of the cutoff at either end are left out.
 
     Standard errors take the residuals as they are, correlated over time (Newey and West 1987,
     Econometrica 55): what the rigid model lacks lasts for many samples.
@@ -105,7 +107,7 @@ def rigid_body_friction(
         )
     if not (np.isfinite(least_speed_rad_s) and least_speed_rad_s >= 0):
         raise InputError(f"least_speed_rad_s: expected 0 or more, got {least_speed_rad_s}")
-    edge = round(max(0.5, 2 / cutoff_hz) / sample_time_s)
+    edge = round(_EDGE_PERIODS / cutoff_hz / sample_time_s)
     if len(torque) < 2 * edge + _FEWEST:
         raise InputError(
             f"torque_nm: expected more than {2 * edge + _FEWEST} samples "
@@ -187,8 +189,8 @@ def _regress(
     q, upper = np.linalg.qr(scaled)
     solution = np.linalg.solve(upper, q.T @ torque)
     left = torque - scaled @ solution
-    # Residuals of a band up to the cutoff are correlated over about its inverse.
-    lags = min(round(4 / cutoff_hz / sample_time_s), len(torque) // 4)
+    # Residuals are filtered: correlated over at least the inverse of the cutoff.
+    lags = min(round(_LAG_PERIODS / cutoff_hz / sample_time_s), len(torque) // 8)
     inverse = np.linalg.inv(upper)
     covariance = _long_run(q * left[:, None], lags, inverse) / np.outer(size, size)
     estimate = solution / size
@@ -221,8 +223,10 @@ def _regress(
 
 def _long_run(scores: Real, lags: int, inverse: Real) -> Real:
     """Covariance of the solution from scores that are correlated up to some lag."""
-    total = scores.T @ scores
-    for lag in range(1, lags + 1):
-        part = (1 - lag / (lags + 1)) * (scores[lag:].T @ scores[:-lag])
-        total += part + part.T
-    return np.asarray(inverse @ total @ inverse.T)
+    triangle = 1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1)
+    total = scores.T @ fftconvolve(scores, triangle[:, None], mode="same", axes=0)
+    # The window averages a spectrum of so many degrees of freedom near zero frequency, where
+    # the estimate has taken a sine and a cosine of each column out of the residuals.
+    freedom = 1.5 * len(scores) / lags
+    scale = freedom / max(freedom - 2 * scores.shape[1], 1.0)
+    return np.asarray(scale * inverse @ total @ inverse.T)

@@ -178,7 +178,7 @@ def _insignificant(context: Context) -> Result:
     times = one.estimate / one.sandwich_error
     text = (
         f"k3 = {one.estimate:.2e} ± {one.sandwich_error:.1e}, {times:.0f} standard errors from zero "
-        f"(white residuals: {one.estimate / one.white_error:.0f}): the information is there. Near the "
+        f"(white residuals: {one.estimate / one.white_error:.0f}). Near the "
         "optimum the loss of fit is the square of a small change, under residuals of "
         f"{100 - one.fit[2]:.0f} % that it does not touch"
     )
