@@ -103,7 +103,10 @@ def test_step_one_of_the_flexible_axis() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda u, y: (u, np.abs(y).cumsum() * STEP), "expected motion in both directions, got 100 %"),
+        (
+            lambda u, y: (u, np.abs(y).cumsum() * STEP),
+            "expected motion in both directions, got 100 %",
+        ),
         (lambda u, y: (u, y[:-1]), "expected 24000 samples as torque_nm, got 23999"),
         (lambda u, y: (u * np.nan, y), "torque_nm: expected finite numbers, got nan at sample 1"),
         (lambda u, y: (u[:1000], y[:1000]), "expected more than 2050 samples"),
@@ -198,7 +201,7 @@ def test_step_two_says_what_the_band_lacks(band: tuple[float, float], message: s
 
 
 def test_step_two_refuses_a_slope_for_a_plateau() -> None:
-    with pytest.raises(InputError, match="expected a plateau .* still .* from the level"):
+    with pytest.raises(InputError, match=r"expected a plateau .* still .* from the level"):
         initial_flexibility(
             two_mass_response(top_hz=14.0),
             rigid_inertia_kg_m2=RIGID,

@@ -186,12 +186,16 @@ def initial_model(
         findings += list(spring.findings)
     else:
         findings.append("one broadband record only: k3 starts at zero; measure a second amplitude")
-    linear = spring.linear_nm_rad if spring and spring.linear_nm_rad > 0 else stiffness.mean()
+    # A spring that softens with the cube of its deflection gives way beyond some torque.
+    usable = spring is not None and spring.cubic_nm_rad3 >= 0 and spring.linear_nm_rad > 0
+    if spring is not None and not usable:
+        findings.append("step 3 starts with k3 = 0 and the mean stiffness")
+    linear = spring.linear_nm_rad if spring and usable else stiffness.mean()
     parameters = {
         "J_m": motor,
         "J_a": arm,
         "k1": float(linear),
-        "k3": spring.cubic_nm_rad3 if spring else 0.0,
+        "k3": spring.cubic_nm_rad3 if spring and usable else 0.0,
         "d": float(np.mean([f.damping_nm_s_rad for f in flexibilities])),
         "F_v": max(found.viscous_friction_nm_s_rad, 0.0),
         "F_c": max(found.coulomb_friction_nm, 0.0),

@@ -68,9 +68,12 @@ class ResidualTests:
         """In words."""
         level = 1 - float(self.correlations.attrs["probability"])
         parts = []
+        # White residuals cannot reach later ones through the controller, others can.
+        feeds = self.closed_loop and max(self.feedback_p_value, self.whiteness_p_value) < level
         if self.independence_p_value < level:
             parts.append(
                 "residuals depend on past inputs: the model lacks dynamics or a nonlinearity"
+                + (", or the controller fed them back; test with the reference" * feeds)
             )
         else:
             parts.append("no dependence on past inputs found")
@@ -113,11 +116,13 @@ def residual_tests(
     Negative lags are inputs that come after the residual. In closed loop the controller puts
     residuals into later inputs, with an undelayed controller also into that of the same sample:
     these lags say nothing against the model, which is judged by lags from one on (open
-    loop: from zero on).
+    loop: from zero on). Residuals that are not white, as those of an output-error model with
+    noise before the output, are then correlated with past inputs too, through their own past;
+    give the reference as ``input_`` to be sure: nothing feeds back into it.
 
     Parameters
     ----------
-    residual, input_ : (n,).
+    residual, input_ : (n,); the input of the model, or the reference of the loop.
     lags : how many lags on either side.
     lag_step : samples from lag to lag; more than one where the samples are dense.
     probability : of the limits.
