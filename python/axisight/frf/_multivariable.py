@@ -7,7 +7,6 @@ import xarray as xr
 
 from axisight import _core
 from axisight.frf._lines import Quantity, line_factor, output_unit, provenance
-from axisight.frf.confidence import with_freedom
 from axisight.frf.response import frequency_response
 from axisight.records.periodic import PeriodicRecords
 
@@ -37,7 +36,7 @@ def estimate(
     if spare:
         variance = found["residual_variance"]
         freedom = np.full(variance.shape, float(spare))
-    dataset = frequency_response(
+    return frequency_response(
         records.frequency_hz,
         found["response"],
         estimator=estimator,
@@ -45,8 +44,8 @@ def estimate(
         noise_variance=noise,
         condition=found["condition"],
         flag=found["flag"],
+        degrees_of_freedom=freedom,
         input_unit=records.input_unit,
         output_unit=output_unit(records, quantity),
         attrs=provenance(records, quantity),
     )
-    return with_freedom(dataset, freedom)

@@ -27,13 +27,13 @@ A line that cannot be estimated is NaN and flagged; a number is never infinite.
 from __future__ import annotations
 
 from enum import IntEnum
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight import _core
 from axisight.errors import InputError
 
 DIMS = ("frequency_hz", "output", "input")
@@ -62,6 +62,7 @@ def frequency_response(
     condition: NDArray[np.float64] | None = None,
     flag: NDArray[np.int8] | None = None,
     coherence: NDArray[np.float64] | None = None,
+    degrees_of_freedom: NDArray[np.float64] | None = None,
     input_unit: str = "Nm",
     output_unit: str = "rad",
     attrs: dict[str, Any] | None = None,
@@ -78,6 +79,8 @@ def frequency_response(
         Units of the channels, for labels.
     condition, flag, coherence
         (n_freq,), (n_freq,) and (n_freq, n_out).
+    degrees_of_freedom
+        Complex, of ``variance``, of its shape.
     attrs
         More provenance, e.g. numbers of experiments and periods.
 
@@ -116,6 +119,9 @@ def frequency_response(
     if coherence is not None:
         _expect("coherence", coherence, shape[:2])
         variables["coherence"] = (DIMS[:2], coherence, {"units": "1"})
+    if degrees_of_freedom is not None:
+        _expect("degrees_of_freedom", degrees_of_freedom, shape)
+        variables["degrees_of_freedom"] = (DIMS, degrees_of_freedom, {"units": "1"})
     return xr.Dataset(
         variables,
         coords={
@@ -127,7 +133,7 @@ def frequency_response(
             "estimator": estimator,
             "input_unit": input_unit,
             "output_unit": output_unit,
-            "axisight_version": version("axisight"),
+            "axisight_version": _core.__version__,
             **(attrs or {}),
         },
     )

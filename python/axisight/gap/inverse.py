@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from axisight import _core
 from axisight.effects import Effect, core_effects
@@ -131,6 +131,8 @@ def _inertia(robot: Robot) -> Array:
 
 def _torque_noise_std(log: Log) -> Array:
     rate = 1.0 / log.sample_time_s
-    f, density = welch(log.torque_nm, rate, nperseg=min(2048, log.n_samples // 2), axis=0)
+    f, density = scipy.signal.welch(
+        log.torque_nm, rate, nperseg=min(2048, log.n_samples // 2), axis=0
+    )
     top = (f > 0.4 * rate) & (f < 0.49 * rate)
     return np.asarray(np.sqrt(np.mean(density[top], axis=0) * rate / 2))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from axisight.errors import InputError
 from axisight.fitting import Weighting
@@ -47,7 +47,7 @@ def position_noise_std(logs: list[Log]) -> Array:
     for log in logs:
         rate = 1.0 / log.sample_time_s
         # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
-        f, density = welch(
+        f, density = scipy.signal.welch(
             np.diff(log.position_rad, n=2, axis=0), rate, nperseg=_segment(log), axis=0
         )
         top = (f > 0.4 * rate) & (f < 0.49 * rate)
@@ -61,7 +61,7 @@ def _segment(log: Log) -> int:
 
 
 def _density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
-    f, density = welch(x, rate, nperseg=segment, axis=0, detrend="constant")
+    f, density = scipy.signal.welch(x, rate, nperseg=segment, axis=0, detrend="constant")
     return f, np.asarray(density.T * rate / 2)
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
@@ -216,7 +216,9 @@ def _acceptable(
     gain = float((current - best.trial.held_out).sum())
     size = float(state.model.size.sum())
     first = max(float((held_out_loss(state.baseline) - state.floor).sum()), 1e-12)
-    needed = max(settings.significance, float(norm.isf(settings.false_alarms / max(tried, 1))))
+    needed = max(
+        settings.significance, float(scipy.stats.norm.isf(settings.false_alarms / max(tried, 1)))
+    )
     real = best.significance > needed and gain / size > settings.smallest_gain
     worth = best.score > settings.smallest_score and gain / first > settings.smallest_share
     return best if real and worth else None

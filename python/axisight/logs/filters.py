@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy
 
 from axisight.errors import InputError
 from axisight.logs.log import Floats
@@ -39,8 +39,8 @@ def lowpass(x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4) -
             f"x: expected more than {least} samples for order {order}, got {x.shape[0]}"
         )
     pad = min(x.shape[0] - 1, max(least, math.ceil(_PADDING_PERIODS / (cutoff_hz * sample_time_s))))
-    sections = butter(order, cutoff_hz * sample_time_s * 2.0, output="sos")
-    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=pad), dtype=np.float64)
+    sections = scipy.signal.butter(order, cutoff_hz * sample_time_s * 2.0, output="sos")
+    return np.asarray(scipy.signal.sosfiltfilt(sections, x, axis=0, padlen=pad), dtype=np.float64)
 
 
 def differentiate(

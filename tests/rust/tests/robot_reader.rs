@@ -7,58 +7,7 @@ use axisight_core::robot::{
 const NOMINAL: &str = include_str!("../../../python/axisight/presets/irb6600_like.toml");
 
 /// A small robot with every kind of joint. Tests count its lines: `schema` is line 1.
-const SMALL: &str = r#"schema = "axisight.robot/1"
-name = "small"
-gravity = [0, 0, -9.81]
-sample_time = 5.0e-4
-
-[[joint]]
-name = "base"
-kind = "driven"
-origin = [0.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-[joint.drive]
-gear_ratio = -0.01
-motor_inertia = 0
-viscous_friction = 0.01
-
-[[joint]]
-name = "shoulder"
-kind = "driven"
-motion = "revolute"
-origin = [0.1, 0.0, 0.5]
-axis = [0.0, 1.0, 0.0]
-stiffness = 1.0e6
-damping = 500.0
-[joint.drive]
-gear_ratio = 0.005
-motor_inertia = 0.012
-viscous_friction = 0.013
-
-[[joint]]
-name = "bend"
-kind = "elastic"
-origin = [0.0, 0.0, 0.0]
-axis = [1.0, 0.0, 0.0]
-stiffness = 8.0e6
-damping = 2000.0
-[joint.link]
-mass = 260
-com = [0.0, -0.2, 0.45]
-inertia = [38.0, 36.0, 7.0, 0.0, 0.0, 0.0]
-
-[controller]
-kind = "cascade"
-kv = [10, 11]
-kp = [1.0, 1.5]
-ki = [2.0, 2.5]
-
-[sensor]
-position_noise_std = 1.0e-5
-
-[operating_point]
-joint_angle = [0.1, 0.2]
-"#;
+const SMALL: &str = include_str!("../src/small_robot.toml");
 
 /// Inertia of the only link.
 const INERTIA: &str = "[38.0, 36.0, 7.0, 0.0, 0.0, 0.0]";

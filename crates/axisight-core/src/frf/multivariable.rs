@@ -108,6 +108,8 @@ struct Line {
     right: Vec<C>,
     scratch: Vec<C>,
     response: Vec<C>,
+    /// `Y - G U` of one output in one experiment, by period.
+    residual: Vec<C>,
     /// Variance of the average of `Y - G U`, `(output, experiment)`.
     error: Vec<f64>,
     condition: f64,
@@ -126,6 +128,7 @@ impl Line {
             right: zeros(e * m),
             scratch: zeros(e * m + 2 * m * m),
             response: zeros(layout.outputs * m),
+            residual: zeros(layout.periods),
             error: vec![0.0; layout.outputs * e],
             condition: f64::NAN,
         }
@@ -257,15 +260,25 @@ impl Line {
             layout.periods,
             layout.channels(),
         );
+        let residual = &mut self.residual;
         for i in 0..layout.outputs {
             let row = &self.response[i * m..(i + 1) * m];
             for k in 0..e {
-                let residual = |p: usize| {
-                    let own = &self.periods[(k * periods + p) * channels..][..channels];
-                    row.iter().zip(own).fold(own[m + i], |r, (g, u)| r - g * u)
-                };
-                let mean = (0..periods).map(residual).sum::<C>() / periods as f64;
-                let scatter: f64 = (0..periods).map(|p| (residual(p) - mean).norm_sqr()).sum();
+                let own = &self.periods[k * periods * channels..][..periods * channels];
+                let mut sum = C::default();
+                for (left, own) in residual.iter_mut().zip(own.chunks_exact(channels)) {
+                    let mut value = own[m + i];
+                    for (g, u) in row.iter().zip(own) {
+                        value -= g * u;
+                    }
+                    *left = value;
+                    sum += value;
+                }
+                let mean = sum / periods as f64;
+                let mut scatter = 0.0;
+                for left in residual.iter() {
+                    scatter += (left - mean).norm_sqr();
+                }
                 self.error[i * e + k] = scatter / (periods * (periods - 1)) as f64;
             }
         }

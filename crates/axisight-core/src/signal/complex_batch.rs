@@ -6,6 +6,7 @@
 
 use super::SmallSolver;
 use super::adjugate;
+use super::ahead::Ahead;
 use super::lockstep_lu::Factors;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::wide::{self, Wide};
@@ -221,15 +222,23 @@ fn invert_lanes<R: Register, const N: usize>(a: &[C], out: &mut [C], singular: &
     let group = R::LANES * size;
     let mut factors = Factors::<R, N>::new();
     let mut later = Vec::new();
-    let groups = a.chunks_exact(group).zip(out.chunks_exact_mut(group));
-    for (g, (a, out)) in groups.enumerate() {
+    let mut left = (a, &mut *out);
+    for g in 0..singular.len() / R::LANES {
+        let (a, from) = left.0.split_at(group);
+        let (out, to) = left.1.split_at_mut(group);
         let first = g * R::LANES;
         if N == 3 {
+            // Quickly done: what is asked for must be a few groups off.
+            let skipped = (2 * group).min(from.len());
+            let next = skipped + group.min(from.len() - skipped);
+            Ahead::new(&from[skipped..next], &to[skipped..next]).ask(group);
             adjugate::leave(adjugate::invert::<R>(a, out), first, &mut later);
         } else {
-            let bad = factors.invert(a, out);
+            let next = group.min(from.len());
+            let bad = factors.invert(a, out, Ahead::new(&from[..next], &to[..next]));
             finish(bad, size, out, &mut singular[first..]);
         }
+        left = (from, to);
     }
     let (mut from, mut to) = (vec![C::default(); group], vec![C::default(); group]);
     let whole = singular.len() / R::LANES * R::LANES;
@@ -249,7 +258,7 @@ fn invert_lanes<R: Register, const N: usize>(a: &[C], out: &mut [C], singular: &
         for (from, place) in from.chunks_exact_mut(size).zip(places) {
             from.copy_from_slice(&a[place * size..][..size]);
         }
-        let bad = factors.invert(&from, &mut to);
+        let bad = factors.invert(&from, &mut to, Ahead::nothing());
         finish(bad, size, &mut to, &mut flags);
         for ((to, flag), place) in to.chunks_exact(size).zip(flags).zip(places) {
             out[place * size..][..size].copy_from_slice(to);

@@ -4,6 +4,7 @@
 //! those of LAPACK's `gesv`, hence its residuals: column `j` of the inverse solves
 //! `A x = e_j`. Exchanges of rows are selections lane by lane.
 
+use super::ahead::Ahead;
 use super::pair::Pair;
 use crate::scalar::{MOST_LANES, Register};
 use nalgebra::Complex;
@@ -40,13 +41,15 @@ impl<R: Register, const N: usize> Factors<R, N> {
     /// Inverses of `R::LANES` matrices; the lanes of the result are above zero where a matrix
     /// is singular or not finite.
     #[inline(always)]
-    pub(super) fn invert(&mut self, a: &[C], out: &mut [C]) -> R {
+    pub(super) fn invert(&mut self, a: &[C], out: &mut [C], mut ahead: Ahead<'_>) -> R {
         for i in 0..N {
             for j in 0..N {
                 self.lu[i][j] = Pair::split(&a[i * N + j..], N * N);
             }
         }
-        self.factor();
+        // As many lines of the next group with each row: N of each of R::LANES N^2 / 4.
+        let lines = (R::LANES * N).div_ceil(12);
+        self.factor(|| ahead.ask(lines));
         // All columns at a time: one load of L or U serves N products. Row i of the right
         // side is scale e_c, c the row that has come to place i.
         let zero = R::splat(0.0);
@@ -59,6 +62,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
             }
         }
         for i in 0..N {
+            ahead.ask(lines);
             let mut sums = x[i];
             for k in 0..i {
                 let factor = self.lu[i][k];
@@ -69,6 +73,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
             x[i] = sums;
         }
         for i in (0..N).rev() {
+            ahead.ask(lines);
             let mut sums = x[i];
             for k in i + 1..N {
                 let factor = self.lu[i][k];
@@ -95,7 +100,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
                 self.lu[i][j] = Pair::split(&u[j * N + i..], N * N);
             }
         }
-        self.factor();
+        self.factor(|| ());
         let mut places = [[0; MOST_LANES]; N];
         for (row, places) in self.row.iter().zip(&mut places) {
             let mut numbers = [0.0; MOST_LANES];
@@ -136,9 +141,9 @@ impl<R: Register, const N: usize> Factors<R, N> {
         self.bad()
     }
 
-    /// Factor what stands in `lu`.
+    /// Factor what stands in `lu`; `between` is done before each column.
     #[inline(always)]
-    fn factor(&mut self) {
+    fn factor(&mut self, mut between: impl FnMut()) {
         let zero = R::splat(0.0);
         // Largest square of each column.
         let mut square_of = [zero; N];
@@ -158,6 +163,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
         (self.singular, self.spoiled) = (zero, zero);
         let smallest = R::splat((4.0 * N as f64 * f64::EPSILON).powi(2));
         for k in 0..N {
+            between();
             self.pivot(k);
             let above = square_of[k].fnma(smallest, self.lu[k][k].square());
             self.singular = above.if_positive(self.singular, R::splat(1.0));

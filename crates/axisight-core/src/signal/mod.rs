@@ -2,6 +2,7 @@
 //! records, small complex systems.
 
 mod adjugate;
+mod ahead;
 mod complex_batch;
 mod complex_solve;
 mod dft;

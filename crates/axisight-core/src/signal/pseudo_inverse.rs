@@ -44,7 +44,10 @@ impl PseudoInverse {
         for i in 0..m {
             let row = &a[i * e..(i + 1) * e];
             // Largest first: squares of small numbers would vanish.
-            let largest = row.iter().map(|x| x.norm()).fold(0.0, f64::max);
+            let largest = row
+                .iter()
+                .map(|x| x.re.abs().max(x.im.abs()))
+                .fold(0.0, f64::max);
             let norm: f64 = row.iter().map(|x| (x / largest).norm_sqr()).sum();
             let scale = 1.0 / (largest * norm.sqrt());
             self.scale[i] = if scale.is_finite() { scale } else { 0.0 };
@@ -98,15 +101,16 @@ impl PseudoInverse {
         let alpha: f64 = a.iter().map(Complex::norm_sqr).sum();
         let beta: f64 = b.iter().map(Complex::norm_sqr).sum();
         let product: C = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
-        let size = product.norm();
+        // Rows have unit norm, so that nothing here overflows: no need of `hypot`.
+        let size = product.norm_sqr().sqrt();
         let orthogonal = size <= f64::EPSILON * (alpha * beta).sqrt();
         if orthogonal || !size.is_finite() || size < f64::MIN_POSITIVE {
             return false;
         }
         let zeta = (beta - alpha) / (2.0 * size);
-        let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-        let c = 1.0 / t.hypot(1.0);
-        let (s, phase) = (c * t, product.conj() / size);
+        let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
+        let c = 1.0 / (t * t + 1.0).sqrt();
+        let (s, phase) = (c * t, product.conj() * (1.0 / size));
         rotate(&mut self.turned, e, (p, q), (c, s), phase);
         rotate(&mut self.turns, self.rows, (p, q), (c, s), phase);
         true
