@@ -730,7 +730,7 @@ class _AxisModelSpec(Protocol):
 
 def axis_fit(
     model: _AxisModelSpec,
-    sets: Sequence[tuple[_Array, _Array, float, float]],
+    sets: Sequence[tuple[_Array, _Array, float, float, int]],
     parameters: Sequence[tuple[float, float, float, float, bool]],
     *,
     whitening: Sequence[float],
@@ -739,17 +739,17 @@ def axis_fit(
     loss_tolerance: float,
     step_tolerance: float,
     cancel: CancelToken | None = None,
-) -> tuple[str, _Array, float, float, int, int, _Array]:
+) -> tuple[str, _Array, float, float, int, int, _Array, _Array, _Array]:
     """Minimize the prediction error of an axis from one start.
 
-    ``sets``: torque, output, sample time, weight. ``parameters``: initial, lower, upper, scale,
-    free. Returns status, parameters, loss, initial loss, iterations, evaluations and the normal
-    matrix of the free parameters.
+    ``sets``: torque, output, sample time, weight, samples of a block. ``parameters``: initial,
+    lower, upper, scale, free. Returns status, parameters, loss, initial loss, iterations,
+    evaluations, normal matrix of the free parameters, residuals, gradients of the blocks.
     """
 
 def axis_linearize(
     model: _AxisModelSpec,
-    sets: Sequence[tuple[_Array, _Array, float, float]],
+    sets: Sequence[tuple[_Array, _Array, float, float, int]],
     theta: Sequence[float],
     free: Sequence[int],
     *,
@@ -761,7 +761,7 @@ def axis_linearize(
 
 def axis_simulate(
     model: _AxisModelSpec,
-    set: tuple[_Array, _Array, float, float],
+    set: tuple[_Array, _Array, float, float, int],
     theta: Sequence[float],
     *,
     predicts: bool,

@@ -22,12 +22,13 @@ pub struct ModelSpec {
 
 /// One parameter: initial, lower, upper, scale, free.
 type ParameterTuple = (f64, f64, f64, f64, bool);
-/// One data set: torque, output, sample time, weight.
+/// One data set: torque, output, sample time, weight, samples of a block.
 type SetTuple<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
     f64,
     f64,
+    usize,
 );
 
 fn model(spec: ModelSpec) -> PyResult<AxisModel> {
@@ -58,13 +59,15 @@ fn model(spec: ModelSpec) -> PyResult<AxisModel> {
 }
 
 fn sets(data: &[SetTuple<'_>]) -> Vec<AxisSet> {
-    let set = |(number, (torque, output, sample_time, weight)): (usize, &SetTuple<'_>)| AxisSet {
-        number,
-        torque: torque.as_array().to_vec(),
-        output: output.as_array().to_vec(),
-        sample_time: *sample_time,
-        weight: *weight,
-    };
+    let set =
+        |(number, (torque, output, sample_time, weight, block)): (usize, &SetTuple<'_>)| AxisSet {
+            number,
+            torque: torque.as_array().to_vec(),
+            output: output.as_array().to_vec(),
+            sample_time: *sample_time,
+            weight: *weight,
+            block: *block,
+        };
     data.iter().enumerate().map(set).collect()
 }
 
@@ -94,7 +97,7 @@ fn fit_error(error: AxisError) -> PyErr {
 }
 
 /// Outcome of a search: status, parameters, loss, initial loss, iterations, evaluations,
-/// normal matrix over the free parameters.
+/// normal matrix over the free parameters, residuals, gradients of the blocks.
 type Outcome<'py> = (
     &'static str,
     Bound<'py, PyArray1<f64>>,
@@ -102,6 +105,8 @@ type Outcome<'py> = (
     f64,
     usize,
     usize,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<f64>>,
 );
 
@@ -115,6 +120,8 @@ fn outcome<'py>(py: Python<'py>, result: SearchResult) -> PyResult<Outcome<'py>>
         result.iterations,
         result.evaluations,
         array2(py, result.normal.matrix, free)?,
+        array1(py, result.residual),
+        array2(py, result.block_gradients, free)?,
     ))
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -18,6 +18,8 @@ Output = Literal["velocity", "velocity_difference", "position"]
 Hold = Literal["zero", "first"]
 
 MOST_MASSES = 5
+# Torque, output, sample time, weight, samples of a block.
+CoreRecord: TypeAlias = tuple[Array, Array, float, float, int]
 OUTPUT_UNIT = {"velocity": "rad/s", "velocity_difference": "rad/s", "position": "rad"}
 
 
@@ -256,7 +258,7 @@ class AxisModel:
             raise InputError(f"start: expected {2 * self.n_masses} numbers, got {begin.shape}")
         step = sample_time(sample_time_s)
         theta = [*self.vector(self.complete(parameters)), *begin.tolist()]
-        data = (torque, np.zeros_like(torque), step, 1.0)
+        data = (torque, np.zeros_like(torque), step, 1.0, 1)
         output, states = _core.axis_simulate(self.core(), data, theta, predicts=False)
         return xr.Dataset(
             {
@@ -340,10 +342,11 @@ class AxisData:
         """Return the motor angle at the first sample, zero where no position is given."""
         return 0.0 if self.position_rad is None else float(np.asarray(self.position_rad)[0])
 
-    def core(self, model: AxisModel) -> tuple[Array, Array, float, float]:
+    def core(self, model: AxisModel, block_s: float = 1.0) -> CoreRecord:
         """Return the record as the compiled core takes it."""
         torque = np.asarray(self.torque_nm, np.float64)
-        return torque, self.measured(model), self.sample_time_s, float(self.weight)
+        block = max(round(block_s / self.sample_time_s), 1)
+        return torque, self.measured(model), self.sample_time_s, float(self.weight), block
 
 
 def samples(field: str, value: ArrayLike) -> Array:

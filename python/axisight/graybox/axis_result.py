@@ -167,19 +167,19 @@ def conclude(
     task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]
 ) -> AxisFit:
     """Turn the end of a search into a result."""
-    from axisight.graybox.prediction_error import residuals
+    from axisight.graybox.prediction_error import free_run
 
     model = task.model
     names = task.free_names
-    errors, jacobian = residuals(task, point)
-    lengths = [len(d) for d in task.data]
+    errors, lengths = point.errors, [len(d) for d in task.data]
     skipped = len(point.whitening) * len(lengths)
-    free = max(errors.size - skipped - len(jacobian), 1)
-    variance = float(errors @ errors) / free
-    inverse, condition = inverse_normal(jacobian)
+    variance = float(errors @ errors) / max(errors.size - skipped - len(point.matrix), 1)
+    inverse, condition = inverse_normal(point.matrix)
     n = len(names)
     covariance = variance * inverse
-    sandwich = inverse @ _scatter(task, errors, jacobian) @ inverse
+    scatter = point.block_gradients.T @ point.block_gradients
+    with np.errstate(invalid="ignore"):
+        sandwich = inverse @ scatter @ inverse
     std = np.sqrt(np.diag(covariance)[:n])
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance[:n, :n] / np.outer(std, std)
@@ -192,9 +192,12 @@ def conclude(
     first = len(model.vector({}))
     starts = np.array(point.theta[first:]).reshape(len(lengths), 2 * model.n_masses)
     texts = [*warnings, *_warnings(point.status, bounded, condition, names, inverse)]
-    fits = tuple(
-        fit_percent(d.measured(model), _simulated(task, point, i)) for i, d in enumerate(task.data)
-    )
+    simulated = not (point.gains or point.whitening)
+    fits = []
+    for i, (d, part, root) in enumerate(zip(task.data, parts, roots, strict=True)):
+        measured = d.measured(model)
+        run = measured + part / root if simulated else free_run(task, point, i)
+        fits.append(fit_percent(measured, run))
     return AxisFit(
         model=model,
         parameters=parameters,
@@ -214,27 +217,17 @@ def conclude(
         evaluations=point.evaluations,
         error_std=float(np.sqrt(variance)),
         residuals=tuple(p / r for p, r in zip(parts, roots, strict=True)),
-        fit_percent=fits,
+        fit_percent=tuple(fits),
         starts=starts,
         noise=noise,
     )
 
 
-def _simulated(task: Task, point: Point, i: int) -> Array:
-    """Free run of record ``i`` from its estimated start."""
-    model, record = task.model, task.data[i]
-    shared, states = len(model.vector({})), 2 * model.n_masses
-    begin = point.theta[shared + i * states : shared + (i + 1) * states]
-    theta = [*point.theta[:shared], *begin]
-    return _core.axis_simulate(model.core(), record.core(model), theta, predicts=False)[0]
-
-
-def inverse_normal(jacobian: Array) -> tuple[Array, float]:
-    """Return (J J^T)^-1 and the condition number of J J^T scaled to unit diagonal.
+def inverse_normal(matrix: Array) -> tuple[Array, float]:
+    """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
 
     Directions that the data do not show get the pseudo-inverse; the condition is then infinite.
     """
-    matrix = jacobian @ jacobian.T
     size = np.sqrt(np.diag(matrix))
     size[size == 0] = 1.0
     unit = matrix / np.outer(size, size)
@@ -247,20 +240,6 @@ def inverse_normal(jacobian: Array) -> tuple[Array, float]:
     blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
     inverse[np.ix_(blind, blind)] = np.inf
     return inverse, condition
-
-
-def _scatter(task: Task, errors: Array, jacobian: Array) -> Array:
-    """Sum of the outer products of the gradients of blocks of data."""
-    total = np.zeros((len(jacobian), len(jacobian)))
-    begin = 0
-    for record in task.data:
-        count = max(int(len(record) * record.sample_time_s / task.settings.block_s), 1)
-        edges = begin + np.linspace(0, len(record), count + 1).astype(int)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
-            gradient = jacobian[:, low:high] @ errors[low:high]
-            total += np.outer(gradient, gradient)
-        begin += len(record)
-    return total
 
 
 def _warnings(

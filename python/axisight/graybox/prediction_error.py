@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -219,11 +219,13 @@ class Point:
     free_gains: bool = False
     whitening: tuple[float, ...] = ()
     status: str = ""
+    matrix: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    errors: Array = field(default_factory=lambda: np.zeros(0))
+    block_gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
     loss: float = np.nan
     initial_loss: float = np.nan
     iterations: int = 0
     evaluations: int = 0
-    n_free: int = 0
 
     def vector(self, task: Task) -> list[float]:
         """All parameters with the present gains."""
@@ -284,9 +286,9 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
         (x, min(lo, x), max(hi, x), abs(x) or 1.0, i in free)
         for i, (x, lo, hi) in enumerate(zip(theta, low, high, strict=True))
     ]
-    status, found, loss, initial_loss, iterations, evaluations, _ = _core.axis_fit(
+    found = _core.axis_fit(
         model.core(),
-        [d.core(model) for d in task.data],
+        [d.core(model, task.settings.block_s) for d in task.data],
         specs,
         whitening=list(point.whitening),
         predicts=point.predicts,
@@ -295,40 +297,40 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
         step_tolerance=task.settings.step_tolerance,
         cancel=token,
     )
+    status, vector, loss, initial_loss, iterations, evaluations, matrix, errors, blocks = found
     first = len(model.vector({})) - model.n_gains()
-    gains = tuple(found[first : first + model.n_gains()].tolist()) if point.predicts else ()
+    gains = tuple(vector[first : first + model.n_gains()].tolist()) if point.predicts else ()
     return replace(
         point,
-        theta=tuple(found.tolist()),
+        theta=tuple(vector.tolist()),
         gains=gains,
         status=status,
+        matrix=matrix,
+        errors=errors,
+        block_gradients=blocks,
         loss=loss,
         initial_loss=initial_loss,
         iterations=point.iterations + iterations,
         evaluations=point.evaluations + evaluations,
-        n_free=len(free),
     )
 
 
-def residuals(task: Task, point: Point, *, whitened: bool = True) -> tuple[Array, Array]:
-    """Return weighted residuals, model minus measurement, and Jacobian (n_free, n)."""
-    model = task.model
-    return _core.axis_linearize(
-        model.core(),
-        [d.core(model) for d in task.data],
-        point.vector(task),
-        free_places(task, point),
-        whitening=list(point.whitening) if whitened else [],
-        predicts=point.predicts,
-    )
+def free_run(task: Task, point: Point, i: int) -> Array:
+    """Simulate record ``i`` from its estimated start, without feedback of errors."""
+    model, record = task.model, task.data[i]
+    shared, states = len(model.vector({})), 2 * model.n_masses
+    begin = point.theta[shared + i * states : shared + (i + 1) * states]
+    theta = [*point.theta[:shared], *begin]
+    return _core.axis_simulate(model.core(), record.core(model), theta, predicts=False)[0]
 
 
 def _whitened(task: Task, point: Point, token: _core.CancelToken) -> Point:
     """Refit with the residuals whitened until the filter no longer changes."""
     for _ in range(task.settings.ar_rounds):
-        plain = replace(point, whitening=())
-        errors, _ = residuals(task, plain)
-        parts = np.split(errors, np.cumsum([len(d) for d in task.data])[:-1])
+        parts = [
+            np.sqrt(d.weight) * (free_run(task, point, i) - d.measured(task.model))
+            for i, d in enumerate(task.data)
+        ]
         found = estimate_filter(parts, task.settings.ar_order, task.settings.most_ar_order)
         before = point.loss
         point = search(task, replace(point, whitening=tuple(found.tolist())), token)

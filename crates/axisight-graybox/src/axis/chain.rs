@@ -3,8 +3,8 @@
 //! The states are the deflections of the springs and the speeds of the masses, so that a
 //! turning axis has no state that drifts; the motor angle is carried where something needs it.
 
+use super::jet::Number;
 use super::layout::AxisModel;
-use axisight_core::scalar::Scalar;
 use std::array::from_fn;
 
 /// State of a chain of `N` masses, or its rate.
@@ -16,7 +16,7 @@ pub(super) struct State<S, const N: usize> {
     pub speed: [S; N],
 }
 
-impl<S: Scalar, const N: usize> State<S, N> {
+impl<S: Number, const N: usize> State<S, N> {
     /// From motor angle, deflections and speeds, one after the other.
     pub fn new(entry: impl Fn(usize) -> S) -> Self {
         Self {
@@ -25,13 +25,17 @@ impl<S: Scalar, const N: usize> State<S, N> {
         }
     }
 
-    /// `self + h * rate`.
+    /// `self + h * rate`; the motor angle of a chain that is not extended stays.
     #[inline(always)]
-    pub fn moved(&self, rate: &Self, h: f64) -> Self {
-        Self {
-            place: from_fn(|i| rate.place[i].fma(S::constant(h), self.place[i])),
-            speed: from_fn(|i| rate.speed[i].fma(S::constant(h), self.speed[i])),
+    pub fn moved<const EXTENDED: bool>(&self, rate: &Self, h: f64) -> Self {
+        let mut out = *self;
+        for i in 0..N {
+            if EXTENDED || i > 0 {
+                out.place[i] = rate.place[i].times_plus(h, self.place[i]);
+            }
+            out.speed[i] = rate.speed[i].times_plus(h, self.speed[i]);
         }
+        out
     }
 
     /// `self + h * rate` where `h` carries derivatives.
@@ -76,6 +80,8 @@ pub(super) struct Chain<S, const N: usize> {
     plain_ratio: f64,
     backlash: S,
     excess: S,
+    /// Whether there is an excess, or could be one.
+    humped: bool,
     inverse_stribeck_speed: S,
     asymmetry: S,
     offset: S,
@@ -87,7 +93,7 @@ pub(super) struct Chain<S, const N: usize> {
 /// The edge of the gap is rounded over this share of its half width, as in the effect `backlash`.
 const EDGE: f64 = 0.05;
 
-impl<S: Scalar, const N: usize> Chain<S, N> {
+impl<S: Number, const N: usize> Chain<S, N> {
     /// Chain with the parameters that `value` gives by their place.
     pub fn new(model: &AxisModel, value: impl Fn(usize) -> S) -> Self {
         let layout = model.layout();
@@ -100,7 +106,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
                 }
             })
         };
-        let ratio = value(layout.ratio());
+        let (ratio, excess) = (value(layout.ratio()), value(layout.excess()));
         let harmonic = |(i, order): (usize, &f64)| {
             (*order, value(layout.ripple(i)), value(layout.ripple(i) + 1))
         };
@@ -114,7 +120,8 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
             ratio,
             plain_ratio: ratio.lane(0),
             backlash: value(layout.backlash()),
-            excess: value(layout.excess()),
+            excess,
+            humped: excess.lane(0) != 0.0 || (0..S::PARTIALS).any(|i| excess.partial(i, 0) != 0.0),
             inverse_stribeck_speed: value(layout.stribeck_speed()).recip(),
             asymmetry: value(layout.asymmetry()),
             offset: value(layout.offset()),
@@ -138,18 +145,28 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
         }
     }
 
+    /// `onto` minus `x` times the gear ratio.
+    #[inline(always)]
+    fn less_geared<const EXTENDED: bool>(&self, x: S, onto: S) -> S {
+        if EXTENDED {
+            onto - x * self.ratio
+        } else {
+            x.times_plus(-self.plain_ratio, onto)
+        }
+    }
+
     /// Rates of the deflections and torques of the springs.
     #[inline(always)]
     fn springs<const EXTENDED: bool>(&self, x: &State<S, N>) -> ([S; N], [S; N]) {
-        let rates = from_fn(|i| match i {
-            0 => S::zero(),
-            1 => self.geared::<EXTENDED>(x.speed[0]) - x.speed[1],
-            _ => x.speed[i - 1] - x.speed[i],
-        });
-        let torques = from_fn(|i| {
-            if i == 0 {
-                return S::zero();
-            }
+        // Loops, because the closures of `from_fn` are not always inlined.
+        let (mut rates, mut torques) = ([S::zero(); N], [S::zero(); N]);
+        for i in 1..N {
+            let before = if i == 1 {
+                self.geared::<EXTENDED>(x.speed[0])
+            } else {
+                x.speed[i - 1]
+            };
+            rates[i] = before - x.speed[i];
             let (deflection, rate) = if EXTENDED && i == 1 {
                 let (loaded, slope) = dead_zone(x.place[1], self.backlash);
                 (loaded, slope * rates[1])
@@ -157,15 +174,15 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
                 (x.place[i], rates[i])
             };
             let stiffness = self.cubic[i].fma(deflection.square(), self.linear[i]);
-            stiffness.fma(deflection, self.damping[i] * rate)
-        });
+            torques[i] = stiffness.fma(deflection, self.damping[i] * rate);
+        }
         (rates, torques)
     }
 
     /// Torque on the motor but for the friction, and the torque of the gear spring on it.
     #[inline(always)]
     fn drive<const EXTENDED: bool>(&self, x: &State<S, N>, gear: S, torque: f64) -> S {
-        let mut drive = -self.geared::<EXTENDED>(gear) + torque;
+        let mut drive = self.less_geared::<EXTENDED>(gear, S::constant(torque));
         if EXTENDED {
             drive += self.offset;
             for (order, cosine, sine) in &self.ripple {
@@ -180,7 +197,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
     #[inline(always)]
     fn friction<const EXTENDED: bool>(&self, speed: S, regime: Regime) -> S {
         let mut level = self.coulomb;
-        if EXTENDED {
+        if EXTENDED && self.humped {
             let hump = (-(speed * self.inverse_stribeck_speed).square()).exp();
             level = self.excess.fma(hump, level);
         }
@@ -209,17 +226,18 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
         if EXTENDED {
             place[0] = x.speed[0];
         }
-        let speed = from_fn(|i| {
-            let net = if i == 0 {
-                self.drive::<EXTENDED>(x, springs[1], torque)
-                    - self.friction::<EXTENDED>(x.speed[0], regime)
-            } else if i + 1 < N {
+        let mut speed = [S::zero(); N];
+        let drive = self.drive::<EXTENDED>(x, springs[1], torque);
+        let friction = self.friction::<EXTENDED>(x.speed[0], regime);
+        speed[0] = (drive - friction) * self.inverse_inertia[0];
+        for i in 1..N {
+            let net = if i + 1 < N {
                 springs[i] - springs[i + 1]
             } else {
                 springs[i]
             };
-            net * self.inverse_inertia[i]
-        });
+            speed[i] = net * self.inverse_inertia[i];
+        }
         let mut rate = State { place, speed };
         if regime == Regime::Stick {
             rate.speed[0] = S::zero();
@@ -240,7 +258,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
 }
 
 /// Deflection beyond a gap of half width `b`, and its slope.
-fn dead_zone<S: Scalar>(delta: S, b: S) -> (S, S) {
+fn dead_zone<S: Number>(delta: S, b: S) -> (S, S) {
     let (zero, one) = (S::zero(), S::one());
     let edge = b * EDGE;
     let over = delta.abs() - b;

@@ -47,11 +47,23 @@ impl Normal {
 }
 
 impl Rows {
-    /// No rows yet, for the free parameters number `slots`.
-    pub fn new(slots: Vec<usize>, samples: usize) -> Self {
+    /// No rows yet, for the free parameters number `slots`, in the memory of earlier ones.
+    pub fn new(slots: Vec<usize>, samples: usize, memory: Option<Self>) -> Self {
+        let (mut residual, mut partials) = memory.map_or_else(
+            || {
+                let passes = slots.len().div_ceil(LANES).max(1);
+                (
+                    Vec::with_capacity(samples),
+                    Vec::with_capacity(samples * passes),
+                )
+            },
+            |m| (m.residual, m.partials),
+        );
+        residual.clear();
+        partials.clear();
         Self {
-            residual: Vec::with_capacity(samples),
-            partials: Vec::with_capacity(samples * slots.len().div_ceil(LANES).max(1)),
+            residual,
+            partials,
             slots,
         }
     }
@@ -111,6 +123,24 @@ impl Rows {
             }
             None => out.resize(out.len() + self.residual.len(), 0.0),
         }
+    }
+
+    /// Gradients of blocks of about `block` samples over `n` free parameters, one after the other.
+    pub fn block_gradients(&self, block: usize, n: usize) -> Vec<f64> {
+        let len = self.residual.len();
+        let count = (len / block.max(1)).max(1);
+        let mut out = vec![0.0; count * n];
+        for (i, gradient) in out.chunks_mut(n.max(1)).enumerate() {
+            let range = i * len / count..(i + 1) * len / count;
+            for (pass, slots) in self.slots.chunks(LANES).enumerate() {
+                let part = self.pass(pass).get(range.clone()).unwrap_or(&[]);
+                let sum = weighted_sum(part, &self.residual[range.clone()]);
+                for (slot, g) in slots.iter().zip(sum) {
+                    gradient[*slot] = g;
+                }
+            }
+        }
+        out
     }
 
     /// Normal equations of `n` free parameters.

@@ -8,6 +8,7 @@
 mod chain;
 mod error;
 mod gram;
+mod jet;
 mod layout;
 mod motion;
 mod predictor;
@@ -15,6 +16,7 @@ mod problem;
 mod search;
 
 pub use error::AxisError;
+pub use gram::Normal;
 pub use layout::{AxisModel, Hold, Layout, Output};
 pub use predictor::Trajectory;
 pub use problem::{AxisProblem, AxisSet, Linearization};

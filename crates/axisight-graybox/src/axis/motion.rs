@@ -8,7 +8,7 @@
 //! one Newton step on the guard in dual numbers from the root found in plain ones.
 
 use super::chain::{Chain, Regime, State};
-use axisight_core::scalar::Scalar;
+use super::jet::Number;
 
 /// Changes of regime within one step; beyond, the rest is done in the last regime.
 const MOST_CHANGES: usize = 8;
@@ -40,7 +40,7 @@ impl Ramp {
 }
 
 #[inline(always)]
-fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
+fn runge_kutta4<S: Number, const N: usize, const EXTENDED: bool>(
     chain: &Chain<S, N>,
     x: &State<S, N>,
     ramp: Ramp,
@@ -49,17 +49,17 @@ fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
 ) -> State<S, N> {
     let (half, middle) = (0.5 * h, ramp.at(0.5 * h));
     let a = chain.rate::<EXTENDED>(x, ramp.torque, regime);
-    let b = chain.rate::<EXTENDED>(&x.moved(&a, half), middle, regime);
-    let c = chain.rate::<EXTENDED>(&x.moved(&b, half), middle, regime);
-    let d = chain.rate::<EXTENDED>(&x.moved(&c, h), ramp.at(h), regime);
-    x.moved(&a, h / 6.0)
-        .moved(&b, h / 3.0)
-        .moved(&c, h / 3.0)
-        .moved(&d, h / 6.0)
+    let b = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&a, half), middle, regime);
+    let c = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&b, half), middle, regime);
+    let d = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&c, h), ramp.at(h), regime);
+    x.moved::<EXTENDED>(&a, h / 6.0)
+        .moved::<EXTENDED>(&b, h / 3.0)
+        .moved::<EXTENDED>(&c, h / 3.0)
+        .moved::<EXTENDED>(&d, h / 6.0)
 }
 
 /// Positive while `regime` lasts.
-fn guard<S: Scalar, const N: usize, const EXTENDED: bool>(
+fn guard<S: Number, const N: usize, const EXTENDED: bool>(
     chain: &Chain<S, N>,
     x: &State<S, N>,
     torque: f64,
@@ -72,7 +72,7 @@ fn guard<S: Scalar, const N: usize, const EXTENDED: bool>(
     }
 }
 
-impl<S: Scalar, const N: usize> Motion<S, N> {
+impl<S: Number, const N: usize> Motion<S, N> {
     pub fn new(chain: Chain<S, N>, plain: Chain<f64, N>) -> Self {
         Self { chain, plain }
     }

@@ -2,10 +2,10 @@
 
 use super::AxisError;
 use super::chain::{Chain, State};
+use super::jet::Number;
 use super::layout::{AxisModel, Hold, Output};
 use super::motion::{Motion, Ramp};
 use super::problem::AxisSet;
-use axisight_core::scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Motor speed [rad/s] beyond which a run counts as diverged.
@@ -31,7 +31,7 @@ pub(super) struct Predictor<'a, S, const N: usize> {
     gains: Option<State<S, N>>,
 }
 
-impl<'a, S: Scalar, const N: usize> Predictor<'a, S, N> {
+impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
     /// From all parameters by their place; the start is that of data set `set`.
     pub fn new(
         model: &'a AxisModel,

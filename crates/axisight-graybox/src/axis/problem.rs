@@ -2,9 +2,10 @@
 
 use super::AxisError;
 use super::gram::{Normal, Rows};
+use super::jet::Jet;
 use super::layout::{AxisModel, Layout};
 use super::predictor::{Predictor, Trajectory};
-use axisight_core::scalar::{Dual, Scalar};
+use axisight_core::scalar::Scalar;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
@@ -24,6 +25,14 @@ pub struct AxisSet {
     pub sample_time: f64,
     /// Weight of its squared residuals.
     pub weight: f64,
+    /// Samples of a block of the sandwich covariance.
+    pub block: usize,
+}
+
+/// Residuals with derivatives by data set, and the normal equations they sum to.
+pub(super) struct Evaluation {
+    pub normal: Normal,
+    pub rows: Vec<Rows>,
 }
 
 /// Residuals and Jacobian, set after set.
@@ -95,30 +104,45 @@ impl<'a> AxisProblem<'a> {
         self.sets.iter().map(of).sum()
     }
 
-    /// Loss, gradient and normal matrix of the `free` parameters at `theta`.
-    ///
-    /// # Errors
-    /// [`AxisError::Diverged`] where the simulation fails, [`AxisError::Cancelled`].
-    pub fn normal(&self, theta: &[f64], free: &[usize]) -> Result<Normal, AxisError> {
-        let parts: Vec<_> = (0..self.sets.len())
+    /// Residuals and normal equations of the `free` parameters at `theta`; the memory of
+    /// `spare` is used again.
+    pub(super) fn evaluate(
+        &self,
+        theta: &[f64],
+        free: &[usize],
+        spare: Option<Evaluation>,
+    ) -> Result<Evaluation, AxisError> {
+        let spare = spare.map_or_else(Vec::new, |e| e.rows);
+        let mut memory: Vec<Option<Rows>> = spare.into_iter().map(Some).collect();
+        memory.resize_with(self.sets.len(), || None);
+        let parts: Vec<_> = memory
             .into_par_iter()
-            .map(|s| Ok(self.rows(theta, free, s)?.normal(free.len())))
+            .enumerate()
+            .map(|(set, memory)| {
+                let rows = self.rows(theta, free, set, memory)?;
+                Ok((rows.normal(free.len()), rows))
+            })
             .collect();
-        let mut total = Normal::zero(free.len());
+        let mut out = Evaluation {
+            normal: Normal::zero(free.len()),
+            rows: Vec::with_capacity(parts.len()),
+        };
         for part in parts {
-            total.add(&part?);
+            let (normal, rows) = part?;
+            out.normal.add(&normal);
+            out.rows.push(rows);
         }
-        Ok(total)
+        Ok(out)
     }
 
     /// Residuals and Jacobian at `theta`.
     ///
     /// # Errors
-    /// As [`AxisProblem::normal`].
+    /// [`AxisError::Diverged`] where the simulation fails, [`AxisError::Cancelled`].
     pub fn linearize(&self, theta: &[f64], free: &[usize]) -> Result<Linearization, AxisError> {
         let parts: Vec<_> = (0..self.sets.len())
             .into_par_iter()
-            .map(|s| self.rows(theta, free, s))
+            .map(|s| self.rows(theta, free, s, None))
             .collect();
         let mut out = Linearization {
             residual: Vec::new(),
@@ -137,7 +161,7 @@ impl<'a> AxisProblem<'a> {
     /// Simulated or predicted run of data set `set`.
     ///
     /// # Errors
-    /// As [`AxisProblem::normal`].
+    /// [`AxisError::Diverged`] where the simulation fails, [`AxisError::Cancelled`].
     pub fn trajectory(&self, theta: &[f64], set: usize) -> Result<Trajectory, AxisError> {
         self.complete(theta)?;
         match self.model.masses {
@@ -180,18 +204,24 @@ impl<'a> AxisProblem<'a> {
     }
 
     /// Residuals of a data set and their derivatives, eight parameters to a pass.
-    fn rows(&self, theta: &[f64], free: &[usize], set: usize) -> Result<Rows, AxisError> {
+    fn rows(
+        &self,
+        theta: &[f64],
+        free: &[usize],
+        set: usize,
+        memory: Option<Rows>,
+    ) -> Result<Rows, AxisError> {
         self.complete(theta)?;
         let extended = self.model.extended(theta, free);
         match (self.model.masses, extended) {
-            (2, false) => self.rows_of::<2, false>(theta, free, set),
-            (2, true) => self.rows_of::<2, true>(theta, free, set),
-            (3, false) => self.rows_of::<3, false>(theta, free, set),
-            (3, true) => self.rows_of::<3, true>(theta, free, set),
-            (4, false) => self.rows_of::<4, false>(theta, free, set),
-            (4, true) => self.rows_of::<4, true>(theta, free, set),
-            (_, false) => self.rows_of::<5, false>(theta, free, set),
-            (_, true) => self.rows_of::<5, true>(theta, free, set),
+            (2, false) => self.rows_of::<2, false>(theta, free, set, memory),
+            (2, true) => self.rows_of::<2, true>(theta, free, set, memory),
+            (3, false) => self.rows_of::<3, false>(theta, free, set, memory),
+            (3, true) => self.rows_of::<3, true>(theta, free, set, memory),
+            (4, false) => self.rows_of::<4, false>(theta, free, set, memory),
+            (4, true) => self.rows_of::<4, true>(theta, free, set, memory),
+            (_, false) => self.rows_of::<5, false>(theta, free, set, memory),
+            (_, true) => self.rows_of::<5, true>(theta, free, set, memory),
         }
     }
 
@@ -200,19 +230,20 @@ impl<'a> AxisProblem<'a> {
         theta: &[f64],
         free: &[usize],
         set: usize,
+        memory: Option<Rows>,
     ) -> Result<Rows, AxisError> {
         let layout = self.layout();
         let own = layout.start(set)..layout.start(set + 1);
         let acts = |i: usize| i < layout.shared() || own.contains(&i);
         let slots: Vec<usize> = (0..free.len()).filter(|s| acts(free[*s])).collect();
         let data = &self.sets[set];
-        let mut rows = Rows::new(slots.clone(), data.torque.len());
+        let mut rows = Rows::new(slots.clone(), data.torque.len(), memory);
         let passes = slots.len().div_ceil(LANES).max(1);
         for pass in 0..passes {
             let seeds = slots.iter().skip(pass * LANES).take(LANES);
             let seeds: Vec<usize> = seeds.map(|s| free[*s]).collect();
             let value = |i: usize| {
-                let number = Dual::<f64, LANES>::constant(theta.get(i).copied().unwrap_or(0.0));
+                let number = Jet::constant(theta.get(i).copied().unwrap_or(0.0));
                 let seed = seeds.iter().position(|s| *s == i);
                 seed.map_or(number, |s| number.seeded(s))
             };
@@ -224,7 +255,7 @@ impl<'a> AxisProblem<'a> {
                 if pass == 0 {
                     residual.push(y.value - data.output[k]);
                 }
-                partials.push(y.partials);
+                partials.push(y.partials.0);
             })?;
         }
         rows.whiten(&self.whitening);

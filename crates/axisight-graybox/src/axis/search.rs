@@ -8,7 +8,7 @@
 
 use super::AxisError;
 use super::gram::Normal;
-use super::problem::AxisProblem;
+use super::problem::{AxisProblem, Evaluation};
 use nalgebra::{DMatrix, DVector};
 
 /// One parameter of a search.
@@ -69,6 +69,10 @@ pub struct SearchResult {
     pub evaluations: usize,
     /// Normal equations at the end, over the free parameters.
     pub normal: Normal,
+    /// Weighted, whitened residuals, model minus measurement, set after set.
+    pub residual: Vec<f64>,
+    /// `J^T r` of every block of every set over the free parameters.
+    pub block_gradients: Vec<f64>,
 }
 
 /// Damped trials, each damped more, before the search gives up.
@@ -83,6 +87,8 @@ struct Search<'a> {
     free: Vec<usize>,
     options: SearchOptions,
     evaluations: usize,
+    /// Memory of a point that was left.
+    spare: Option<Evaluation>,
 }
 
 /// Minimize the loss of `problem` from the initial parameters.
@@ -104,6 +110,7 @@ pub fn search(
             .collect(),
         options,
         evaluations: 0,
+        spare: None,
     };
     search.run(parameters.iter().map(|p| p.initial).collect())
 }
@@ -128,19 +135,20 @@ fn check(problem: &AxisProblem<'_>, parameters: &[SearchParameter]) -> Result<()
 }
 
 impl Search<'_> {
-    fn evaluate(&mut self, theta: &[f64]) -> Result<Normal, AxisError> {
+    fn evaluate(&mut self, theta: &[f64]) -> Result<Evaluation, AxisError> {
         self.evaluations += 1;
-        self.problem.normal(theta, &self.free)
+        let spare = self.spare.take();
+        self.problem.evaluate(theta, &self.free, spare)
     }
 
     fn run(&mut self, theta: Vec<f64>) -> Result<SearchResult, AxisError> {
         let mut theta = theta;
-        let mut normal = self.evaluate(&theta)?;
-        let initial_loss = normal.loss;
+        let mut point = self.evaluate(&theta)?;
+        let initial_loss = point.normal.loss;
         let floor = ROUNDING * self.problem.energy();
         let (mut iterations, mut damping) = (0, 1e-3);
         let status = 'search: loop {
-            if normal.loss <= floor {
+            if point.normal.loss <= floor {
                 break SearchStatus::Exact;
             }
             if iterations == self.options.max_iterations {
@@ -148,25 +156,28 @@ impl Search<'_> {
             }
             let (mut growth, mut trials) = (2.0, 0);
             loop {
-                let next = self.step(&theta, &normal, damping);
-                let promised = promise(&normal, &self.change(&theta, &next));
+                let next = self.step(&theta, &point.normal, damping);
+                let loss = point.normal.loss;
+                let promised = promise(&point.normal, &self.change(&theta, &next));
                 if self.moved(&theta, &next) <= self.options.step_tolerance {
                     break 'search SearchStatus::StepConverged;
                 }
-                if promised <= self.options.loss_tolerance * normal.loss && damping < 1.0 {
+                if promised <= self.options.loss_tolerance * loss && damping < 1.0 {
                     break 'search SearchStatus::LossConverged;
                 }
                 match self.evaluate(&next) {
-                    Ok(trial) if trial.loss < normal.loss => {
-                        let ratio = (normal.loss - trial.loss) / promised;
+                    Ok(trial) if trial.normal.loss < loss => {
+                        let ratio = (loss - trial.normal.loss) / promised;
                         let cube = (2.0 * ratio - 1.0).powi(3);
                         damping = (damping * (1.0 - cube).clamp(0.1, 2.0)).max(1e-15);
-                        (theta, normal) = (next, trial);
+                        self.spare = Some(std::mem::replace(&mut point, trial));
+                        theta = next;
                         iterations += 1;
                         break;
                     }
                     Err(AxisError::Cancelled) => return Err(AxisError::Cancelled),
-                    _ => {
+                    failed => {
+                        self.spare = failed.ok();
                         damping *= growth;
                         growth *= 2.0;
                         trials += 1;
@@ -177,14 +188,20 @@ impl Search<'_> {
                 }
             }
         };
+        let sets = self.problem.sets().iter();
+        let blocks = sets.zip(&point.rows);
         Ok(SearchResult {
             status,
             theta,
-            loss: normal.loss,
+            block_gradients: blocks
+                .flat_map(|(s, r)| r.block_gradients(s.block, self.free.len()))
+                .collect(),
+            residual: point.rows.into_iter().flat_map(|r| r.residual).collect(),
+            loss: point.normal.loss,
             initial_loss,
             iterations,
             evaluations: self.evaluations,
-            normal,
+            normal: point.normal,
         })
     }
 
