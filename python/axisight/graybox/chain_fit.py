@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
-from scipy.signal import find_peaks
 
 from axisight.errors import InputError
 from axisight.graybox.collocated import Collocated, collocated, sandwich
@@ -189,7 +188,7 @@ def _pairs(coefficients: Real, scale: float, name: str) -> tuple[Real, Real]:
 def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
     """The most prominent resonances and the lowest lines below each."""
     level = np.log(np.abs(data.acceleration))
-    found, properties = find_peaks(level, prominence=0.1)
+    found, properties = scipy.signal.find_peaks(level, prominence=0.1)
     if len(found) < pairs:
         raise InputError(
             f"response: expected {pairs} resonances for {pairs + 1} masses, found {len(found)} "
@@ -303,7 +302,7 @@ class _Problem:
 
 def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: list[str]) -> ChainFit:
     problem = _Problem(data, start, delay)
-    found: OptimizeResult = least_squares(
+    found: scipy.optimize.OptimizeResult = scipy.optimize.least_squares(
         problem.residual,
         problem.first,
         jac=problem.jacobian,

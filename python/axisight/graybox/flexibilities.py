@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
-from scipy.signal import lfilter
 
 from axisight.errors import InputError
 from axisight.graybox.collocated import collocated
@@ -289,6 +288,14 @@ def simulate_deflection(
     From rest. Coulomb friction takes the sign of the measured velocity, so that the rest is
     linear and exact for a torque held from sample to sample.
 
+    Parameters
+    ----------
+    torque_nm, velocity_rad_s : of the motor, (n,), sampled every
+    sample_time_s : [s].
+    motor_inertia_kg_m2, viscous_friction_nm_s_rad, coulomb_friction_nm : J_m, F_v, F_c, motor side.
+    arm_inertia_kg_m2, stiffness_nm_rad, damping_nm_s_rad : J_a, k, d, joint side.
+    gear_ratio : r, joint angle per motor angle.
+
     Raises InputError for arrays that differ in length or are not finite.
     """
     torque, velocity = (
@@ -308,12 +315,13 @@ def simulate_deflection(
     system[1, :3] = np.array([-r * k, -viscous_friction_nm_s_rad - r * d * r, r * d]) / motor
     system[2, :3] = np.array([k, d * r, -d]) / arm
     system[1, 3] = 1 / motor
-    step = expm(system * sample_time_s)
+    step = scipy.linalg.expm(system * sample_time_s)
     values, vectors = np.linalg.eig(step[:3, :3])
     drive = np.linalg.solve(vectors, step[:3, 3])
     moving = torque - coulomb_friction_nm * np.sign(velocity)
     parts = [
-        vectors[0, i] * lfilter([0.0, drive[i]], [1.0, -values[i]], moving.astype(np.complex128))
+        vectors[0, i]
+        * scipy.signal.lfilter([0.0, drive[i]], [1.0, -values[i]], moving.astype(np.complex128))
         for i in range(3)
     ]
     return np.asarray(np.sum(parts, axis=0).real)

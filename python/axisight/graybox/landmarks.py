@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.signal import find_peaks, medfilt
 
 from axisight.errors import InputError
 from axisight.graybox.collocated import Collocated, sandwich
@@ -104,7 +103,9 @@ def find_notch(data: Collocated, *, band_rad_s: tuple[float, float] | None = Non
 def find_resonance(
     data: Collocated, *, above_rad_s: float = 0.0, below_rad_s: float = np.inf
 ) -> Landmark:
-    """Return the highest resonance between two frequencies, estimated as :func:`find_notch`.
+    """Return the highest resonance between ``above_rad_s`` and ``below_rad_s``.
+
+    Estimated between the lines as in :func:`find_notch`.
 
     Raises InputError if the highest line is at the edge of the band.
     """
@@ -161,7 +162,7 @@ def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequency
 
 def plateau_start(data: Collocated) -> float:
     """Return where the plateau may begin [rad/s]: 1.6 times the last peak of 3 dB or more."""
-    peaks, _ = find_peaks(_level_db(data), prominence=_PEAK_DB)
+    peaks, _ = scipy.signal.find_peaks(_level_db(data), prominence=_PEAK_DB)
     if not len(peaks):
         raise InputError("response: expected a resonance of 3 dB or more in the band, got none")
     return float(_PLATEAU_FROM * data.angular_rad_s[peaks[-1]])
@@ -169,7 +170,7 @@ def plateau_start(data: Collocated) -> float:
 
 def _level_db(data: Collocated) -> Real:
     """Magnitude in decibel; a single wild line is no landmark."""
-    return np.asarray(medfilt(20 * np.log10(np.abs(data.acceleration)), 3))
+    return np.asarray(scipy.signal.medfilt(20 * np.log10(np.abs(data.acceleration)), 3))
 
 
 def _relative_deviation(data: Collocated) -> Real:
@@ -222,7 +223,7 @@ def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
         return np.stack([-sign * free(by_frequency), -sign * free(by_damping)], axis=1)
 
     spacing = float(np.median(np.diff(omega)))
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         residual,
         np.array([start_rad_s, 0.05]),
         jac=slope,

@@ -234,7 +234,7 @@ def identify_axis(
 
     Wernholt (2004), section 9.3: step 1 and 2 give a start (:func:`initial_model`), step 3 fits
     all records at once by their prediction errors (:func:`fit_axis`), then the residuals are
-    tested (:func:`residual_tests`).
+    tested (:func:`residual_tests`), against the reference where logs have one, else the torque.
 
     Parameters
     ----------
@@ -291,15 +291,31 @@ def identify_axis(
         for d in data
     )
     tests = tuple(
-        _tests(residual, d, closed_loop) for residual, d in zip(fit.residuals, data, strict=True)
+        _tests(residual, d, _reference(record, axis), closed_loop)
+        for residual, d, record in zip(fit.residuals, data, [rigid, *broadband], strict=True)
     )
     return AxisIdentification(model, data, initial, fit, before, tests)
 
 
-def _tests(residual: Real, data: AxisData, closed_loop: bool) -> ResidualTests:
+def _tests(
+    residual: Real, data: AxisData, reference: Real | None, closed_loop: bool
+) -> ResidualTests:
+    """Test against the reference, which nothing feeds back into, or else the torque."""
     step = max(1, round(_LAG_S / data.sample_time_s))
-    torque = np.asarray(data.torque_nm)[-len(residual) :]
-    return residual_tests(residual, torque, lag_step=step, closed_loop=closed_loop)
+    signal = np.asarray(data.torque_nm) if reference is None else reference
+    return residual_tests(
+        residual,
+        signal[-len(residual) :],
+        lag_step=step,
+        closed_loop=closed_loop and reference is None,
+    )
+
+
+def _reference(record: AxisData | Log, axis: int) -> Real | None:
+    if not isinstance(record, Log) or record.velocity_ref_rad_s is None:
+        return None
+    reference = record.velocity_ref_rad_s[:, axis - 1]
+    return reference if np.isfinite(reference).all() and np.ptp(reference) > 0 else None
 
 
 def _as_data(record: AxisData | Log, axis: int, name: str) -> AxisData:

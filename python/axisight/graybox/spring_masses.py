@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from axisight.errors import InputError
 
@@ -255,4 +255,4 @@ def _dampers(chain: SpringMassChain, poles: ArrayLike | None, zeros: ArrayLike |
         # Rows as damping ratios: a slow mode counts as much as a fast one.
         rows.append(chain._natural(held)[1] / (2 * frequency)[:, None])
         targets.append(ratio)
-    return np.asarray(nnls(np.vstack(rows), np.concatenate(targets))[0])
+    return np.asarray(scipy.optimize.nnls(np.vstack(rows), np.concatenate(targets))[0])

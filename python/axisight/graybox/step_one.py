@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, fftconvolve, sosfiltfilt
 
 from axisight.errors import InputError
+from axisight.logs.filters import lowpass
 
 Real = NDArray[np.float64]
 
@@ -115,8 +116,7 @@ def rigid_body_friction(
         )
 
     def low_pass(signal: Real) -> Real:
-        sections = butter(_FILTER_ORDER, cutoff_hz, fs=1 / sample_time_s, output="sos")
-        return np.asarray(sosfiltfilt(sections, signal, padlen=edge))
+        return lowpass(signal, sample_time_s, cutoff_hz, _FILTER_ORDER)
 
     smooth = low_pass(position)
     velocity = np.gradient(smooth, sample_time_s)
@@ -224,7 +224,7 @@ def _regress(
 def _long_run(scores: Real, lags: int, inverse: Real) -> Real:
     """Covariance of the solution from scores that are correlated up to some lag."""
     triangle = 1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1)
-    total = scores.T @ fftconvolve(scores, triangle[:, None], mode="same", axes=0)
+    total = scores.T @ scipy.signal.fftconvolve(scores, triangle[:, None], mode="same", axes=0)
     # The window averages a spectrum of so many degrees of freedom near zero frequency, where
     # the estimate has taken a sine and a cosine of each column out of the residuals.
     freedom = 1.5 * len(scores) / lags

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import next_fast_len
-from scipy.stats import chi2, norm
 
 from axisight.errors import InputError
 
@@ -28,8 +27,9 @@ _WINDOW_SHARE = 10
 def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
     """Return the model fit (3.54) in per cent.
 
-    ``100 (1 - |y - yhat| / |y - mean(y)|)``: 100 for a perfect model, 0 for one no better than
-    the mean, negative for worse. Arrays (n,) of the same length. Raises InputError for others,
+    ``100 (1 - |y - yhat| / |y - mean(y)|)``, y the ``measured`` output and yhat the ``simulated``
+    or predicted one, (n,): 100 for a perfect model, 0 for one no better than the mean, negative
+    for worse. Raises InputError for others,
     values that are not finite, and a measurement that does not vary.
     """
     y, model = _pair("measured", measured, "simulated", simulated)
@@ -81,7 +81,7 @@ class ResidualTests:
             parts.append(
                 "they show in later inputs, as they must in closed loop: no fault of the model"
                 if self.closed_loop
-                else "they are correlated with later inputs: the data are from a closed loop"
+                else "they are correlated with later inputs: a closed loop, or an input that repeats"
             )
         if self.whiteness_p_value < level:
             parts.append(
@@ -124,7 +124,8 @@ def residual_tests(
     ----------
     residual, input_ : (n,); the input of the model, or the reference of the loop.
     lags : how many lags on either side.
-    lag_step : samples from lag to lag; more than one where the samples are dense.
+    lag_step : samples from lag to lag of the correlations, more than one where the samples are
+        dense; whiteness is judged from sample to sample.
     probability : of the limits.
 
     Raises InputError for arrays that do not fit, too few samples, and lags out of range.
@@ -148,7 +149,7 @@ def residual_tests(
     scale = np.sqrt(auto[0] * power[0])
     window = max(n // _WINDOW_SHARE, last + 1)
     spread = _spread(auto, power, window, 2 * last + 1) / n
-    limit = norm.ppf(0.5 + probability / 2)
+    limit = scipy.stats.norm.ppf(0.5 + probability / 2)
     dataset = xr.Dataset(
         {
             "autocorrelation": ("lag", r_auto),
@@ -162,7 +163,7 @@ def residual_tests(
     causal = at >= (1 if closed_loop else 0)
     return ResidualTests(
         dataset,
-        float(chi2.sf(n * np.sum(r_auto[at > 0] ** 2), lags)),
+        float(scipy.stats.chi2.sf(n * np.sum((auto[1 : lags + 1] / auto[0]) ** 2), lags)),
         _joint(cross[at[causal]], at[causal], spread),
         _joint(cross[at[~causal]], at[~causal], spread),
         closed_loop,
@@ -172,7 +173,7 @@ def residual_tests(
 def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real]:
     """R_e, R_eu and R_u by FFT, negative lags from the end."""
     n = len(e)
-    size = next_fast_len(2 * n, real=True)
+    size = scipy.fft.next_fast_len(2 * n, real=True)
     fe, fu = np.fft.rfft(e, size), np.fft.rfft(u, size)
     auto = np.fft.irfft(np.abs(fe) ** 2, size) / n
     power = np.fft.irfft(np.abs(fu) ** 2, size) / n
@@ -204,7 +205,7 @@ def _joint(cross: Real, at: NDArray[np.int64], spread: Real) -> float:
     if not kept.any():
         return float("nan")
     parts = vectors[:, kept].T @ cross
-    return float(chi2.sf(np.sum(parts**2 / values[kept]), int(kept.sum())))
+    return float(scipy.stats.chi2.sf(np.sum(parts**2 / values[kept]), int(kept.sum())))
 
 
 def cross_validation(
@@ -253,7 +254,11 @@ def fit_table(
     simulate: Callable[[M, D], ArrayLike],
     measured: Callable[[D], ArrayLike],
 ) -> xr.DataArray:
-    """Return the fit (3.54) of every model on every data set, dims (data_set, estimated_on) [%]."""
+    """Return the fit (3.54) of every model on every data set, dims (data_set, estimated_on) [%].
+
+    ``models`` and ``data_sets`` by name; ``simulate`` and ``measured`` as for
+    :func:`cross_validation`.
+    """
     rows = [
         [fit_percent(measured(data), simulate(model, data)) for model in models.values()]
         for data in data_sets.values()
