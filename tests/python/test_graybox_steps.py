@@ -150,6 +150,7 @@ def test_step_two_of_two_masses() -> None:
     assert found.motor_inertia_kg_m2 == pytest.approx(0.0121, rel=0.01)
     assert found.arm_inertia_kg_m2 == pytest.approx(1130.0, rel=0.01)
     assert found.stiffness_nm_rad == pytest.approx(1.46e6, rel=0.01)
+    assert found.damping_nm_s_rad == pytest.approx(2630.0, rel=0.05)
     assert not found.findings
 
 

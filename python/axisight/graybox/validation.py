@@ -103,7 +103,7 @@ def residual_tests(
     """Test residuals for whiteness and for independence of the input.
 
     Ljung (1999), section 16.6. Whiteness: n times the sum of squared autocorrelations over
-    the lags is chi-squared with as many degrees of freedom (16.34). Independence: the
+    lags 1 to ``lags`` is chi-squared with as many degrees of freedom (16.34). Independence: the
     cross-covariances over the lags are normal with covariance
 
         sum_k R_e(k) R_u(k + i - j) / n

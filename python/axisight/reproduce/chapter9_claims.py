@@ -210,8 +210,8 @@ def _hidden(context: Context) -> Result:
 
 @PUZZLE.claim(
     "9.5-both",
-    "A k3 large enough for the measured responses still gives two masses the k3 of m3, with "
-    "hardly any loss of fit without it.",
+    "A k3 large enough for the measured responses leaves two masses with less than half of it, "
+    "about that of m3, and with hardly any loss of fit without it.",
 )
 def _both(context: Context) -> Result:
     one = cubic.by_name(context, cubic.LARGE)
@@ -222,9 +222,10 @@ def _both(context: Context) -> Result:
         f"{M3['cubic_stiffness']:.2e}) and lose {one.loss[1]:.1f} and {one.loss[2]:.1f} points without "
         f"it, three find {three:.2e}"
     )
-    near = abs(one.stiffening / cubic.THESIS_STIFFENING - 1) < 0.3
-    alike = 0.6 < one.estimate / M3["cubic_stiffness"] < 1.6
-    return bool(near and alike and max(one.loss[1:]) < 3 and abs(three / one.true - 1) < 0.1), text
+    stiff = abs(one.stiffening / cubic.THESIS_STIFFENING - 1) < 0.3
+    hidden = one.estimate < 0.5 * one.true and one.estimate < 2.5 * M3["cubic_stiffness"]
+    found = abs(three / one.true - 1) < 0.2
+    return bool(stiff and hidden and max(one.loss[1:]) < 3 and found), text
 
 
 @PUZZLE.claim("9.5-friction", "Friction hides k3.")
