@@ -187,11 +187,13 @@ def table(found: list[Importance]) -> pd.DataFrame:
 
 
 def three_mass_table(context: Context) -> pd.DataFrame:
-    """Return k3 estimated with two and with three masses for several true values."""
+    """Return k3 estimated with two and with three masses, and fit lost without it, over the truth."""
     rows = []
     for two in _chosen(context, _SERIES):
         three = three_masses(context, two.case.machine)
+        linear = three_masses(context, two.case.machine, cubic=False)
         at = three.free.index("k3")
+        lost = np.subtract(three.fit_percent, linear.fit_percent)
         rows.append(
             {
                 "true_k3": two.true,
@@ -199,6 +201,8 @@ def three_mass_table(context: Context) -> pd.DataFrame:
                 "two_masses_standard_error": two.sandwich_error,
                 "three_masses": three.parameters["k3"],
                 "three_masses_standard_error": float(np.sqrt(three.sandwich[at, at])),
+                "fit_2_lost_three_masses": float(lost[1]),
+                "fit_3_lost_three_masses": float(lost[2]),
             }
         )
     return pd.DataFrame(rows)
@@ -231,18 +235,20 @@ def figure(context: Context) -> Figure:
         )
     left.axhline(K3 / unit, color=SERIES[4], lw=0.8, ls=":", label="model m3 of the thesis")
     left.set_ylabel("estimated k$_3$ [10$^{11}$ Nm/rad$^3$]", fontsize=8)
-    true = [one.true / unit for one in losses]
-    right.plot(true, [one.loss[2] for one in losses], "o-", color=SERIES[0], lw=1.0, ms=4)
-    right.plot(
-        [one.true / unit for one in alone],
-        [one.loss[2] for one in alone],
-        "D--",
-        color=SERIES[1],
-        lw=1.0,
-        ms=4,
+    curves = (
+        ([one.true for one in alone], [one.loss[2] for one in alone], "D--", SERIES[1]),
+        (estimates["true_k3"], estimates["fit_3_lost_three_masses"], "s-", SERIES[2]),
+        ([one.true for one in losses], [one.loss[2] for one in losses], "o-", SERIES[0]),
     )
-    right.annotate("arm of one mass", (1.0, 12.0), fontsize=7.5, color=SERIES[1], ha="right")
-    right.annotate("arm of two masses", (3.3, 2.8), fontsize=7.5, color=SERIES[0], ha="right")
+    for true, lost, style, color in curves:
+        right.plot(np.asarray(true) / unit, lost, style, color=color, lw=1.0, ms=4)
+    notes = (
+        ("two masses, on an\narm of one mass", (2.1, 12.3), SERIES[1], "left"),
+        ("three masses", (3.3, 5.4), SERIES[2], "right"),
+        ("two masses", (3.3, 1.6), SERIES[0], "right"),
+    )
+    for text, place, color, side in notes:
+        right.annotate(text, place, fontsize=7.5, color=color, ha=side)
     right.set_ylabel("fit lost without k$_3$, set 3 [% points]", fontsize=8)
     right.set_ylim(bottom=0)
     for axes in (left, right):

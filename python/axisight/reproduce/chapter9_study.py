@@ -170,8 +170,11 @@ def fitted(
     return context.shared(key, make)
 
 
-def three_masses(context: Context, machine: Machine) -> AxisFit:
-    """Return a fit of three masses to all sets, started a tenth off the chain of small motion."""
+def three_masses(context: Context, machine: Machine, *, cubic: bool = True) -> AxisFit:
+    """Return a fit of three masses to all sets, started a tenth off the chain of small motion.
+
+    Without ``cubic`` the springs are linear; that fit starts where the other ended.
+    """
 
     def make() -> AxisFit:
         true = chain()
@@ -179,11 +182,16 @@ def three_masses(context: Context, machine: Machine) -> AxisFit:
         names |= {"k1": true.stiffness_nm_rad[0], "k1_2": true.stiffness_nm_rad[1]}
         names |= {"d": true.damping_nm_s_rad[0], "d_2": true.damping_nm_s_rad[1]}
         begin = {name: 1.1 * float(value) for name, value in names.items()}
-        begin |= {"J_m": 0.0133, "k3": 0.0, "F_v": 0.0143, "F_c": 0.71}
-        taken = records(context, machine)
-        return fit_axis(THREE_MASSES, list(taken.data.values()), begin, settings=_SETTINGS)
+        begin |= {"J_m": 0.0133, "F_v": 0.0143, "F_c": 0.71}
+        if not cubic:
+            ended = three_masses(context, machine).parameters
+            begin = {name: value for name, value in ended.items() if name != "r"}
+        begin["k3"] = 0.0
+        data = list(records(context, machine).data.values())
+        fixed = () if cubic else ("k3",)
+        return fit_axis(THREE_MASSES, data, begin, fixed=fixed, settings=_SETTINGS)
 
-    return context.shared(("chapter 9 three masses", machine), make)
+    return context.shared(("chapter 9 three masses", machine, cubic), make)
 
 
 def simulated(parameters: Mapping[str, float], data: AxisData) -> Real:
