@@ -10,6 +10,7 @@ import typer
 from axisight.cli_common import OUT, errors
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
+from axisight.excitation.plots import plot_references, plot_signal
 
 
 def excite_command(
@@ -53,6 +54,12 @@ def excite_command(
     torque_limit: Annotated[
         str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (Nm).")
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also draw the signal here, and the references in NAME-references (.png, .pdf)."
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
@@ -85,6 +92,9 @@ def excite_command(
             raise typer.Exit(1)
         for path in write_references(made.references, out):
             OUT.print(f"written: {path}", soft_wrap=True)
+        if plot is not None:
+            for path in _draw(made, plot):
+                OUT.print(f"written: {path}", soft_wrap=True)
 
 
 def _show(made: Excited) -> None:
@@ -102,6 +112,17 @@ def _show(made: Excited) -> None:
         )
     if made.report is not None:
         OUT.print(str(made.report), highlight=False, soft_wrap=True)
+
+
+def _draw(made: Excited, path: Path) -> list[Path]:
+    both = path.with_name(f"{path.stem}-references{path.suffix}")
+    figures = {path: plot_signal(made.signal), both: plot_references(made.references)}
+    for name, figure in figures.items():
+        try:
+            figure.savefig(name, dpi=200)
+        except (OSError, ValueError) as error:
+            raise InputError(f"--plot: {name} cannot be drawn: {error}") from None
+    return list(figures)
 
 
 def _replace(data: dict[str, Any], part: str, **values: Any) -> None:

@@ -23,7 +23,10 @@ def reproduce_command(
         int | None, typer.Option(min=1, help="Threads. Default: all processors.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer realizations, for a first look.")
+        bool,
+        typer.Option(
+            "--quick", help="Fewer realizations and figures as small PNG only, for a first look."
+        ),
     ] = False,
 ) -> None:
     """Reproduce the tables and figures of Wernholt's thesis on the preset robot."""
@@ -54,5 +57,7 @@ def _show(claims: list[Claim]) -> None:
         return
     table = Table("section", "statement", "holds", "evidence")
     for c in claims:
-        table.add_row(c.section, c.statement, "yes" if c.holds else "[bold]no[/]", c.evidence)
+        table.add_row(
+            c.section, c.statement, "yes" if c.holds else f"[bold]{c.verdict}[/]", c.evidence
+        )
     OUT.print(table)

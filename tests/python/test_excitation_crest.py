@@ -157,7 +157,7 @@ def test_single_line_and_two_lines() -> None:
         ({"clipping": Clipping(oversampling=1)}, "clipping.oversampling"),
         ({"refinement": LpRefinement(first_exponent=7)}, "refinement.exponent"),
         ({"refinement": LpRefinement(oversampling=1000)}, "refinement.oversampling"),
-        ({"snow_lines": [3]}, "each once"),
+        ({"snow_lines": [3]}, "lines that are not excited"),
         ({"snow_lines": [5000]}, "snow_lines: expected lines from 1 to below"),
         ({"snow_limit": -1.0}, "snow_limit"),
         ({"response": [1.0]}, "response: expected 79"),

@@ -151,7 +151,7 @@ def test_output_of_a_response() -> None:
         ({"phases": "nice"}, "phases: expected schroeder"),
         ({"phases": [1.0]}, "phases: expected 40"),
         ({"grid": "even"}, "grid: expected one of"),
-        ({"seed": -1}, "seed: expected 0"),
+        ({"seed": -1}, "seed: expected a whole number, 0 to"),
     ],
 )
 def test_misuse(changes: dict[str, object], message: str) -> None:

@@ -148,7 +148,7 @@ def test_dc_level_moves_the_motor_a_quarter_turn_per_period() -> None:
         (lambda: triangle(0.0105, T), "multiple of four"),
         (lambda: square(0.0105, T), "even"),
         (lambda: square(1.0, T, smoothing_samples=600), "smoothing"),
-        (lambda: prbs(1, T), "bits: expected 2 to 24"),
+        (lambda: prbs(1, T), "bits: expected a whole number 2 to 24"),
         (lambda: discrete_interval_binary(0.1, T, []), "lines: expected at least one"),
         (lambda: discrete_interval_binary(0.1, T, [1], hold=3), "hold: expected a divisor"),
         (lambda: discrete_interval_binary(0.1, T, [1], weight=-1.0), "weight"),

@@ -197,5 +197,5 @@ def test_netcdf_misuse_is_named(tmp_path):
     with pytest.raises(InputError, match=r"attributes NetCDF can hold.*settings"):
         save_netcdf(ours, tmp_path / "response.nc")
     xr.Dataset({"x": ("t", np.zeros(3))}).to_netcdf(tmp_path / "other.nc", engine="scipy")
-    with pytest.raises(InputError, match="variable response"):
+    with pytest.raises(InputError, match="over frequency_hz"):
         load_netcdf(tmp_path / "other.nc")

@@ -142,7 +142,7 @@ def test_wrong_choices_are_named() -> None:
     records = loop_records(2)[0]
     with pytest.raises(InputError, match="quantity: expected one of position"):
         frf.mfrf(records, quantity="jerk")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="phase: expected angle"):
+    with pytest.raises(InputError, match="phase: expected one of angle"):
         frf.logarithmic_mean(records, phase="x")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="ETFE expects one input, got 2"):
         frf.etfe(records)

@@ -204,7 +204,7 @@ def test_a_log_is_an_experiment():
     np.testing.assert_array_equal(got.records.output[0], run.output.reshape(6, 1000, 1)[3:])
     with pytest.raises(InputError, match="has no joint_position"):
         experiment_of_log(log, output="joint_position")
-    with pytest.raises(InputError, match="output: expected 'position'"):
+    with pytest.raises(InputError, match="output: expected one of position"):
         experiment_of_log(log, output="torque")
     with pytest.raises(InputError, match="period_s: expected one"):
         prepare_records([log, replace(log, period_s=2.0)])
@@ -220,10 +220,14 @@ def broken(**changes):
         ([], {}, "experiments: expected at least one"),
         (broken(sample_time_s=2e-3), {}, "sample_time_s: expected 0.001 as experiment 1"),
         (broken(reference=None), {}, "reference: expected 1 channels as experiment 1, got 0"),
-        ([experiment(n_periods=4)], {"skip_s": -1.0}, "no negative time"),
+        ([experiment(n_periods=4)], {"skip_s": -1.0}, "skip_s: expected a number not below zero"),
         ([experiment(n_periods=4)], {"period_s": 5.0}, "at most the shortest"),
         ([experiment(n_periods=4)], {"period_s": float("nan")}, "period_s: expected a positive"),
-        ([experiment(n_periods=4)], {"drop_periods": -1}, "drop_periods: expected no negative"),
+        (
+            [experiment(n_periods=4)],
+            {"drop_periods": -1},
+            "drop_periods: expected a whole number from 0",
+        ),
         ([experiment(n_periods=4)], {"drop_periods": 4}, "expected to keep a period"),
         ([experiment(n_periods=4)], {"waiting_time_s": 9.0}, "expected to keep a period"),
         ([experiment(n_periods=4)], {"lines": [1, 500]}, "Nyquist"),
@@ -241,9 +245,9 @@ def test_misuse_is_named(runs, options, message):
         ({"sample_time_s": 0.0}, "sample_time_s"),
         (
             {"output": np.full(4000, np.nan)},
-            r"output: .*nan at sample 1, channel 1 \(4000 in all\)",
+            r"output: .*nan in sample 1, channel 1 \(4000 in all\)",
         ),
-        ({"input": np.zeros((4000, 0))}, "input: expected shape"),
+        ({"input": np.zeros((4000, 0))}, "input: expected axes"),
         ({"reference": np.zeros(3999)}, "reference: expected 4000 samples"),
     ],
 )

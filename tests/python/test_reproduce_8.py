@@ -224,7 +224,7 @@ def test_claims_page(tmp_path):
     assert page[2] == "1 of 2 hold on this robot."
     assert page[6:] == [r"| 8.3.1 | Two. | yes | 4 |", r"| 8.4 | One. | **no** | \|dG\| 3 |"]
     table = pd.read_csv(tmp_path / "claims.csv")
-    assert list(table["holds"]) == [True, False]
+    assert list(table["holds"]) == ["yes", "no"]
 
 
 def test_command(tmp_path):

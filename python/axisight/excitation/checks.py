@@ -3,78 +3,66 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from axisight.arguments import Real, positive, reals, shown
 from axisight.errors import InputError
 
-Real = NDArray[np.float64]
-Lines = NDArray[np.int64]
+# Samples of a signal, all periods together: 1 GB. The core's own bound is higher.
+MOST_SAMPLES = 2**27
 
-# More samples than memory holds anyway; the core's own bound.
-_MOST = 1e9
-
-
-def positive(field: str, value: float) -> float:
-    """Return a positive finite number."""
-    if not (np.isfinite(value) and value > 0):
-        raise InputError(f"{field}: expected a positive number, got {value}")
-    return float(value)
+# Squares, and sums of them, are still numbers.
+SMALLEST_SIZE, LARGEST_SIZE = 1e-100, 1e100
 
 
-def whole(field: str, value: float, least: int = 1) -> int:
-    """Return a whole number of at least ``least``."""
-    if not (np.isfinite(value) and value == int(value) and value >= least):
-        raise InputError(f"{field}: expected a whole number from {least}, got {value}")
-    return int(value)
-
-
-def whole_samples(field: str, seconds: float, sample_time_s: float) -> int:
+def whole_samples(field: str, seconds: object, sample_time_s: object) -> int:
     """Return ``seconds`` in samples; decimal fractions may be a rounding error off."""
-    positive("sample_time_s", sample_time_s)
-    ratio = positive(field, seconds) / sample_time_s
-    count = round(ratio) if ratio < _MOST else 0
+    step = positive("sample_time_s", sample_time_s)
+    ratio = positive(field, seconds) / step
+    count = round(ratio) if ratio < MOST_SAMPLES else 0
     if count < 1 or abs(ratio - count) > 1e-9 * count:
         raise InputError(
-            f"{field}: expected a positive whole number of samples of {sample_time_s} s, "
-            f"got {seconds} s"
+            f"{field}: expected a positive whole number of samples of {step} s, at most "
+            f"{MOST_SAMPLES}, got {shown(seconds)} s"
         )
     return count
 
 
-def seed_of(field: str, seed: int) -> int:
-    """Return a seed or the number of a run."""
-    if not 0 <= seed < 1 << 64:
-        raise InputError(f"{field}: expected 0 to 2^64 - 1, got {seed}")
-    return int(seed)
+def few_enough(field: str, n_samples: int) -> int:
+    """Return a number of samples that a signal may have."""
+    if n_samples > MOST_SAMPLES:
+        raise InputError(f"{field}: expected at most {MOST_SAMPLES} samples, got {n_samples}")
+    return n_samples
 
 
-def numbers(field: str, value: ArrayLike, count: int) -> Real:
-    """Return ``count`` finite numbers."""
-    array = np.array(value, dtype=np.float64)
-    if array.shape != (count,) or not np.isfinite(array).all():
+def numbers(field: str, value: object, count: int) -> Real:
+    """Return a copy of ``count`` finite numbers."""
+    if count == 0 and isinstance(value, list | tuple | np.ndarray) and not len(value):
+        return np.empty(0)
+    array = reals(field, value, f"{count} finite numbers", (0, 1))
+    if array.shape != (count,):
         raise InputError(f"{field}: expected {count} finite numbers, got shape {array.shape}")
-    return array
+    return array.copy()
 
 
-def per_item(field: str, value: ArrayLike, count: int) -> Real:
+def per_item(field: str, value: object, count: int) -> Real:
     """Return one finite number per item from one number or ``count``."""
-    array = np.asarray(value, dtype=np.float64)
+    array = reals(field, value, f"{count} finite numbers or one", (0, 1))
     return numbers(field, np.full(count, float(array)) if array.ndim == 0 else array, count)
 
 
-def lines_below(field: str, value: ArrayLike, n_samples: int) -> Lines:
-    """Return ascending lines from 1 to below the Nyquist line of ``n_samples``."""
-    array = np.asarray(value)
-    if not array.size:
-        return np.empty(0, np.int64)
-    if array.ndim != 1 or not np.array_equal(array, np.round(array)):
-        raise InputError(f"{field}: expected a list of whole numbers")
-    lines = array.astype(np.int64)
-    outside = lines[(lines < 1) | (2 * lines >= n_samples)]
-    if outside.size:
+def size_of(field: str, value: object) -> float:
+    """Return an amplitude: positive, and neither it nor its square near the ends of numbers."""
+    size = positive(field, value)
+    if not SMALLEST_SIZE <= size <= LARGEST_SIZE:
         raise InputError(
-            f"{field}: expected lines from 1 to below {n_samples / 2:g} (Nyquist), got {outside[0]}"
+            f"{field}: expected {SMALLEST_SIZE:g} to {LARGEST_SIZE:g}, got {shown(value)}"
         )
-    if np.any(np.diff(lines) <= 0):
-        raise InputError(f"{field}: expected ascending lines without repetition")
-    return lines
+    return size
+
+
+def band_of(field: str, value: object) -> tuple[float, float]:
+    """Return two positive frequencies."""
+    ends = reals(field, value, "two frequencies (low, high)", 1)
+    if ends.shape != (2,):
+        raise InputError(f"{field}: expected two frequencies (low, high), got {shown(value)}")
+    return positive(field, ends[0]), positive(field, ends[1])

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from axisight import _core
+from axisight.arguments import (
+    Real,
+    instance,
+    lines_below,
+    not_negative,
+    number,
+    positive,
+    seed_of,
+    switch,
+    threads_of,
+    whole,
+)
 from axisight.errors import InputError
-from axisight.excitation.checks import Real, lines_below, positive, seed_of, whole
 from axisight.excitation.multisine import Multisine, response_at
 
 
@@ -105,32 +116,43 @@ def optimize_crest_factor(
         ``snow_limit`` times the root mean square of the signal's.
     snow_limit : see there.
     response : complex (n_lines,), response at the lines: the crest factor of the output
-        ``G u`` is made small instead of that of the signal. Not together with snow.
+        ``G u`` is made small instead of that of the signal. Not together with snow, at whose
+        lines the response is not known.
     threads : 0 takes every core. The result does not depend on it.
 
     Raises InputError naming the field.
 
     """
-    snow = lines_below("snow_lines", np.asarray(snow_lines), signal.n_samples)
+    instance("signal", signal, Multisine)
+    snow = lines_below("snow_lines", snow_lines, signal.n_samples)
+    twice = np.intersect1d(signal.lines, snow)
+    if twice.size:
+        raise InputError(f"snow_lines: expected lines that are not excited, got {twice[0]}")
     amplitude, turned = signal.amplitude, np.zeros(len(signal.lines))
     if response is not None:
         if snow.size:
-            raise InputError("response, snow_lines: expected at most one of them")
+            raise InputError(
+                "response, snow_lines: expected at most one of them: the response is known at the "
+                "excited lines only, so what snow does to the output is not; optimize the output "
+                "without snow, or the signal with it"
+            )
         gain = response_at(response, len(signal.lines))
         amplitude, turned = amplitude * np.abs(gain), np.angle(gain)
-    steps = None if refinement == "none" else astuple(refinement or LpRefinement())
+    steps = None
+    if not (isinstance(refinement, str) and refinement == "none"):
+        steps = _numbers("refinement", LpRefinement() if refinement is None else refinement)
     found = _core.optimize_crest_factor(
         signal.lines.tolist(),
         amplitude.tolist(),
         snow=snow.tolist(),
-        snow_limit=float(snow_limit),
-        phase=(signal.phase_rad + turned).tolist() if from_signal else None,
+        snow_limit=not_negative("snow_limit", snow_limit),
+        phase=(signal.phase_rad + turned).tolist() if switch("from_signal", from_signal) else None,
         seed=seed_of("seed", seed),
-        clipping=astuple(clipping or Clipping()),
+        clipping=_numbers("clipping", Clipping() if clipping is None else clipping),
         refinement=steps,
         starts=whole("starts", starts),
         time_s=None if time_s is None else positive("time_s", time_s),
-        threads=whole("threads", threads, 0),
+        threads=threads_of(threads),
     )
     if found is None:  # only a cancel token does that, and none was given
         raise KeyboardInterrupt
@@ -154,3 +176,13 @@ def optimize_crest_factor(
         refinement_steps=found["refinement_steps"],
         status="out_of_time" if found["out_of_time"] else "completed",
     )
+
+
+def _numbers(field: str, settings: Clipping | LpRefinement) -> tuple[Any, ...]:
+    """Return the settings as the search takes them; it checks their ranges."""
+    instance(field, settings, LpRefinement if field == "refinement" else Clipping)
+    out: list[float] = []
+    for setting in fields(settings):
+        name, value = f"{field}.{setting.name}", getattr(settings, setting.name)
+        out.append(whole(name, value, 0) if setting.type == "int" else number(name, value))
+    return tuple(out)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.arguments import instance, path_of, shown
 from axisight.errors import InputError
 from axisight.excitation.crest import CrestSearch, optimize_crest_factor
 from axisight.excitation.limits import LimitReport, Limits, check_limits
@@ -115,6 +116,10 @@ def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign
 
     Raises InputError naming every field that is wrong, after ``where`` it stands.
     """
+    instance("data", data, dict)
+    unnamed = [key for key in data if not isinstance(key, str)]
+    if unnamed:
+        raise InputError(f"{where}: expected names of fields, got {shown(unnamed[0])}")
     try:
         return ExcitationDesign(**data)
     except ValidationError as error:
@@ -127,7 +132,7 @@ def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign
 
 def load_design(path: Path | str) -> dict[str, Any]:
     """Return the design in a TOML file, not yet checked; a robot file lies next to it."""
-    source = Path(path)
+    source = path_of("path", path)
     try:
         data = tomllib.loads(source.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -140,6 +145,7 @@ def load_design(path: Path | str) -> dict[str, Any]:
 
 def excite(design: ExcitationDesign) -> Excited:
     """Carry a design out; raises InputError naming the field."""
+    instance("design", design, ExcitationDesign)
     robot = load_robot(design.robot)
     signal, search = _signal(design.signal, robot.sample_time_s)
     wave = design.square

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import Real, reals, whole
 from axisight.errors import InputError
-from axisight.excitation.checks import Real, whole
 
 Directions = Literal["t1", "identity", "t2", "hadamard"]
+
+MOST_INPUTS = 4096
 
 
 def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
@@ -21,17 +23,16 @@ def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
     ``"hadamard"`` has orthogonal rows of plus and minus one, for 1, 2, 4, 8, ... inputs. A
     matrix of full row rank passes as it is. Raises InputError.
     """
-    n = whole("n_inputs", n_inputs)
+    n = whole("n_inputs", n_inputs, 1, MOST_INPUTS)
     if isinstance(name, str):
         if name not in get_args(Directions):
             known = ", ".join(get_args(Directions))
             raise InputError(f"directions: expected one of {known} or a matrix, got {name!r}")
         return _core.directions("identity" if name == "t1" else str(name), n)
-    matrix = np.array(name, dtype=np.float64)
-    if matrix.ndim != 2 or matrix.shape[0] != n or not np.isfinite(matrix).all():
-        raise InputError(
-            f"directions: expected finite numbers of shape ({n}, n_experiments), got {matrix.shape}"
-        )
+    what = f"finite numbers of shape ({n}, n_experiments)"
+    matrix = reals("directions", name, what, 2).copy()
+    if len(matrix) != n:
+        raise InputError(f"directions: expected {what}, got {matrix.shape}")
     rank = int(np.linalg.matrix_rank(matrix))
     if rank < n:
         raise InputError(f"directions: expected rank {n}, one per input, got rank {rank}")
@@ -45,5 +46,5 @@ def dft_matrix(n_inputs: int) -> NDArray[np.complex128]:
     orthogonal rows at every line, for any number of inputs (Dobrowiecki, Schoukens and
     Guillaume 2006).
     """
-    index = np.arange(whole("n_inputs", n_inputs))
+    index = np.arange(whole("n_inputs", n_inputs, 1, MOST_INPUTS))
     return np.asarray(np.exp(2j * np.pi * np.outer(index, index) / len(index)))

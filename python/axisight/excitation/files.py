@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
 
+from axisight.arguments import instance, path_of
 from axisight.errors import InputError
 from axisight.excitation.references import References
 from axisight.storage import write_bytes
@@ -33,6 +34,7 @@ def write_references(reference: References, path: Path | str) -> list[Path]:
     metadata of a Parquet file. Numbers are written in full. Raises InputError for another
     ending or a folder that cannot be written.
     """
+    instance("reference", reference, References)
     target = _known(path)
     text = json.dumps(_design(reference), indent=1)
     files = {target: _bytes(reference, text, target.suffix)}
@@ -129,7 +131,7 @@ def _table(reference: References) -> pd.DataFrame:
 
 
 def _known(path: Path | str) -> Path:
-    target = Path(path)
+    target = path_of("path", path)
     if target.suffix not in _KINDS:
         raise InputError(f"{target}: expected a name ending in {', '.join(_KINDS)}")
     return target

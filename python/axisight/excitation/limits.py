@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from axisight.arguments import Real, instance, one_of, several, whole
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.excitation.checks import Real, per_item, whole
+from axisight.excitation.checks import numbers, per_item
 from axisight.excitation.references import References
+from axisight.excitation.rigid_motion import rigid_torque
 from axisight.robot import Robot
 from axisight.simulation import Model, simulate_batch
 
 Quantity = Literal["reference_velocity", "velocity", "acceleration", "torque"]
+Method = Literal["closed_loop", "inverse_dynamics"]
 UNITS: dict[Quantity, str] = {
     "reference_velocity": "rad/s",
     "velocity": "rad/s",
@@ -72,23 +75,39 @@ class LimitReport:
 
     ``excesses`` worst first, relative to the limit; ``largest`` the largest absolute values
     (quantity, experiment, axis); ``failed`` the experiments (from 1) whose simulation did not
-    complete, with its status.
+    complete, with its status; ``compared`` the quantities that had a limit; ``method`` is
+    "closed_loop" or, for robots without a known controller, "inverse_dynamics".
     """
 
     excesses: tuple[Excess, ...]
     largest: xr.DataArray
     failed: dict[int, str]
+    compared: tuple[Quantity, ...]
+    method: Method
 
     @property
     def ok(self) -> bool:
-        """Whether every experiment ran to its end within all limits."""
+        """Whether every experiment ran to its end and no limit that was given is passed."""
         return not self.excesses and not self.failed
 
     def __str__(self) -> str:
-        """What is wrong, a line each; or that nothing is."""
+        """What is wrong, a line each; or that nothing is, and what was compared."""
         lines = [f"experiment {e}: simulation {status}" for e, status in self.failed.items()]
         lines += [str(excess) for excess in self.excesses]
-        return "\n".join(lines) or "within all limits"
+        if not self.compared:
+            lines.append("no limits given: nothing was compared")
+        elif not lines:
+            lines.append(
+                "within all limits"
+                if len(self.compared) == len(UNITS)
+                else f"within the limits given: {', '.join(self.compared)}"
+            )
+        if self.method == "inverse_dynamics":
+            lines.append(
+                "no controller is known: torque is that of the rigid robot along the reference, "
+                "without start, elasticity and feedback"
+            )
+        return "\n".join(lines)
 
 
 def check_limits(
@@ -106,16 +125,25 @@ def check_limits(
     Parameters
     ----------
     reference : motor-side velocity references [rad/s] at the robot's sample time.
-    robot : the model; it needs a controller.
+    robot : the model. Without a known controller (kind ``"none"``) there is no loop to
+        simulate: the motors are taken to follow the reference, repeated for ever, and the
+        torque is that of the rigid robot, :func:`axisight.Robot.inverse_dynamics` with motor
+        inertia and viscous friction. ``model`` then has no meaning, effects are refused.
     limits : what must not be passed.
     periods : periods to simulate; the first one holds the start from rest.
     model, effects, start_rad : as in :func:`axisight.simulate`.
 
     Velocity and acceleration are means over a sample, from true motor positions; torque is the
-    command. Raises InputError for other sample times, axes or units and for limits that are
-    not positive.
+    command. Raises InputError for other sample times, axes or units, for limits that are
+    not positive, and for effects where there is no controller.
 
     """
+    instance("reference", reference, References)
+    instance("robot", robot, Robot)
+    one_of("model", model, get_args(Model))
+    added = [instance("effects", effect, Effect) for effect in several("effects", effects)]
+    if start_rad is not None:
+        start_rad = numbers("start_rad", start_rad, robot.n_axes).tolist()
     if reference.unit != "rad/s" or reference.n_inputs != robot.n_axes:
         raise InputError(
             f"reference: expected {robot.n_axes} velocities [rad/s], got {reference.n_inputs} "
@@ -126,27 +154,30 @@ def check_limits(
             f"reference: expected the sample time of the robot, {robot.sample_time_s} s, "
             f"got {reference.sample_time_s} s"
         )
-    bounds = _bounds(limits, robot.n_axes)
+    bounds = _bounds(instance("limits", limits, Limits), robot.n_axes)
     given = reference.repeated(whole("periods", periods))
-    run = simulate_batch(robot, given, effects=list(effects), start_rad=start_rad, model=model)
     step = robot.sample_time_s
-    position = run["motor_position_rad"].values
-    rest = robot.equilibrium(start_rad, effects)["motor_angle_rad"].values
-    before = np.broadcast_to(rest, (len(position), 1, robot.n_axes))
-    velocity = np.diff(position, axis=1, prepend=before) / step
-    signals: dict[Quantity, Real] = {
-        "reference_velocity": given,
-        "velocity": velocity,
-        "acceleration": np.diff(velocity, axis=1, prepend=0.0) / step,
-        "torque": run["torque_cmd_nm"].values,
-    }
+    failed: dict[int, str] = {}
+    method: Method = "closed_loop"
+    if robot.core.controller_kind == "none":
+        method = "inverse_dynamics"
+        if added:
+            raise InputError(
+                f"effects: expected none for a robot without controller, got {len(added)}"
+            )
+        signals = _followed(given, robot, start_rad)
+    else:
+        run = simulate_batch(robot, given, effects=added, start_rad=start_rad, model=model)
+        rest = robot.equilibrium(start_rad, added)["motor_angle_rad"].values
+        signals = _simulated(run, given, rest, step)
+        status = run["status"].values
+        failed = {e + 1: str(s) for e, s in enumerate(status) if s != "completed"}
     excesses = [
         excess
         for quantity, bound in bounds.items()
         for excess in _excesses(quantity, signals[quantity], bound, step)
     ]
     excesses.sort(key=lambda e: -e.largest / e.limit)
-    status = run["status"].values
     return LimitReport(
         excesses=tuple(excesses),
         largest=xr.DataArray(
@@ -158,8 +189,33 @@ def check_limits(
                 "axis": robot.axis_numbers(),
             },
         ),
-        failed={e + 1: str(s) for e, s in enumerate(status) if s != "completed"},
+        failed=failed,
+        compared=tuple(bounds),
+        method=method,
     )
+
+
+def _simulated(run: xr.Dataset, given: Real, rest: Real, step: float) -> dict[Quantity, Real]:
+    position = run["motor_position_rad"].values
+    before = np.broadcast_to(rest, (len(position), 1, len(rest)))
+    velocity = np.diff(position, axis=1, prepend=before) / step
+    return {
+        "reference_velocity": given,
+        "velocity": velocity,
+        "acceleration": np.diff(velocity, axis=1, prepend=0.0) / step,
+        "torque": run["torque_cmd_nm"].values,
+    }
+
+
+def _followed(given: Real, robot: Robot, start_rad: Sequence[float] | None) -> dict[Quantity, Real]:
+    """Signals of motors that follow the reference, which comes round after its last sample."""
+    acceleration = (given - np.roll(given, 1, axis=1)) / robot.sample_time_s
+    return {
+        "reference_velocity": given,
+        "velocity": given,
+        "acceleration": acceleration,
+        "torque": rigid_torque(robot, given, acceleration, start_rad),
+    }
 
 
 def _bounds(limits: Limits, n_axes: int) -> dict[Quantity, Real]:

@@ -6,8 +6,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from axisight.arguments import Lines, one_of, seed_of, whole
 from axisight.errors import InputError
-from axisight.excitation.checks import Lines, positive, seed_of, whole, whole_samples
+from axisight.excitation.checks import band_of, whole_samples
 
 Grid = Literal["full", "odd", "odd_odd", "odd_random"]
 
@@ -34,14 +35,13 @@ def line_set(
     number of samples and a band that is empty or reaches the Nyquist frequency.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
-    low, high = (positive("band_hz", f) for f in band_hz)
+    low, high = band_of("band_hz", band_hz)
+    one_of("grid", grid, get_args(Grid))
     nyquist = 0.5 / sample_time_s
     if not low <= high < nyquist:
         raise InputError(
             f"band_hz: expected 0 < low <= high < {nyquist:g} Hz (Nyquist), got {low:g} to {high:g}"
         )
-    if grid not in get_args(Grid):
-        raise InputError(f"grid: expected one of {', '.join(get_args(Grid))}, got {grid!r}")
     near = 1e-9 * high * period_s
     first, last = np.ceil(low * period_s - near), np.floor(high * period_s + near)
     band = np.arange(max(first, 1), min(last, (n - 1) // 2) + 1, dtype=np.int64)

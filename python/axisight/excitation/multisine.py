@@ -10,16 +10,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.errors import InputError
-from axisight.excitation.checks import (
+from axisight.arguments import (
     Lines,
     Real,
+    complexes,
     lines_below,
-    numbers,
-    per_item,
     positive,
+    reals,
     seed_of,
     whole,
+)
+from axisight.errors import InputError
+from axisight.excitation.checks import (
+    LARGEST_SIZE,
+    MOST_SAMPLES,
+    SMALLEST_SIZE,
+    numbers,
+    per_item,
+    size_of,
     whole_samples,
 )
 from axisight.excitation.lines import Grid, line_set
@@ -62,8 +70,9 @@ class Multisine:
 
     def __post_init__(self) -> None:
         """Check everything and hold arrays of the right type."""
-        positive("sample_time_s", self.sample_time_s)
-        n = whole("n_samples", self.n_samples, 3)
+        object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
+        n = whole("n_samples", self.n_samples, 3, MOST_SAMPLES)
+        object.__setattr__(self, "n_samples", n)
         for name in ("lines", "detection_lines", "snow_lines"):
             object.__setattr__(self, name, lines_below(name, getattr(self, name), n))
         for name in ("detection_lines", "snow_lines"):
@@ -79,8 +88,11 @@ class Multisine:
         if np.any(self.snow_amplitude < 0):
             least = self.snow_amplitude.min()
             raise InputError(f"snow_amplitude: expected no negative number, got {least:g}")
-        if np.any(self.amplitude <= 0):
-            at = int(np.argmax(self.amplitude <= 0))
+        if np.any(self.snow_amplitude > LARGEST_SIZE):
+            raise InputError(f"snow_amplitude: expected at most {LARGEST_SIZE:g}")
+        usable = (self.amplitude >= SMALLEST_SIZE) & (self.amplitude <= LARGEST_SIZE)
+        if not usable.all():
+            at = int(np.argmin(usable))
             raise InputError(
                 f"amplitude: expected positive numbers, got {self.amplitude[at]} at line "
                 f"{self.lines[at]}; leave the line out instead"
@@ -133,8 +145,8 @@ class Multisine:
         """Return the signal with this peak or this effective rms; give exactly one."""
         if (peak is None) == (rms is None):
             raise InputError("peak, rms: expected exactly one of them")
-        target, own = (rms, self.rms) if peak is None else (peak, self.peak)
-        factor = positive("peak, rms", target or 0.0) / own
+        name, target, own = ("rms", rms, self.rms) if peak is None else ("peak", peak, self.peak)
+        factor = size_of(name, target) / own
         return replace(
             self,
             amplitude=self.amplitude * factor,
@@ -160,12 +172,11 @@ class Multisine:
 
 def response_at(response: ArrayLike, count: int) -> NDArray[np.complex128]:
     """Return a response at ``count`` lines, finite and not zero."""
-    gain = np.asarray(response, dtype=np.complex128)
-    if gain.shape != (count,) or not np.isfinite(gain).all() or np.any(gain == 0):
-        raise InputError(
-            f"response: expected {count} finite complex numbers other than zero, "
-            f"got shape {gain.shape}"
-        )
+    what = f"{count} finite complex numbers other than zero"
+    gain = complexes("response", response, what, 1)
+    if gain.shape != (count,) or np.any(gain == 0):
+        got = f"shape {gain.shape}" if gain.shape != (count,) else "zero"
+        raise InputError(f"response: expected {what}, got {got}")
     return gain
 
 
@@ -209,7 +220,9 @@ def multisine(
             period_s, band_hz, sample_time_s, grid=grid, group=group, seed=seed, run=run
         )
     else:
-        chosen = lines_below("lines", np.asarray(lines), n)
+        chosen = lines_below("lines", lines, n)
+        if not chosen.size:
+            raise InputError("lines: expected at least one excited line, got none")
     sizes = amplitude(chosen / period_s) if callable(amplitude) else amplitude
     sizes = per_item("amplitude", sizes, len(chosen))
     return Multisine(
@@ -238,7 +251,10 @@ def schroeder_phases(amplitude: ArrayLike) -> Real:
     ``phi_k = -2 pi sum_{j<k} (k - j) p_j`` with p the shares of the power (Schroeder 1970);
     for a flat spectrum ``-k (k - 1) pi / F``, Wernholt (2004), section 5.4.
     """
-    power = np.asarray(amplitude, dtype=np.float64) ** 2
+    size = reals("amplitude", amplitude, "numbers of shape (n_lines,)", 1)
+    if not np.any(size != 0):
+        raise InputError("amplitude: expected one that is not zero, got zeros")
+    power = (size / np.abs(size).max()) ** 2
     share = power / power.sum()
     delay = np.concatenate([[0.0], np.cumsum(share)[:-1]])
     return np.asarray(-2 * np.pi * np.cumsum(delay))
@@ -247,5 +263,5 @@ def schroeder_phases(amplitude: ArrayLike) -> Real:
 def random_phases(n_lines: int, seed: int, run: int = 0) -> Real:
     """Return phases [rad], (n_lines,), uniform over the circle, a function of (seed, run)."""
     return _core.random_phases(
-        whole("n_lines", n_lines), seed_of("seed", seed), seed_of("run", run)
+        whole("n_lines", n_lines, 1, MOST_SAMPLES), seed_of("seed", seed), seed_of("run", run)
     )

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.signal import max_len_seq
 
 from axisight import _core
-from axisight.errors import InputError
-from axisight.excitation.checks import (
+from axisight.arguments import (
     Lines,
     Real,
+    instance,
     lines_below,
-    numbers,
-    per_item,
+    number,
     positive,
+    reals,
     seed_of,
     whole,
+    words,
+)
+from axisight.errors import InputError
+from axisight.excitation.checks import (
+    LARGEST_SIZE,
+    SMALLEST_SIZE,
+    band_of,
+    few_enough,
+    per_item,
+    size_of,
     whole_samples,
 )
 
@@ -53,8 +64,15 @@ class PeriodicSignal:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        positive("sample_time_s", self.sample_time_s)
-        object.__setattr__(self, "period", numbers("period", self.period, len(self.period)))
+        object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
+        period = reals("period", self.period, "numbers of shape (n_samples,)", 1).copy()
+        if np.abs(period).max() > LARGEST_SIZE:
+            raise InputError(f"period: expected at most {LARGEST_SIZE:g}, got larger ones")
+        object.__setattr__(self, "period", period)
+        object.__setattr__(self, "peak", size_of("peak", self.peak))
+        words("kind", self.kind)
+        instance("settings", self.settings, dict)
+        object.__setattr__(self, "lines", lines_below("lines", self.lines, len(period)))
 
     @property
     def n_samples(self) -> int:
@@ -76,12 +94,15 @@ class PeriodicSignal:
 
     @property
     def crest_factor(self) -> float:
-        """Peak over effective rms."""
-        return self.peak / self.rms
+        """Peak over effective rms; raises InputError where there is no power."""
+        rms = self.rms
+        if not rms > 0:
+            raise InputError("period: expected power on the lines for a crest factor, got none")
+        return self.peak / rms
 
     def scaled(self, *, peak: float) -> PeriodicSignal:
         """Return the signal with this peak."""
-        factor = positive("peak", peak) / self.peak
+        factor = size_of("peak", peak) / self.peak
         return replace(self, period=self.period * factor, peak=float(peak))
 
 
@@ -102,14 +123,22 @@ def chirp(
     ``phase_rad``. The lines are those of the band. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
-    ends = [positive("band_hz", f) * period_s for f in band_hz]
+    band_hz = band_of("band_hz", band_hz)
+    ends = [f * period_s for f in band_hz]
     first, last = (round(k) for k in ends)
     if max(abs(ends[0] - first), abs(ends[1] - last)) > 1e-9 * max(ends) or first == last:
         raise InputError(
             f"band_hz: expected two different multiples of {1 / period_s:g} Hz, got {band_hz}"
         )
-    lines = lines_below("band_hz", np.arange(min(first, last), max(first, last) + 1), n)
-    positive("amplitude", amplitude)
+    low, high = min(first, last), max(first, last)
+    if not 1 <= low < high < n / 2:
+        raise InputError(
+            f"band_hz: expected at least {1 / period_s:g} Hz and below {0.5 / sample_time_s:g} Hz "
+            f"(Nyquist), got {band_hz}"
+        )
+    lines = np.arange(low, high + 1, dtype=np.int64)
+    amplitude = size_of("amplitude", amplitude)
+    phase_rad = number("phase_rad", phase_rad)
 
     def at(part: Real) -> Real:
         return amplitude * np.sin(
@@ -141,7 +170,7 @@ def triangle(period_s: float, sample_time_s: float, *, amplitude: float = 1.0) -
     n = whole_samples("period_s", period_s, sample_time_s)
     if n % 4:
         raise InputError(f"period_s: expected a multiple of four samples, got {n}")
-    positive("amplitude", amplitude)
+    amplitude = size_of("amplitude", amplitude)
     quarter = n // 4
     ramp = np.arange(quarter) / quarter
     period = amplitude * np.concatenate([ramp, 1 - ramp, -ramp, ramp - 1])
@@ -159,8 +188,10 @@ def square(
     l, the half length of the window. As a velocity reference it keeps motors away from
     standstill. Raises InputError.
     """
+    ratio = positive("period_s", period_s) / positive("sample_time_s", sample_time_s)
+    few_enough("period_s", math.ceil(min(ratio, 1e18)))
     period = _core.square_period(
-        positive("amplitude", amplitude),
+        size_of("amplitude", amplitude),
         positive("period_s", period_s),
         whole("smoothing_samples", smoothing_samples, 0),
         positive("sample_time_s", sample_time_s),
@@ -183,11 +214,11 @@ def prbs(
     mean is ``A / (2^bits - 1)`` in size, its
     autocorrelation at any other shift ``-A^2 / (2^bits - 1)``. ``bits`` 2 to 24.
     """
-    if not 2 <= whole("bits", bits) <= 24:
-        raise InputError(f"bits: expected 2 to 24, got {bits}")
-    positive("amplitude", amplitude)
-    sequence, _ = max_len_seq(bits)
-    period = amplitude * np.repeat(2.0 * sequence - 1.0, whole("hold", hold))
+    bits, hold = whole("bits", bits, 2, 24), whole("hold", hold)
+    amplitude = size_of("amplitude", amplitude)
+    few_enough("bits, hold", (2**bits - 1) * hold)
+    sequence, _ = scipy.signal.max_len_seq(bits)
+    period = amplitude * np.repeat(2.0 * sequence - 1.0, hold)
     settings = {"bits": bits, "amplitude": amplitude, "hold": hold}
     return PeriodicSignal("prbs", sample_time_s, period, float(amplitude), settings=settings)
 
@@ -213,15 +244,17 @@ def discrete_interval_binary(
     the share of the power on the lines. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
-    if n % whole("hold", hold):
+    hold = whole("hold", hold)
+    if n % hold:
         raise InputError(f"hold: expected a divisor of the {n} samples of a period, got {hold}")
     count = n // hold
     chosen = lines_below("lines", lines, count)
     if not chosen.size:
         raise InputError("lines: expected at least one line, got none")
     w = per_item("weight", weight, len(chosen))
-    if np.any(w <= 0):
-        raise InputError("weight: expected positive numbers")
+    for one in w:
+        size_of("weight", one)
+    amplitude = size_of("amplitude", amplitude)
     best = max(
         (
             _settled(w, chosen, count, _core.random_phases(len(w), seed_of("seed", seed), run))
@@ -229,7 +262,7 @@ def discrete_interval_binary(
         ),
         key=lambda signs: float(w @ np.abs(np.fft.rfft(signs)[chosen])),
     )
-    period = positive("amplitude", amplitude) * np.repeat(best, hold)
+    period = amplitude * np.repeat(best, hold)
     signal = PeriodicSignal(
         "discrete_interval_binary", sample_time_s, period, float(amplitude), lines=chosen
     )
@@ -298,18 +331,25 @@ def stepped_sine(
     InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
-    exact = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)) * period_s
+    frequency = reals("frequency_hz", frequency_hz, "one frequency or a list", (0, 1))
+    exact = np.atleast_1d(frequency) * period_s
     lines = np.round(exact)
-    if exact.ndim != 1 or not exact.size or np.any(np.abs(exact - lines) > 1e-9 * lines):
+    if np.any(np.abs(exact - lines) > 1e-9 * np.abs(lines)):
         raise InputError(f"frequency_hz: expected multiples of {1 / period_s:g} Hz")
-    chosen = lines.astype(np.int64)
-    if np.any((chosen < 1) | (2 * chosen >= n)):
+    if np.any((lines < 1) | (2 * lines >= n)):
         raise InputError(
             f"frequency_hz: expected above 0 and below {0.5 / sample_time_s:g} Hz (Nyquist)"
         )
+    chosen = lines.astype(np.int64)
     sizes = per_item("amplitude", amplitude, len(chosen))
+    if not np.all(usable := (sizes >= SMALLEST_SIZE) & (sizes <= LARGEST_SIZE)):
+        at = int(np.argmin(usable))
+        raise InputError(
+            f"amplitude: expected positive numbers, got {sizes[at]:g} at "
+            f"{chosen[at] / period_s:g} Hz; leave the step out instead"
+        )
     wait, use = whole("waiting_periods", waiting_periods, 0), whole("periods", periods)
-    step = (wait + use) * n
+    step = few_enough("waiting_periods, periods", (wait + use) * n * len(chosen)) // len(chosen)
     time = np.arange(step) % n / n
     samples = (sizes[:, None] * np.sin(2 * np.pi * chosen[:, None] * time)).ravel()
     signal = PeriodicSignal(

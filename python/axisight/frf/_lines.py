@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import Complex, Lines, Real, instance, one_of, switch, threads_of
 from axisight.errors import InputError
 from axisight.frf.response import Flag
+from axisight.records.arbitrary import ArbitraryRecords
 from axisight.records.periodic import PeriodicRecords
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 Quantity = Literal["position", "velocity", "acceleration"]
 ORDER = {"position": 0, "velocity": 1, "acceleration": 2}
 
@@ -25,13 +25,13 @@ LARGE_CONDITION = 1e3
 
 def line_factor(frequency_hz: Real, quantity: Quantity) -> Complex:
     """``(i w)^p`` on the lines, for the p-th derivative of a recorded position."""
-    if quantity not in ORDER:
-        raise InputError(f"quantity: expected one of {', '.join(ORDER)}, got {quantity!r}")
+    one_of("quantity", quantity, ORDER)
     return np.asarray((2j * np.pi * frequency_hz) ** ORDER[quantity], np.complex128)
 
 
-def output_unit(records: PeriodicRecords, quantity: Quantity) -> str:
+def output_unit(records: PeriodicRecords | ArbitraryRecords, quantity: Quantity) -> str:
     """Unit of the output, seconds added."""
+    one_of("quantity", quantity, ORDER)
     return records.output_unit + ("", "/s", "/s^2")[ORDER[quantity]]
 
 
@@ -46,19 +46,82 @@ def provenance(records: PeriodicRecords, quantity: Quantity) -> dict[str, Any]:
     }
 
 
+def expect_options(
+    records: PeriodicRecords, quantity: Quantity, remove_drift: bool, threads: int
+) -> None:
+    """Check what every estimator of periodic records takes."""
+    instance("records", records, PeriodicRecords)
+    one_of("quantity", quantity, ORDER)
+    switch("remove_drift", remove_drift)
+    threads_of(threads)
+
+
+def line_spectra(
+    signal: Real, lines: Lines, *, remove_drift: bool = False, threads: int = 1
+) -> Complex:
+    """DFT of every period of a signal on lines, (n_freq, channel, experiment, period)."""
+    found = _core.record_spectra(signal, lines.tolist(), remove_drift=remove_drift, threads=threads)
+    return np.ascontiguousarray(found.transpose(2, 3, 0, 1))
+
+
 def spectra(
-    records: PeriodicRecords, quantity: Quantity, *, remove_drift: bool, threads: int
+    records: PeriodicRecords,
+    quantity: Quantity,
+    *,
+    remove_drift: bool,
+    threads: int,
+    lines: Lines | None = None,
 ) -> tuple[Complex, Complex]:
-    """Spectra of input and output on the lines, (n_freq, channel, experiment, period)."""
-    factor = line_factor(records.frequency_hz, quantity)
-    lines = records.lines.tolist()
+    """Spectra of input and output, (n_freq, channel, experiment, period).
 
-    def of(signal: Real, drifts: bool) -> Complex:
-        found = _core.record_spectra(signal, lines, remove_drift=drifts, threads=threads)
-        return np.ascontiguousarray(found.transpose(2, 3, 0, 1))
+    On the excited lines, or on others.
+    """
+    at = records.lines if lines is None else lines
+    factor = line_factor(at / (records.n_samples * records.sample_time_s), quantity)
+    output = line_spectra(records.output, at, remove_drift=remove_drift, threads=threads)
+    return (
+        line_spectra(records.input, at, threads=threads),
+        output * factor[:, None, None, None],
+    )
 
-    output = of(records.output, remove_drift) * factor[:, None, None, None]
-    return of(records.input, False), output
+
+def lost_lines(flag: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Whether a line has no estimate."""
+    return np.asarray((flag == Flag.RANK_DEFICIENT) | (flag == Flag.NO_EXCITATION))
+
+
+def worst_flag(flags: NDArray[np.int8]) -> NDArray[np.int8]:
+    """The worst along the first axis: no excitation, then deficient, then ill-conditioned."""
+    out = np.full(flags.shape[1:], Flag.GOOD, np.int8)
+    for flag in (Flag.ILL_CONDITIONED, Flag.RANK_DEFICIENT, Flag.NO_EXCITATION):
+        out[(flags == flag).any(axis=0)] = flag
+    return out
+
+
+def in_noise(u: Complex) -> NDArray[np.bool_]:
+    """Whether the weakest direction of U at each line is lost in the scatter of the periods.
+
+    ``u`` is (n_freq, n_inputs, n_experiments, n_periods), as many experiments as inputs or more.
+    The rule of the compiled estimate: the smallest singular value of the mean, rows scaled to
+    one, below twice the root mean square of the noise along a direction. A record whose
+    periods are no copies of one another (at half of its lines even the strongest direction is
+    lost) has no such noise, and nothing is said of it.
+    """
+    periods = u.shape[3]
+    if periods < 2:
+        return np.zeros(len(u), bool)
+    mean = u.mean(axis=3)
+    power = np.sum(np.abs(mean) ** 2, axis=2)
+    scatter = np.sum(np.abs(u - mean[..., None]) ** 2, axis=(2, 3))
+    known = power > 0
+    share = np.divide(scatter, power, out=np.zeros_like(power), where=known)
+    noise = share.mean(axis=1) / (periods * (periods - 1))
+    scaled = mean / np.sqrt(np.where(known, power, 1.0))[:, :, None]
+    value = np.linalg.svd(scaled, compute_uv=False)
+    repeats = value[:, 0] ** 2 >= 4 * noise
+    if np.mean(repeats) < 0.5:
+        return np.zeros(len(u), bool)
+    return np.asarray(value[:, -1] ** 2 < 4 * noise)
 
 
 def condition_and_flag(u: Complex) -> tuple[Real, NDArray[np.int8]]:

@@ -10,11 +10,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.arguments import one_of, several, switch, threads_of
 from axisight.errors import InputError
-from axisight.frf._lines import Quantity, expect_experiments
+from axisight.frf._lines import ORDER, Quantity, expect_experiments
 from axisight.frf.confidence import with_freedom
 from axisight.frf.mfrf import mfrf
-from axisight.frf.response import Flag, frequency_response
+from axisight.frf.response import Flag, estimate_of, frequency_response
 from axisight.records.periodic import PeriodicRecords
 
 Complex = NDArray[np.complex128]
@@ -54,22 +55,22 @@ def stack(data: Realizations, quantity: Quantity, remove_drift: bool, threads: i
     def estimated(records: PeriodicRecords) -> xr.Dataset:
         return mfrf(records, quantity=quantity, remove_drift=remove_drift, threads=threads)
 
+    one_of("quantity", quantity, ORDER)
+    switch("remove_drift", remove_drift)
+    threads_of(threads)
     if isinstance(data, PeriodicRecords):
         return _gather([estimated(r) for r in split(data)])
     if isinstance(data, xr.Dataset):
         if "realization" not in data.dims:
-            return _gather([data])
-        return _gather([data.isel(realization=i) for i in range(data.sizes["realization"])])
+            return _gather([estimate_of("data", data)])
+        each = [data.isel(realization=i) for i in range(data.sizes["realization"])]
+        return _gather([estimate_of("data", one) for one in each])
     found: list[xr.Dataset] = []
-    for item in data:
+    for item in several("data", data):
         if isinstance(item, PeriodicRecords):
             found += [estimated(r) for r in split(item)]
-        elif isinstance(item, xr.Dataset) and "response" in item:
-            found.append(item)
         else:
-            raise InputError(
-                f"data: expected frequency responses or PeriodicRecords, got {type(item).__name__}"
-            )
+            found.append(estimate_of("data", item))
     if not found:
         raise InputError("data: expected at least one realization, got none")
     return _gather(found)

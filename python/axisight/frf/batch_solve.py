@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import complex_array, shown, threads_of
 from axisight.errors import InputError
 
 Complex = NDArray[np.complex128]
@@ -30,20 +31,22 @@ def invert(
 
     Raises InputError for matrices that are not square and for an ``out`` that does not fit.
     """
-    a = np.ascontiguousarray(matrices, np.complex128)
-    if a.ndim < 2 or a.shape[-1] != a.shape[-2]:
+    a = np.ascontiguousarray(complex_array("matrices", matrices))
+    threads_of(threads)
+    if a.ndim < 2 or a.shape[-1] != a.shape[-2] or not a.shape[-1]:
         raise InputError(f"matrices: expected shape (..., n, n), got {a.shape}")
     if out is None:
         out = np.empty_like(a)
     elif (
-        out.shape != a.shape
+        not isinstance(out, np.ndarray)
+        or out.shape != a.shape
         or out.dtype != a.dtype
         or not (out.flags.c_contiguous and out.flags.writeable)
         or np.may_share_memory(a, out)
     ):
         raise InputError(
             f"out: expected a writeable C-contiguous complex128 array of shape {a.shape} that "
-            f"does not overlap matrices, got {out.dtype} {out.shape}"
+            f"does not overlap matrices, got {shown(out)}"
         )
     stack = (int(np.prod(a.shape[:-2])), *a.shape[-2:])
     singular = _core.invert_matrices(a.reshape(stack), out.reshape(stack), threads=threads)
@@ -58,9 +61,15 @@ def right_divide(
     ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes; ``threads`` as for `invert`. Returns G,
     (..., p, n), and flags as `invert`. Raises InputError for shapes that do not fit.
     """
-    y = np.ascontiguousarray(y, np.complex128)
-    u = np.ascontiguousarray(u, np.complex128)
-    fits = y.ndim >= 2 and u.shape == (*y.shape[:-2], y.shape[-1], y.shape[-1])
+    y = np.ascontiguousarray(complex_array("y", y))
+    u = np.ascontiguousarray(complex_array("u", u))
+    threads_of(threads)
+    fits = (
+        y.ndim >= 2
+        and y.shape[-1] > 0
+        and y.shape[-2] > 0
+        and u.shape == (*y.shape[:-2], y.shape[-1], y.shape[-1])
+    )
     if not fits:
         raise InputError(f"u: expected shape (..., n, n) for y {y.shape}, got {u.shape}")
     out = np.empty_like(y)

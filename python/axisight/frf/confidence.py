@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.errors import InputError
-from axisight.frf.response import DIMS
+from axisight.arguments import between
+from axisight.frf.response import DIMS, estimate_of
 
 
 def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.DataArray:
@@ -25,10 +25,8 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
     Returns a DataArray as ``variance``; NaN where that is unknown. Raises InputError for a
     probability outside (0, 1) or a Dataset without variance.
     """
-    if not 0 < probability < 1:
-        raise InputError(f"probability: expected a number between 0 and 1, got {probability}")
-    if "variance" not in dataset:
-        raise InputError("dataset: expected a frequency response with variance")
+    probability = between("probability", probability, 0, 1)
+    estimate_of("dataset", dataset)
     variance = dataset["variance"]
     scale = np.full(variance.shape, -np.log1p(-probability))
     freedom = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))

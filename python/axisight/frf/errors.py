@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.arguments import complex_array, complexes, reals, shown
 from axisight.errors import InputError
 
 Real = NDArray[np.float64]
@@ -103,7 +104,7 @@ def approximate_error_directions(
 
     ``scalar_reference`` is R_0, (n_freq,); ``directions`` is T, (m, m).
     """
-    v, r0 = _stack("disturbance", disturbance), np.asarray(scalar_reference)
+    v, r0 = _stack("disturbance", disturbance), _any_shape("scalar_reference", scalar_reference)
     if r0.shape != v.shape[:1]:
         raise InputError(f"scalar_reference: expected shape {v.shape[:1]}, got {r0.shape}")
     reference = r0[:, None, None] * _directions(directions)
@@ -118,9 +119,10 @@ def error_variance(disturbance_power: ArrayLike, input_: ArrayLike) -> Real:
     ``input_`` is U without the disturbance, (n_freq, m, m).
     """
     u = _stack("input", input_)
-    power = np.asarray(disturbance_power, dtype=np.float64)
-    if power.ndim != 2 or len(power) != len(u):
-        raise InputError(f"disturbance_power: expected shape ({len(u)}, n_out), got {power.shape}")
+    what = f"numbers not below zero of shape ({len(u)}, n_out)"
+    power = reals("disturbance_power", disturbance_power, what, 2)
+    if len(power) != len(u) or np.any(power < 0):
+        raise InputError(f"disturbance_power: expected {what}, got {shown(power)}")
     columns = np.sum(np.abs(_inverse(_square("input", u))) ** 2, axis=1)
     return np.asarray(power[:, :, None] * columns[:, None, :])
 
@@ -137,7 +139,7 @@ def directions_gain(directions: ArrayLike) -> Real:
 
 def relative_error(estimate: ArrayLike, true: ArrayLike) -> Complex:
     """Return ``(estimate - true) / true`` element by element, (6.3); NaN where true is zero."""
-    e, g = np.asarray(estimate, np.complex128), np.asarray(true, np.complex128)
+    e, g = _any_shape("estimate", estimate), _any_shape("true", true)
     _same("estimate", e, g.shape)
     return _ratio(e - g, g)
 
@@ -159,7 +161,7 @@ def signal_to_noise_ratio(signal: ArrayLike, disturbance: ArrayLike) -> Real:
 
     In dB this is ``10 log10`` of it.
     """
-    x, v = np.asarray(signal), np.asarray(disturbance)
+    x, v = _any_shape("signal", signal), _any_shape("disturbance", disturbance)
     _same("disturbance", v, x.shape)
     return _ratio(np.abs(x) ** 2, np.abs(v) ** 2)
 
@@ -193,15 +195,27 @@ def _inverse_input(response: ArrayLike, controller: ArrayLike) -> Complex:
 
 
 def _stack(name: str, value: ArrayLike) -> Complex:
-    array = np.asarray(value, np.complex128)
+    array = complex_array(name, value)
     if array.ndim != 3 or 0 in array.shape:
         raise InputError(f"{name}: expected matrices of shape (n_freq, n, m), got {array.shape}")
-    return array
+    return _without_infinity(array)
+
+
+def _any_shape(name: str, value: ArrayLike) -> Complex:
+    array = complex_array(name, value)
+    if not array.size or not array.ndim:
+        raise InputError(f"{name}: expected an array of numbers, got shape {array.shape}")
+    return _without_infinity(array)
+
+
+def _without_infinity(array: Complex) -> Complex:
+    """What is infinite is unknown: products of it would be NaN anyway, or infinite."""
+    return np.asarray(np.where(np.isfinite(array), array, np.nan))
 
 
 def _directions(value: ArrayLike) -> Complex:
-    array = np.asarray(value, np.complex128)
-    if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.size:
+    array = complexes("directions", value, "a square matrix", 2)
+    if array.shape[0] != array.shape[1]:
         raise InputError(f"directions: expected a square matrix, got shape {array.shape}")
     return array
 

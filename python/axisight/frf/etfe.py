@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from axisight.arguments import one_of
 from axisight.errors import InputError
-from axisight.frf._lines import Quantity, spectra
+from axisight.frf._lines import Quantity, expect_options, spectra
 from axisight.frf.arithmetic_mean import arithmetic_mean
 from axisight.frf.smoothing import smooth
 from axisight.records.periodic import PeriodicRecords
@@ -36,12 +37,14 @@ def etfe(
 
     Raises InputError for more than one input (use `mfrf`, then `smooth`).
     """
+    expect_options(records, quantity, remove_drift, threads)
     if records.n_inputs != 1:
         raise InputError(
             f"records.input: ETFE expects one input, got {records.n_inputs}; use mfrf, then smooth"
         )
-    if weighting not in ("flat", "input_power"):
-        raise InputError(f"weighting: expected flat or input_power, got {weighting!r}")
+    one_of("weighting", weighting, ("flat", "input_power"))
+    if bandwidth_hz is None and weighting == "input_power":
+        raise InputError("weighting: expected a bandwidth_hz with input_power, got none")
     dataset = arithmetic_mean(
         records, quantity=quantity, remove_drift=remove_drift, threads=threads
     )

@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.arguments import Complex, instance
 from axisight.errors import InputError
-from axisight.frf._lines import SMALLEST, Complex, spectra
-from axisight.frf.response import Flag
+from axisight.frf._lines import SMALLEST, spectra
+from axisight.frf.response import Flag, estimate_of
 from axisight.records.periodic import PeriodicRecords
 
 REASON = {
@@ -32,13 +33,15 @@ def explain_flags(dataset: xr.Dataset, records: PeriodicRecords | None = None) -
     Returns an empty list where every line is good. Raises InputError where ``dataset`` has no
     flags or ``records`` has other lines.
     """
-    if "flag" not in dataset:
-        raise InputError("dataset: expected a frequency response with flags")
+    estimate_of("dataset", dataset)
     frequency = dataset["frequency_hz"].values
     flag = dataset["flag"].values
     u = None
     if records is not None:
-        if not np.allclose(records.frequency_hz, frequency, rtol=1e-9, atol=0):
+        instance("records", records, PeriodicRecords)
+        if records.frequency_hz.shape != frequency.shape or not np.allclose(
+            records.frequency_hz, frequency, rtol=1e-9, atol=0
+        ):
             raise InputError("records: expected the lines of the dataset")
         u, _ = spectra(records, "position", remove_drift=False, threads=1)
         u = u.mean(axis=3)

@@ -8,10 +8,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.arguments import Complex, Real
 from axisight.errors import InputError
+from axisight.frf._lines import (
+    Quantity,
+    expect_options,
+    line_factor,
+    output_unit,
+    provenance,
+    spectra,
+)
 from axisight.frf.confidence import with_freedom
 from axisight.frf.response import frequency_response
-from axisight.frf.robust import Complex, Real, excitation, inverse, period_variance, spectra
+from axisight.frf.robust import by_realization, excitation, inverse, period_variance
 from axisight.records.periodic import PeriodicRecords
 
 NEIGHBOURS = 6
@@ -25,7 +34,13 @@ class FastMethod(NamedTuple):
     distortion: xr.Dataset
 
 
-def fast_method(records: PeriodicRecords) -> FastMethod:
+def fast_method(
+    records: PeriodicRecords,
+    *,
+    quantity: Quantity = "position",
+    remove_drift: bool = True,
+    threads: int = 1,
+) -> FastMethod:
     """Return the response and the levels of noise, odd and even distortion.
 
     Source: Pintelon and Schoukens (2012), section 4.3.2. At a line without excitation a
@@ -37,6 +52,9 @@ def fast_method(records: PeriodicRecords) -> FastMethod:
         One realization, that is ``n_inputs`` experiments, of P >= 2 periods in steady state.
         ``records.detection_lines`` are used; without any, all lines free of excitation
         between the first and the last excited one.
+    quantity, remove_drift, threads
+        As for `mfrf`. Everything is found from the recorded output, then multiplied by i w or
+        (i w)^2: response, variances and distortion alike.
 
     ``response``, the Dataset of every estimator, is ``Y U^-1`` at the excited lines.
     ``noise_variance`` is from the scatter over the periods (P - 1 complex degrees of
@@ -64,9 +82,10 @@ def fast_method(records: PeriodicRecords) -> FastMethod:
     without any distortion ``|distortion|^2 / noise_variance`` is F distributed with 2 and
     2 (P - 1) degrees of freedom.
 
-    Raises InputError for a single period, other than ``n_inputs`` experiments, detection
-    lines that are excited, and no detection line.
+    Raises InputError for a single period, other than ``n_inputs`` experiments and no
+    detection line.
     """
+    expect_options(records, quantity, remove_drift, threads)
     n, periods = records.n_inputs, records.n_periods
     if records.n_experiments != n:
         raise InputError(
@@ -76,40 +95,52 @@ def fast_method(records: PeriodicRecords) -> FastMethod:
     if periods < 2:
         raise InputError("records: expected at least 2 periods to tell the noise, got 1")
     detection = _detection_lines(records)
-    excited, free = spectra(records, records.lines), spectra(records, detection)
-    condition, flag = excitation(excited.input)
-    u, y = excited.input[0], excited.output[0]
+
+    def of(lines: NDArray[np.int64]) -> tuple[Complex, Complex]:
+        found = spectra(
+            records, "position", remove_drift=remove_drift, threads=threads, lines=lines
+        )
+        u, y = (by_realization(signal, n) for signal in found)
+        return u, y
+
+    excited, free = of(records.lines), of(detection)
+    condition, flag = excitation(excited[0])
+    u, y = excited[0][0], excited[1][0]
+    free_u, free_y = free[0][0], free[1][0]
     weight = inverse(u.mean(axis=0), flag)
     response = y.mean(axis=0) @ weight
     noise = period_variance(((y - response @ u) @ weight)[None])[0]
 
     between = _interpolate(records.lines, response, detection)
-    error = free.output[0] - between @ free.input[0]
+    error = free_y - between @ free_u
     level, level_noise = error.mean(axis=0), period_variance(error[None])[0]
     power = _at_excited(records.lines, detection, np.abs(level) ** 2 - level_noise)
     share = power @ np.abs(weight) ** 2
+    factor = line_factor(records.frequency_hz, quantity)[:, None, None]
     result = frequency_response(
         records.frequency_hz,
-        response,
+        response * factor,
         estimator="fast_method",
-        variance=noise + share,
-        noise_variance=noise,
+        variance=(noise + share) * np.abs(factor) ** 2,
+        noise_variance=noise * np.abs(factor) ** 2,
         condition=condition,
         flag=flag,
         input_unit=records.input_unit,
-        output_unit=records.output_unit,
-        attrs={"n_periods": periods},
+        output_unit=output_unit(records, quantity),
+        attrs=provenance(records, quantity),
     )
     result = with_freedom(result, _freedom(noise, share, periods, len(detection)))
     scale = 2 / records.n_samples
-    uncorrected, amplitude = free.output[0].mean(axis=0), free.input[0].mean(axis=0)
+    free_hz = detection / (records.n_samples * records.sample_time_s)
+    derived = scale * line_factor(free_hz, quantity)[:, None, None]
+    uncorrected, amplitude = free_y.mean(axis=0), free_u.mean(axis=0)
     levels = {
-        "distortion": scale * level,
-        "noise_variance": scale**2 * level_noise,
-        "uncorrected": scale * uncorrected,
+        "distortion": derived * level,
+        "noise_variance": np.abs(derived) ** 2 * level_noise,
+        "uncorrected": derived * uncorrected,
         "input_amplitude": scale * amplitude,
     }
-    return FastMethod(result, _distortion(records, detection, levels))
+    return FastMethod(result, _distortion(records, quantity, detection, levels))
 
 
 def _freedom(noise: Real, share: Real, periods: int, n_detection: int) -> Real:
@@ -124,9 +155,6 @@ def _detection_lines(records: PeriodicRecords) -> NDArray[np.int64]:
     if not lines.size:
         first, last = records.lines[[0, -1]]
         lines = np.setdiff1d(np.arange(first, last), records.lines)
-    excited = np.intersect1d(lines, records.lines)
-    if excited.size:
-        raise InputError(f"detection_lines: expected lines without excitation, got {excited[0]}")
     if not lines.size:
         raise InputError("detection_lines: expected at least one line free of excitation, got none")
     return lines
@@ -155,9 +183,12 @@ def _at_excited(excited: NDArray[np.int64], detection: NDArray[np.int64], power:
 
 
 def _distortion(
-    records: PeriodicRecords, lines: NDArray[np.int64], levels: dict[str, NDArray[np.inexact]]
+    records: PeriodicRecords,
+    quantity: Quantity,
+    lines: NDArray[np.int64],
+    levels: dict[str, NDArray[np.inexact]],
 ) -> xr.Dataset:
-    unit = records.output_unit
+    unit = output_unit(records, quantity)
     dims = ("frequency_hz", "output", "experiment")
     frequency_hz = lines / (records.n_samples * records.sample_time_s)
     return xr.Dataset(
@@ -179,5 +210,5 @@ def _distortion(
             "input": np.arange(1, records.n_inputs + 1),
             "experiment": np.arange(1, records.n_experiments + 1),
         },
-        attrs={"estimator": "fast_method", "n_periods": records.n_periods},
+        attrs={"estimator": "fast_method"} | provenance(records, quantity),
     )

@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from axisight.arguments import Complex, Real, instance
 from axisight.errors import InputError
 from axisight.frf._lines import (
-    Complex,
     Quantity,
-    Real,
     condition_and_flag,
     expect_experiments,
+    expect_options,
+    in_noise,
+    lost_lines,
     output_unit,
     provenance,
     spectra,
@@ -66,6 +68,7 @@ def h2(
     Bias: noise on Y makes the response too large, by the noise-to-signal power ratio of Y;
     noise on U averages out. Exact without noise and distortion.
     """
+    instance("records", records, PeriodicRecords)
     if records.n_outputs != records.n_inputs:
         raise InputError(
             f"records.output: H2 expects as many outputs as inputs ({records.n_inputs}), "
@@ -84,15 +87,17 @@ def _by_instrument(
     records: PeriodicRecords, name: str, quantity: Quantity, remove_drift: bool, threads: int
 ) -> xr.Dataset:
     """G = (sum Y Z^H) (sum U Z^H)^-1 with Z = U for H1 and Y for H2."""
+    expect_options(records, quantity, remove_drift, threads)
     expect_experiments(records, "S_uu is singular at every line")
     u, y = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
     flat_u, flat_y = (s.reshape(*s.shape[:2], -1) for s in (u, y))
     z = flat_u if name == "h1" else flat_y
     condition, flag = condition_and_flag(flat_u)
+    flag[in_noise(u) & (flag == Flag.GOOD)] = Flag.ILL_CONDITIONED
     crossed = _cross(flat_u, z)
     response, singular = right_divide(_cross(flat_y, z), crossed, threads=threads)
     flag[singular & (flag != Flag.NO_EXCITATION)] = Flag.RANK_DEFICIENT
-    lost = (flag == Flag.RANK_DEFICIENT) | (flag == Flag.NO_EXCITATION)
+    lost = lost_lines(flag)
     response[lost] = np.nan
     condition[lost] = np.nan
     residual = flat_y - response @ flat_u

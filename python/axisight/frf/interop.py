@@ -20,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import signal
 
+from axisight.arguments import complex_array, path_of, positive, reals, whole
 from axisight.errors import InputError, MissingExtraError
 from axisight.frf.response import DIMS, frequency_response
 
@@ -80,10 +81,10 @@ def to_scipy(
     """
     _response(response)
     for name, value in (("output", output), ("input", input)):
-        if value not in response[name].values:
+        if whole(name, value) not in response[name].values:
             raise InputError(f"{name}: expected one of {response[name].values}, got {value}")
     element = response["response"].sel(output=output, input=input).values
-    scale = 1.0 if sample_time_s is None else _positive(sample_time_s)
+    scale = 1.0 if sample_time_s is None else positive("sample_time_s", sample_time_s)
     return 2 * np.pi * scale * response["frequency_hz"].values, element
 
 
@@ -108,15 +109,16 @@ def from_scipy(
 
     Raises InputError for shapes that do not fit and frequencies that do not ascend.
     """
-    w, h = np.asarray(w, float), np.asarray(h, complex)
-    if w.ndim != 1 or h.ndim not in (1, 3) or len(h) != len(w):
+    w = reals("w", w, "frequencies of shape (n_freq,)", 1)
+    h = complex_array("h", h)
+    if h.ndim not in (1, 3) or len(h) != len(w) or 0 in h.shape:
         raise InputError(
             f"h: expected shape (n_freq,) or (n_freq, n_out, n_in) for w of shape {w.shape}, got "
             f"{h.shape}"
         )
     if not np.all(np.diff(w) > 0):
         raise InputError("w: expected ascending frequencies")
-    scale = 1.0 if sample_time_s is None else _positive(sample_time_s)
+    scale = 1.0 if sample_time_s is None else positive("sample_time_s", sample_time_s)
     return frequency_response(
         w / (2 * np.pi * scale),
         h[:, None, None] if h.ndim == 1 else h,
@@ -127,7 +129,7 @@ def from_scipy(
 
 
 def evaluate(
-    system: signal.lti | signal.dlti,
+    system: scipy.signal.lti | scipy.signal.dlti,
     frequency_hz: Real,
     *,
     input_unit: str = "Nm",
@@ -147,14 +149,10 @@ def evaluate(
     A line on a pole is NaN. Raises InputError for another type, a discrete system without a
     sample time, and lines that do not ascend or lie above its Nyquist frequency.
     """
-    frequency = np.asarray(frequency_hz, float)
-    if (
-        frequency.ndim != 1
-        or not np.all(np.diff(frequency) > 0)
-        or not np.isfinite(frequency).all()
-    ):
-        raise InputError("frequency_hz: expected ascending finite frequencies, shape (n_freq,)")
-    if isinstance(system, signal.dlti):
+    frequency = reals("frequency_hz", frequency_hz, "frequencies of shape (n_freq,)", 1)
+    if not np.all(np.diff(frequency) > 0):
+        raise InputError("frequency_hz: expected ascending frequencies")
+    if isinstance(system, scipy.signal.dlti):
         if system.dt is True or not system.dt:
             raise InputError("system: expected a discrete system with its sample time, got dt=True")
         if frequency.size and frequency[-1] > 0.5 / system.dt * (1 + 1e-12):
@@ -162,7 +160,7 @@ def evaluate(
                 f"frequency_hz: expected at most {0.5 / system.dt:g} Hz (Nyquist), got {frequency[-1]:g}"
             )
         at = np.exp(2j * np.pi * frequency * system.dt)
-    elif isinstance(system, signal.lti):
+    elif isinstance(system, scipy.signal.lti):
         at = 2j * np.pi * frequency
     else:
         raise InputError(
@@ -181,7 +179,7 @@ def evaluate(
 
 def _evaluated(system: Any, at: Complex) -> Complex:
     with np.errstate(divide="ignore", invalid="ignore"):
-        if isinstance(system, signal.StateSpace):
+        if isinstance(system, scipy.signal.StateSpace):
             a, b, c, d = system.A, system.B, system.C, system.D
             response = np.full((len(at), *d.shape), np.nan, complex)
             for k, s in enumerate(at):
@@ -189,7 +187,7 @@ def _evaluated(system: Any, at: Complex) -> Complex:
                     response[k] = c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d
                 except np.linalg.LinAlgError:
                     continue  # on a pole: stays NaN
-        elif isinstance(system, signal.ZerosPolesGain):
+        elif isinstance(system, scipy.signal.ZerosPolesGain):
             factors = system.gain * np.prod(at[:, None] - np.atleast_1d(system.zeros), axis=1)
             poles = np.prod(at[:, None] - np.atleast_1d(system.poles), axis=1)
             response = (factors / poles)[:, None, None]
@@ -203,9 +201,12 @@ def _evaluated(system: Any, at: Complex) -> Complex:
 def save_netcdf(response: xr.Dataset, path: Path | str) -> None:
     """Write a response to a NetCDF 3 file, complex variables as ``NAME_real`` and ``NAME_imag``.
 
-    ``response`` is any Dataset of this package; :func:`load_netcdf` gives it back. Raises
-    InputError for an attribute NetCDF cannot hold, naming it.
+    ``response`` is any Dataset over ``frequency_hz`` of this package, also the levels of
+    :func:`fast_method`; :func:`load_netcdf` gives it back. Raises InputError for an attribute
+    NetCDF cannot hold, naming it, and a place that cannot be written.
     """
+    target = path_of("path", path)
+    _expect_lines(response)
     parts: dict[str, Any] = {}
     for name, value in response.data_vars.items():
         if np.iscomplexobj(value):
@@ -215,18 +216,24 @@ def save_netcdf(response: xr.Dataset, path: Path | str) -> None:
             parts[str(name)] = value
     plain = xr.Dataset(parts, coords=response.coords, attrs=response.attrs)
     try:
-        plain.to_netcdf(path, engine="scipy")
-    except TypeError as error:
+        plain.to_netcdf(target, engine="scipy")
+    except (TypeError, ValueError) as error:
         raise InputError(f"response: expected attributes NetCDF can hold: {error}") from error
+    except OSError as error:
+        raise InputError(f"path: {target} cannot be written: {error}") from error
 
 
 def load_netcdf(path: Path | str) -> xr.Dataset:
     """Read what :func:`save_netcdf` wrote at ``path``.
 
-    Raises InputError if the file is no frequency response.
+    Raises InputError if the file cannot be read or holds nothing over frequency.
     """
-    with xr.open_dataset(path, engine="scipy") as file:
-        plain = file.load()
+    source = path_of("path", path)
+    try:
+        with xr.open_dataset(source, engine="scipy") as file:
+            plain = file.load()
+    except (OSError, TypeError, ValueError, IndexError, KeyError, EOFError) as error:
+        raise InputError(f"path: expected a NetCDF file, got {source}: {error}") from error
     variables: dict[str, Any] = {}
     for key, value in plain.data_vars.items():
         name = str(key)
@@ -241,8 +248,17 @@ def load_netcdf(path: Path | str) -> xr.Dataset:
         for name, c in plain.coords.items()
     }
     loaded = xr.Dataset(variables, attrs=plain.attrs).assign_coords(coords)
-    _response(loaded)
+    _expect_lines(loaded)
     return loaded
+
+
+def _expect_lines(response: object) -> None:
+    """Refuse what is not over frequency; a response is, and so are levels of distortion."""
+    if not isinstance(response, xr.Dataset):
+        raise InputError(f"response: expected a Dataset, got {type(response).__name__}")
+    if "frequency_hz" not in response.dims:
+        dims = ", ".join(map(str, response.dims)) or "nothing"
+        raise InputError(f"response: expected a Dataset over frequency_hz, got one over {dims}")
 
 
 def _response(response: xr.Dataset) -> Complex:
@@ -251,12 +267,6 @@ def _response(response: xr.Dataset) -> Complex:
     if found is None or set(found.dims) != set(DIMS):
         raise InputError(f"response: expected a Dataset with a variable response over {DIMS}")
     return np.asarray(found.transpose(*DIMS).values, complex)
-
-
-def _positive(sample_time_s: float) -> float:
-    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
-        raise InputError(f"sample_time_s: expected a positive time, got {sample_time_s}")
-    return sample_time_s
 
 
 def _control() -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from axisight.errors import InputError
-from axisight.frf._lines import Quantity, expect_experiments
+from axisight.frf._lines import Quantity, expect_experiments, expect_options
 from axisight.frf._multivariable import estimate
 from axisight.records.periodic import PeriodicRecords
 
@@ -34,6 +34,7 @@ def joint_input_output(
     Raises InputError where the reference is missing or has not one channel per input, and for
     fewer experiments than inputs.
     """
+    expect_options(records, quantity, remove_drift, threads)
     if records.reference is None:
         raise InputError("records.reference: expected the recorded reference, got None")
     if records.reference.shape[3] != records.n_inputs:

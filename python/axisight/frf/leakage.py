@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from axisight.frf.loop import velocity_gains
+from axisight.arguments import whole
+from axisight.frf.loop import frequencies_below_nyquist, velocity_gains
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -26,6 +27,8 @@ def noise_leakage_power(robot: Robot, frequency_hz: Real, n_samples: int) -> Rea
     Raises InputError for another controller than ``pi_velocity`` or ``p_velocity``.
     """
     kp, ki = velocity_gains(robot)
+    frequency_hz = frequencies_below_nyquist(robot, frequency_hz)
+    whole("n_samples", n_samples)
     step, std = robot.sample_time_s, robot.core.position_noise_std
     a, b, c = _sampled(robot)
     n, m = b.shape

@@ -5,7 +5,9 @@ from __future__ import annotations
 import xarray as xr
 
 from axisight import _core
+from axisight.arguments import whole
 from axisight.frf import local_window
+from axisight.frf._lines import Quantity
 from axisight.frf.local_window import Lines, Records
 from axisight.records.periodic import PeriodicRecords
 
@@ -16,6 +18,8 @@ def local_polynomial(
     order: int = 2,
     half_width: int | None = None,
     lines: Lines | None = None,
+    quantity: Quantity = "position",
+    remove_drift: bool = False,
     threads: int = 0,
 ) -> xr.Dataset:
     """Return the frequency response by the local polynomial method, transients removed.
@@ -39,6 +43,14 @@ def local_polynomial(
     lines
         Lines to estimate: of the record for arbitrary records (None: all below half the
         sampling frequency), excited lines of the period for periodic ones (None: all).
+    quantity
+        Response to the recorded output ("position") or its first or second derivative: the
+        estimate times i w or (i w)^2.
+    remove_drift
+        Remove from each output the linear drift that the means of its periods show
+        (:func:`axisight.records.remove_drift`). Only for records in steady state: a transient
+        passes for drift in part, and what is left no longer fits the model. A single record
+        shows no drift; a ramp is a transient to the method.
     threads
         Threads; 0 for all. They do not change the result.
 
@@ -62,8 +74,10 @@ def local_polynomial(
     Raises InputError for too few lines for the order, lines out of range and, for several
     periods, fewer experiments than inputs.
     """
-    order = local_window.whole_number("order", order, 0)
-    data = local_window.whole(records, lines)
+    order = whole("order", order, 0, local_window.HIGHEST_ORDER)
+    data = local_window.whole(
+        records, lines, quantity=quantity, remove_drift=remove_drift, threads=threads
+    )
     if not isinstance(records, PeriodicRecords) or data.n_periods == 1:
         return local_window.regression(
             records,
@@ -77,7 +91,7 @@ def local_polynomial(
     if half_width is None:
         per_experiment = -(-local_window.DEGREES_OF_FREEDOM // records.n_experiments)
         half_width = max(order + 2, -(-(per_experiment + order + 1) // 2))
-    half_width = local_window.whole_number("half_width", half_width, 1)
+    half_width = whole("half_width", half_width, 1)
     found = _core.frf_local_periodic(
         data.input,
         data.output,

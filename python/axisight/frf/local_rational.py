@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
+from axisight.arguments import whole
 from axisight.frf import local_window
+from axisight.frf._lines import Quantity
 from axisight.frf.local_window import Lines, Records
 
 
@@ -15,6 +17,8 @@ def local_rational(
     denominator_order: int | None = None,
     half_width: int | None = None,
     lines: Lines | None = None,
+    quantity: Quantity = "position",
+    remove_drift: bool = False,
     threads: int = 0,
 ) -> xr.Dataset:
     """Return the frequency response by the local rational method, transients removed.
@@ -42,6 +46,14 @@ def local_rational(
     lines
         Lines to estimate: of the record for arbitrary records (None: all below half the
         sampling frequency), excited lines of the period for periodic ones (None: all).
+    quantity
+        Response to the recorded output ("position") or its first or second derivative: the
+        estimate times i w or (i w)^2.
+    remove_drift
+        Remove from each output the linear drift that the means of its periods show
+        (:func:`axisight.records.remove_drift`). Only for records in steady state: a transient
+        passes for drift in part, and what is left no longer fits the model. A single record
+        shows no drift; a ramp is a transient to the method.
     threads
         Threads; 0 for all. They do not change the result.
 
@@ -64,15 +76,20 @@ def local_rational(
 
     Raises InputError for too few lines for the orders and lines out of range.
     """
-    order = local_window.whole_number("order", order, 0)
+    order = whole("order", order, 0, local_window.HIGHEST_ORDER)
     if denominator_order is None:
         denominator_order = order
+    data = local_window.whole(
+        records, lines, quantity=quantity, remove_drift=remove_drift, threads=threads
+    )
     return local_window.regression(
         records,
-        local_window.whole(records, lines),
+        data,
         estimator="local_rational",
         order=order,
-        denominator_order=local_window.whole_number("denominator_order", denominator_order, 0),
+        denominator_order=whole(
+            "denominator_order", denominator_order, 0, local_window.HIGHEST_ORDER
+        ),
         half_width=half_width,
         threads=threads,
     )

@@ -10,13 +10,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import instance, lines_below, switch, threads_of
+from axisight.arguments import whole as whole_number
 from axisight.errors import InputError
+from axisight.frf._lines import Quantity, line_factor, output_unit
 from axisight.frf.response import frequency_response
 from axisight.records.arbitrary import ArbitraryRecords
+from axisight.records.drift import remove_drift as without_drift
 from axisight.records.periodic import PeriodicRecords
 
 Records = PeriodicRecords | ArbitraryRecords
 Lines = Sequence[int] | NDArray[np.int64]
+
+HIGHEST_ORDER = 8
 
 DEGREES_OF_FREEDOM = 12
 """Least number that a default window leaves: the disc that holds 95 % for a known variance
@@ -32,6 +38,7 @@ class Whole:
     lines: NDArray[np.int64]
     n_periods: int
     frequency_hz: NDArray[np.float64]
+    quantity: Quantity
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -44,42 +51,40 @@ class Whole:
         return int((self.input.shape[1] - 1) // 2)
 
 
-def whole(records: Records, lines: Lines | None) -> Whole:
+def whole(
+    records: Records,
+    lines: Lines | None,
+    *,
+    quantity: Quantity,
+    remove_drift: bool,
+    threads: int,
+) -> Whole:
     """Join the periods of the records and check the lines (None: all, or all excited)."""
+    instance("records", records, PeriodicRecords, ArbitraryRecords)
+    output_unit(records, quantity)
+    switch("remove_drift", remove_drift)
+    threads_of(threads)
     n_periods = 1
+    chosen = None if lines is None else lines_below("lines", lines, records.n_samples)
+    output = records.output
     if isinstance(records, PeriodicRecords):
         n_periods = records.n_periods
-        chosen = records.lines if lines is None else np.asarray(lines)
-        joined = [
-            a.reshape(records.n_experiments, -1, a.shape[3])
-            for a in (records.input, records.output)
-        ]
-        if not np.isin(chosen, records.lines).all():
-            raise InputError(f"lines: expected excited lines of the records, got {chosen}")
-    elif isinstance(records, ArbitraryRecords):
-        highest = (records.n_samples - 1) // 2
-        chosen = np.arange(1, highest + 1) if lines is None else np.asarray(lines)
-        joined = [records.input, records.output]
-        if chosen.ndim != 1 or np.any(chosen != chosen.astype(np.int64)):
-            raise InputError(f"lines: expected a list of whole numbers, got {chosen!r}")
-        if np.any((chosen < 1) | (chosen > highest)):
-            raise InputError(f"lines: expected lines from 1 to {highest}, got {chosen}")
+        chosen = records.lines if chosen is None else chosen
+        if remove_drift and n_periods > 1:
+            output = without_drift(output)
+        joined = [a.reshape(records.n_experiments, -1, a.shape[3]) for a in (records.input, output)]
+        other = np.setdiff1d(chosen, records.lines)
+        if other.size:
+            raise InputError(f"lines: expected excited lines of the records, got {other[0]}")
     else:
-        raise InputError(
-            f"records: expected PeriodicRecords or ArbitraryRecords, got {type(records).__name__}"
-        )
-    if not chosen.size or np.any(np.diff(chosen) <= 0):
-        raise InputError("lines: expected ascending lines without repetition, at least one")
+        if chosen is None:
+            chosen = np.arange(1, (records.n_samples - 1) // 2 + 1)
+        joined = [records.input, output]
+    if not chosen.size:
+        raise InputError("lines: expected at least one, got none")
     length = joined[0].shape[1] / n_periods
     frequency_hz = chosen / (length * records.sample_time_s)
-    return Whole(joined[0], joined[1], chosen.astype(np.int64), n_periods, frequency_hz)
-
-
-def whole_number(name: str, value: int, least: int) -> int:
-    """Return a whole number from the least one to 2^31, or raise InputError."""
-    if isinstance(value, bool) or value != int(value) or not least <= value <= 2**31:
-        raise InputError(f"{name}: expected a whole number of at least {least}, got {value}")
-    return int(value)
+    return Whole(joined[0], joined[1], chosen, n_periods, frequency_hz, quantity)
 
 
 def regression(
@@ -120,20 +125,23 @@ def dataset(
     """Return the response of the core as every estimator does."""
     provenance = {
         **attrs,
+        "quantity": data.quantity,
         "degrees_of_freedom": found["degrees_of_freedom"],
         "n_experiments": records.n_experiments,
         "n_periods": data.n_periods,
     }
+    factor = line_factor(data.frequency_hz, data.quantity)[:, None, None]
+    variance = found["variance"] * np.abs(factor) ** 2
     return frequency_response(
         data.frequency_hz,
-        found["response"],
+        found["response"] * factor,
         estimator=estimator,
-        variance=found["variance"],
-        noise_variance=found["variance"] if data.n_periods > 1 else None,
+        variance=variance,
+        noise_variance=variance if data.n_periods > 1 else None,
         condition=found["condition"],
         flag=found["flag"],
         input_unit=records.input_unit,
-        output_unit=records.output_unit,
+        output_unit=output_unit(records, data.quantity),
         attrs=provenance,
     )
 

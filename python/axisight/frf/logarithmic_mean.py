@@ -6,16 +6,19 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from axisight.arguments import Complex, one_of
 from axisight.errors import InputError
-from axisight.frf._lines import Quantity
+from axisight.frf._lines import Quantity, spectra
 from axisight.frf._realizations import Realizations, averaged, stack
+from axisight.records.periodic import PeriodicRecords
 
 
 def logarithmic_mean(
     data: Realizations,
     *,
-    phase: Literal["angle", "arithmetic"] = "angle",
+    phase: Literal["angle", "arithmetic", "cross_spectrum"] = "angle",
     quantity: Quantity = "position",
     remove_drift: bool = True,
     threads: int = 1,
@@ -25,8 +28,9 @@ def logarithmic_mean(
     phase
         "angle" is the mean of the angles (7.10), each counted from the direction of the mean
         of the unit phasors, so that angles about plus and minus 180 degrees are neighbours;
-        "arithmetic" is the phase of the arithmetic mean (7.7). (7.9) is for one input and one
-        output only; "arithmetic" on records without noise on U is the same.
+        "arithmetic" is the phase of the arithmetic mean (7.7); "cross_spectrum" that of the
+        mean of ``Y conj(U)`` (7.9), which weighs every realization with the power of its input:
+        for one input only, and from PeriodicRecords.
     data, quantity, remove_drift, threads
         As for `arithmetic_mean`; Dataset, variances and errors too. The variance is that of
         the mean of log G, times |G|^2.
@@ -37,9 +41,11 @@ def logarithmic_mean(
     with any number of realizations. An element that is exactly zero in one realization is
     zero.
     """
-    if phase not in ("angle", "arithmetic"):
-        raise InputError(f"phase: expected angle or arithmetic, got {phase!r}")
+    one_of("phase", phase, ("angle", "arithmetic", "cross_spectrum"))
     found = stack(data, quantity, remove_drift, threads)
+    crossed = None
+    if phase == "cross_spectrum":
+        crossed = _crossed(data, found.usable, quantity, remove_drift, threads)
     single = found.response
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.log(np.abs(single))
@@ -51,9 +57,38 @@ def logarithmic_mean(
         direction = np.angle(towards) + mean_turn
         if phase == "arithmetic":
             direction = np.angle(found.mean(single))
+        elif crossed is not None:
+            direction = np.angle(crossed)
         response = np.exp(mean_size + 1j * direction)
         silent = np.isneginf(mean_size)
         response[silent] = 0.0
         deviation = response * ((size - mean_size) + 1j * (turned - mean_turn))
     deviation[:, silent] = single[:, silent]
     return averaged(found, "logarithmic_mean", response, deviation, phase=phase)
+
+
+def _crossed(
+    data: Realizations,
+    usable: NDArray[np.bool_],
+    quantity: Quantity,
+    remove_drift: bool,
+    threads: int,
+) -> Complex:
+    """Sum of ``Y conj(U)`` over the usable realizations, (n_freq, n_out, 1), periods averaged."""
+    sets = [data] if isinstance(data, PeriodicRecords | xr.Dataset) else list(data)
+    parts = []
+    for records in sets:
+        if not isinstance(records, PeriodicRecords) or records.n_inputs != 1:
+            raise InputError(
+                "phase: expected PeriodicRecords of one input for cross_spectrum, got "
+                + (
+                    f"{records.n_inputs} inputs"
+                    if isinstance(records, PeriodicRecords)
+                    else type(records).__name__
+                )
+            )
+        u, y = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
+        # With one input every experiment is a realization: (n_freq, n_out, realization).
+        parts.append(y.mean(axis=3) * u.mean(axis=3).conj())
+    every = np.moveaxis(np.concatenate(parts, axis=2), 2, 0)[..., None]
+    return np.asarray(np.where(usable, every, 0).sum(axis=0))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import instance, reals
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.robot import Robot
@@ -44,6 +45,7 @@ def robot_loop(robot: Robot, frequency_hz: Real, effects: Iterable[Effect] = ())
     equations of the controller in :doc:`conventions`. Raises InputError for another kind.
     """
     kp, ki = velocity_gains(robot)
+    frequency_hz = frequencies_below_nyquist(robot, frequency_hz)
     step = robot.sample_time_s
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) * step)[:, None]
     feedback = kp * (1 - 1 / z) / step + ki
@@ -56,8 +58,20 @@ def robot_loop(robot: Robot, frequency_hz: Real, effects: Iterable[Effect] = ())
     )
 
 
+def frequencies_below_nyquist(robot: Robot, frequency_hz: object) -> Real:
+    """Return frequencies [Hz], (n_freq,), above zero and up to the Nyquist frequency."""
+    nyquist = 0.5 / robot.sample_time_s
+    what = f"frequencies above 0 up to {nyquist:g} Hz (Nyquist)"
+    found = reals("frequency_hz", frequency_hz, what, 1)
+    outside = found[(found <= 0) | (found > nyquist * (1 + 1e-12))]
+    if outside.size:
+        raise InputError(f"frequency_hz: expected {what}, got {outside[0]:g}")
+    return found
+
+
 def velocity_gains(robot: Robot) -> tuple[Real, Real]:
     """Return kp [Nm s/rad] and ki [Nm/rad] (n_axes,); raises InputError for other controllers."""
+    instance("robot", robot, Robot)
     kind = robot.core.controller_kind
     if kind not in ("pi_velocity", "p_velocity"):
         raise InputError(f"robot: expected a pi_velocity or p_velocity controller, got {kind}")

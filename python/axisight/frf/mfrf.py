@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import xarray as xr
 
-from axisight.frf._lines import Quantity, expect_experiments
+from axisight.arguments import one_of
+from axisight.frf._covariance import with_covariance
+from axisight.frf._lines import Quantity, expect_experiments, expect_options, spectra
 from axisight.frf._multivariable import estimate
 from axisight.records.periodic import PeriodicRecords
 
@@ -14,6 +18,7 @@ def mfrf(
     *,
     quantity: Quantity = "position",
     remove_drift: bool = True,
+    covariance: Literal["elements", "full"] = "elements",
     threads: int = 1,
 ) -> xr.Dataset:
     """Estimate G = Y U^-1 on the excited lines, periods averaged first.
@@ -28,6 +33,13 @@ def mfrf(
     remove_drift
         Remove from each output of each experiment the linear drift that the means of its
         periods show (one period shows none).
+    covariance
+        "full" adds ``covariance`` (frequency_hz, element, element_2), complex and Hermitian:
+        ``E dG_a conj(dG_b)`` of the elements (output, input), counted as in
+        ``response.reshape(n_freq, -1)`` and named "output,input". Its diagonal is
+        ``variance``. ``noise_covariance`` is the same for ``noise_variance``, with several
+        periods. Of full rank only with at least n_out degrees of freedom: n_out + 1 periods,
+        or n_out more experiments than inputs.
     threads
         Threads for the transforms, 0 for every core; the result does not depend on it.
 
@@ -45,8 +57,10 @@ def mfrf(
 
     Raises InputError for fewer experiments than inputs.
     """
+    expect_options(records, quantity, remove_drift, threads)
     expect_experiments(records, "Y U^-1 has no unique solution at any line")
-    return estimate(
+    one_of("covariance", covariance, ("elements", "full"))
+    dataset = estimate(
         records,
         "mfrf",
         by_reference=False,
@@ -54,3 +68,7 @@ def mfrf(
         remove_drift=remove_drift,
         threads=threads,
     )
+    if covariance == "full":
+        u, y = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
+        return with_covariance(dataset, u, y)
+    return dataset

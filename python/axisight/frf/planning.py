@@ -7,23 +7,34 @@ simulating the motion predicts it. Sensor noise is added by its variance, with w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import cast
+from typing import cast, get_args
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.arguments import (
+    instance,
+    lines_below,
+    one_of,
+    reals,
+    several,
+    threads_of,
+    whole,
+)
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.frf.errors import error_variance, estimation_error, signal_to_noise_ratio
 from axisight.frf.leakage import noise_leakage_power
+from axisight.frf.loop import velocity_gains
 from axisight.robot import Robot
 from axisight.simulation import Model, simulate_batch
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_MOST_PERIODS = 10**6
 _DIMS = ("frequency_hz", "output", "input")
 
 
@@ -65,24 +76,20 @@ def predict_errors(
     Raises InputError for shapes that do not fit, lines out of range, and a run that fails.
 
     """
-    refs = np.asarray(references_rad_s, np.float64)
+    velocity_gains(robot)
+    added = [instance("effects", effect, Effect) for effect in several("effects", effects)]
+    one_of("model", model, get_args(Model))
     n = robot.n_axes
-    if refs.ndim != 4 or refs.shape[1] != n or refs.shape[3] != n or 0 in refs.shape:
-        raise InputError(
-            f"references_rad_s: expected shape (n_realizations, {n}, n_samples, {n}), "
-            f"got {refs.shape}"
-        )
-    k = np.asarray(lines)
-    if k.ndim != 1 or not k.size or k.dtype.kind not in "iu" or k.min() < 1:
-        raise InputError(f"lines: expected whole numbers from 1, got {lines!r}")
-    if k.max() >= refs.shape[2] / 2:
-        raise InputError(f"lines: expected below {refs.shape[2] / 2:g} (Nyquist), got {k.max()}")
-    for name, value, least in (
-        ("waiting_periods", waiting_periods, 0),
-        ("n_periods", n_periods, 1),
-    ):
-        if value < least:
-            raise InputError(f"{name}: expected at least {least}, got {value}")
+    what = f"shape (n_realizations, {n}, n_samples, {n})"
+    refs = reals("references_rad_s", references_rad_s, what, 4)
+    if refs.shape[1] != n or refs.shape[3] != n:
+        raise InputError(f"references_rad_s: expected {what}, got {refs.shape}")
+    k = lines_below("lines", lines, refs.shape[2])
+    if not k.size:
+        raise InputError("lines: expected at least one, got none")
+    waiting_periods = whole("waiting_periods", waiting_periods, 0, _MOST_PERIODS)
+    n_periods = whole("n_periods", n_periods, 1, _MOST_PERIODS)
+    threads_of(threads)
     frequency = k / (refs.shape[2] * robot.sample_time_s)
     true = robot.zoh_response(frequency).values
     noise = refs.shape[2] * robot.core.position_noise_std**2
@@ -91,7 +98,7 @@ def predict_errors(
     found = []
     for one in refs:
         repeated = np.tile(one, (1, waiting_periods + 1, 1))
-        run = simulate_batch(robot, repeated, effects=effects, model=model, threads=threads)
+        run = simulate_batch(robot, repeated, effects=added, model=model, threads=threads)
         if not (run["status"] == "completed").all():
             raise InputError(f"references_rad_s: the simulation ended as {run['status'].values}")
         found.append(_one(run, refs.shape[2], k, true, power))
@@ -105,12 +112,10 @@ def averaged_relative_error(prediction: xr.Dataset, n_realizations: int) -> xr.D
     estimates, (7.7). The bias predicted from a few realizations holds their own scatter; its
     expected share is taken off. Raises InputError if the prediction rests on one.
     """
-    count = int(prediction.attrs["n_realizations"])
-    if n_realizations < 1 or count < 2:
-        raise InputError(
-            "n_realizations: expected at least 1, and a prediction from at least 2, got "
-            f"{n_realizations} and {count}"
-        )
+    count = int(_predicted("prediction", prediction).attrs["n_realizations"])
+    whole("n_realizations", n_realizations)
+    if count < 2:
+        raise InputError(f"prediction: expected one from at least 2 realizations, got {count}")
     scatter = prediction["realization_variance"]
     bias = np.maximum(np.abs(prediction["bias"]) ** 2 - scatter / count, 0.0)
     variance = (scatter + prediction["noise_variance"]) / n_realizations
@@ -124,7 +129,11 @@ def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
     Columns: ``design``, ``1,1`` ... (output, input) and ``mean`` over all elements.
     """
     rows = []
+    if not isinstance(predictions, Mapping):
+        kind = type(predictions).__name__
+        raise InputError(f"predictions: expected {{name: Dataset}}, got {kind}")
     for name, prediction in predictions.items():
+        _predicted(f"predictions[{name!r}]", prediction)
         mean = prediction["relative_error"].mean("frequency_hz")
         elements = {
             f"{int(i)},{int(j)}": float(mean.sel(output=i, input=j))
@@ -133,6 +142,20 @@ def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
         }
         rows.append({"design": name, **elements, "mean": float(mean.mean())})
     return pd.DataFrame(rows)
+
+
+def _predicted(field: str, value: object) -> xr.Dataset:
+    """Return what :func:`predict_errors` gave; raises InputError for anything else."""
+    needed = {"response", "bias", "realization_variance", "noise_variance", "relative_error"}
+    if (
+        not isinstance(value, xr.Dataset)
+        or not needed <= set(value.data_vars)
+        or "n_realizations" not in value.attrs
+    ):
+        raise InputError(
+            f"{field}: expected a Dataset of predict_errors, got {type(value).__name__}"
+        )
+    return value
 
 
 _Errors = tuple[Complex, Real, Real, Real]

@@ -14,13 +14,15 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator, MultipleLocator, NullFormatter
 from numpy.typing import NDArray
 
+from axisight.arguments import between, switch, whole, words
 from axisight.errors import InputError
 from axisight.frf.confidence import confidence_radius
-from axisight.frf.response import DIMS, Flag
+from axisight.frf.response import Flag, estimate_of
 from axisight.palette import SERIES
 
 Real = NDArray[np.float64]
 
+_WIDEST_IN = 100
 _DENSE = 60  # more lines than this are drawn as a curve, fewer with dots; half of it if small
 Responses = xr.Dataset | Mapping[str, xr.Dataset]
 
@@ -65,7 +67,10 @@ def plot_bode(
     Datasets that hold no response.
     """
     named = _named(responses)
+    switch("unwrap", unwrap)
+    width_in = between("width_in", width_in, 0, _WIDEST_IN)
     for name, value in (("output", output), ("input", input)):
+        whole(name, value)
         for dataset in named.values():
             if value not in dataset[name].values:
                 raise InputError(
@@ -105,6 +110,9 @@ def plot_response_matrix(
     Raises InputError as :func:`plot_bode`, and for responses of different sizes.
     """
     named = _named(responses)
+    phase, unwrap = switch("phase", phase), switch("unwrap", unwrap)
+    width_in = between("width_in", width_in, 0, _WIDEST_IN)
+    row_height_in = between("row_height_in", row_height_in, 0, _WIDEST_IN)
     first = next(iter(named.values()))
     outputs, inputs = first["output"].values, first["input"].values
     parts = 2 if phase else 1
@@ -146,16 +154,19 @@ def plot_response_matrix(
 
 
 def _named(responses: Responses) -> dict[str, xr.Dataset]:
-    named = {"": responses} if isinstance(responses, xr.Dataset) else dict(responses)
+    if not isinstance(responses, xr.Dataset | Mapping):
+        kind = type(responses).__name__
+        raise InputError(f"responses: expected a Dataset or {{label: Dataset}}, got {kind}")
+    if isinstance(responses, xr.Dataset):
+        named = {"": responses}
+    else:
+        named = {words("responses", k): v for k, v in dict(responses).items()}
     if not named:
         raise InputError("responses: expected at least one, got none")
     for label, dataset in named.items():
-        found = dataset.get("response") if isinstance(dataset, xr.Dataset) else None
-        if found is None or set(found.dims) != set(DIMS):
-            raise InputError(
-                f"responses: expected Datasets with a variable response over {DIMS}"
-                + (f", got something else as {label!r}" if label else "")
-            )
+        found = estimate_of(
+            f"responses[{label!r}]" if label else "responses", dataset, uncertain=False
+        )["response"]
         if not np.isfinite(found.values).any():
             raise InputError(f"responses: expected a line with numbers, got only NaN {label!r}")
     first_label, first = next(iter(named.items()))

@@ -34,6 +34,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import complex_array, instance, real_array, reals, shown, words
 from axisight.errors import InputError
 
 DIMS = ("frequency_hz", "output", "input")
@@ -88,8 +89,19 @@ def frequency_response(
 
     Raises InputError for shapes that do not fit.
     """
+    frequency_hz = reals("frequency_hz", frequency_hz, "frequencies of shape (n_freq,)", 1)
+    if np.any(np.diff(frequency_hz) <= 0):
+        raise InputError("frequency_hz: expected ascending frequencies")
+    for name, text in (
+        ("estimator", estimator),
+        ("input_unit", input_unit),
+        ("output_unit", output_unit),
+    ):
+        words(name, text)
+    instance("attrs", {} if attrs is None else attrs, dict)
+    response = complex_array("response", response)
     shape = response.shape
-    if len(shape) != 3 or shape[0] != len(frequency_hz):
+    if len(shape) != 3 or shape[0] != len(frequency_hz) or 0 in shape:
         raise InputError(
             f"response: expected shape ({len(frequency_hz)}, n_out, n_in), got {shape}"
         )
@@ -103,13 +115,14 @@ def frequency_response(
         squared["variance"] = np.full(shape, np.nan)
     for name, value in squared.items():
         if value is not None:
-            _expect(name, value, shape)
-            finite = np.where(np.isfinite(value) & known[:, None, None], value, np.nan)
+            given = _expect(name, value, shape)
+            finite = np.where(np.isfinite(given) & known[:, None, None], given, np.nan)
             variables[name] = (DIMS, finite, {"units": f"({unit})^2"})
-    condition = np.full(n, np.nan) if condition is None else condition
-    flag = np.zeros(n, np.int8) if flag is None else flag.astype(np.int8)
-    _expect("condition", condition, (n,))
-    _expect("flag", flag, (n,))
+    condition = _expect("condition", np.full(n, np.nan) if condition is None else condition, (n,))
+    flag = _expect("flag", np.zeros(n, np.int8) if flag is None else flag, (n,))
+    if not np.isin(flag, list(Flag)).all():
+        raise InputError(f"flag: expected flags {', '.join(str(int(f)) for f in Flag)}")
+    condition = np.where(np.isfinite(condition), condition, np.nan)
     # A line without numbers is never good, whatever took them.
     lost = ~known & np.isin(flag, (Flag.GOOD, Flag.ILL_CONDITIONED))
     flag = np.where(lost, Flag.RANK_DEFICIENT, flag).astype(np.int8)
@@ -117,11 +130,13 @@ def frequency_response(
     meanings = {"flag_values": [f.value for f in Flag], "flag_meanings": _meanings()}
     variables["flag"] = (DIMS[:1], flag, meanings)
     if coherence is not None:
-        _expect("coherence", coherence, shape[:2])
+        coherence = _expect("coherence", coherence, shape[:2])
+        coherence = np.where(np.isfinite(coherence), coherence, np.nan)
         variables["coherence"] = (DIMS[:2], coherence, {"units": "1"})
     if degrees_of_freedom is not None:
-        _expect("degrees_of_freedom", degrees_of_freedom, shape)
-        variables["degrees_of_freedom"] = (DIMS, degrees_of_freedom, {"units": "1"})
+        freedom = _expect("degrees_of_freedom", degrees_of_freedom, shape)
+        freedom = np.where(np.isfinite(freedom), freedom, np.nan)
+        variables["degrees_of_freedom"] = (DIMS, freedom, {"units": "1"})
     return xr.Dataset(
         variables,
         coords={
@@ -139,10 +154,37 @@ def frequency_response(
     )
 
 
+def estimate_of(field: str, value: object, *, uncertain: bool = True) -> xr.Dataset:
+    """Return a Dataset as described above; raises InputError for anything else.
+
+    The variance may be absent unless ``uncertain``.
+    """
+    if not isinstance(value, xr.Dataset):
+        raise InputError(f"{field}: expected a frequency response, got {type(value).__name__}")
+    needed: dict[str, tuple[str, ...]] = {
+        "response": DIMS,
+        "frequency_hz": DIMS[:1],
+        "condition": DIMS[:1],
+        "flag": DIMS[:1],
+    }
+    if uncertain:
+        needed["variance"] = DIMS
+    for name, dims in needed.items():
+        if name not in value.variables or value[name].dims != dims:
+            raise InputError(
+                f"{field}: expected a frequency response, with variable {name} over {', '.join(dims)}, got "
+                f"a Dataset with {', '.join(map(str, value.variables)) or 'nothing'}"
+            )
+    return value
+
+
 def _meanings() -> str:
     return " ".join(f.name.lower() for f in Flag)
 
 
-def _expect(name: str, value: NDArray[Any], shape: tuple[int, ...]) -> None:
-    if value.shape != shape:
-        raise InputError(f"{name}: expected shape {shape}, got {value.shape}")
+def _expect(name: str, value: object, shape: tuple[int, ...]) -> NDArray[Any]:
+    array = real_array(value)
+    if array is None or array.shape != shape:
+        got = shown(value) if array is None else str(array.shape)
+        raise InputError(f"{name}: expected real numbers of shape {shape}, got {got}")
+    return array

@@ -8,15 +8,22 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.arguments import Complex, Real
 from axisight.errors import InputError
+from axisight.frf._lines import (
+    Quantity,
+    condition_and_flag,
+    expect_options,
+    line_spectra,
+    lost_lines,
+    output_unit,
+    provenance,
+    spectra,
+    worst_flag,
+)
+from axisight.frf.batch_solve import invert
 from axisight.frf.response import DIMS, Flag, frequency_response
 from axisight.records.periodic import PeriodicRecords
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
-
-SILENT = 1e-12
-"""Share of the largest amplitude that rounding may leave at a line without excitation."""
 
 
 class Spectra(NamedTuple):
@@ -27,7 +34,13 @@ class Spectra(NamedTuple):
     reference: Complex | None
 
 
-def robust_method(records: PeriodicRecords) -> xr.Dataset:
+def robust_method(
+    records: PeriodicRecords,
+    *,
+    quantity: Quantity = "position",
+    remove_drift: bool = True,
+    threads: int = 1,
+) -> xr.Dataset:
     """Return the best linear approximation, with its noise and its distortion variance.
 
     Sources: Pintelon and Schoukens (2012), section 4.3.1; D'haene, Pintelon, Schoukens and
@@ -39,6 +52,8 @@ def robust_method(records: PeriodicRecords) -> xr.Dataset:
         independent in phase, of P >= 2 periods each in steady state. A recorded reference
         with as many channels as inputs is used: responses from it to input and output are
         averaged and divided, which in closed loop is unbiased by noise at the input.
+    quantity, remove_drift, threads
+        As for `mfrf`.
 
     Scatter over the periods is noise; scatter over the realizations is noise and stochastic
     nonlinear distortion together:
@@ -61,6 +76,7 @@ def robust_method(records: PeriodicRecords) -> xr.Dataset:
     Raises InputError for a single period or realization and for experiments that do not
     make whole realizations.
     """
+    expect_options(records, quantity, remove_drift, threads)
     n, total = records.n_inputs, records.n_experiments
     if total % n or total < 2 * n:
         raise InputError(
@@ -70,14 +86,13 @@ def robust_method(records: PeriodicRecords) -> xr.Dataset:
     count, periods = total // n, records.n_periods
     if periods < 2:
         raise InputError("records: expected at least 2 periods to tell the noise, got 1")
-    data = spectra(records, records.lines)
+    data = _spectra(records, quantity, remove_drift, threads)
     condition, flag = excitation(data.input)
     divisor = data.input
     if data.reference is not None:
         divisor = data.reference
         other = excitation(divisor)[1]
-        lost = (other == Flag.RANK_DEFICIENT) | (other == Flag.NO_EXCITATION)
-        worse = (flag == Flag.GOOD) | ((flag == Flag.ILL_CONDITIONED) & lost)
+        worse = (flag == Flag.GOOD) | ((flag == Flag.ILL_CONDITIONED) & lost_lines(other))
         flag = np.where(worse, other, flag)
     weight = inverse(divisor.mean(axis=1), flag)
     response, weight = _divide(data, weight, flag)
@@ -94,54 +109,47 @@ def robust_method(records: PeriodicRecords) -> xr.Dataset:
         condition=condition,
         flag=flag,
         input_unit=records.input_unit,
-        output_unit=records.output_unit,
-        attrs={"n_realizations": count, "n_periods": periods, "degrees_of_freedom": count - 1},
+        output_unit=output_unit(records, quantity),
+        attrs=provenance(records, quantity)
+        | {"n_realizations": count, "degrees_of_freedom": count - 1},
     )
     distortion = count * np.maximum(variance - noise, 0.0)
     result["distortion_variance"] = (DIMS, distortion, {"units": result["variance"].units})
     return result
 
 
-def spectra(records: PeriodicRecords, lines: NDArray[np.int64]) -> Spectra:
-    """Return lines of the DFT of every period."""
+def _spectra(
+    records: PeriodicRecords, quantity: Quantity, remove_drift: bool, threads: int
+) -> Spectra:
+    """Return the excited lines of every period."""
     n = records.n_inputs
+    u, y = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
+    reference = None
+    if records.reference is not None and records.reference.shape[3] == n:
+        r = line_spectra(records.reference, records.lines, threads=threads)
+        reference = by_realization(r, n)
+    return Spectra(by_realization(u, n), by_realization(y, n), reference)
 
-    def transform(signal: Real) -> Complex:
-        out = np.fft.rfft(signal, axis=2)[:, :, lines]
-        out = out.reshape(-1, n, *out.shape[1:])
-        return np.ascontiguousarray(np.moveaxis(out, 1, -1))
 
-    reference = records.reference
-    usable = reference is not None and reference.shape[3] == n
-    return Spectra(
-        transform(records.input),
-        transform(records.output),
-        transform(reference) if usable and reference is not None else None,
-    )
+def by_realization(signal: Complex, n: int) -> Complex:
+    """Turn (line, channel, experiment, period) to the axes of :class:`Spectra`."""
+    lines, channels, experiments, periods = signal.shape
+    parts = signal.reshape(lines, channels, experiments // n, n, periods)
+    return np.ascontiguousarray(parts.transpose(2, 4, 0, 1, 3))
 
 
 def excitation(signal: Complex) -> tuple[Real, NDArray[np.int8]]:
     """Return the worst condition over realizations of the scaled period mean, and flags."""
-    u = signal.mean(axis=1)
-    rows = np.linalg.norm(u, axis=-1)
-    silent = np.any(rows <= SILENT * rows.max(axis=1, keepdims=True), axis=(0, 2))
-    scaled = u / np.where(rows > 0, rows, 1.0)[..., None]
-    values = np.linalg.svd(scaled, compute_uv=False)
-    deficient = np.any(values[..., -1] <= SILENT * values[..., 0], axis=0)
-    good = ~(silent | deficient)
-    condition = np.full(good.shape, np.nan)
-    condition[good] = np.max(values[:, good, 0] / values[:, good, -1], axis=0)
-    flag = np.where(np.nan_to_num(condition) > 1e3, Flag.ILL_CONDITIONED, Flag.GOOD)
-    flag = np.where(deficient, Flag.RANK_DEFICIENT, flag)
-    flag = np.where(silent, Flag.NO_EXCITATION, flag)
-    return condition, flag.astype(np.int8)
+    found = [condition_and_flag(u) for u in signal.mean(axis=1)]
+    conditions, flags = (np.array(part) for part in zip(*found, strict=True))
+    flag = worst_flag(flags)
+    return np.where(lost_lines(flag), np.nan, conditions.max(axis=0)), flag
 
 
 def inverse(matrix: Complex, flag: NDArray[np.int8]) -> Complex:
     """Invert over the last two axes; lines (third last axis) flagged unusable are NaN."""
-    out = np.full(matrix.shape, np.nan, np.complex128)
-    good = (flag == Flag.GOOD) | (flag == Flag.ILL_CONDITIONED)
-    out[..., good, :, :] = np.linalg.inv(matrix[..., good, :, :])
+    out, _ = invert(matrix)
+    out[..., lost_lines(flag), :, :] = np.nan
     return out
 
 

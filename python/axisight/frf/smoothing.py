@@ -9,9 +9,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from axisight.arguments import positive, reals, shown
 from axisight.errors import InputError
 from axisight.frf.confidence import with_freedom
-from axisight.frf.response import Flag
+from axisight.frf.response import Flag, estimate_of
 
 Real = NDArray[np.float64]
 
@@ -23,13 +24,13 @@ def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
     the band it is kept symmetric by narrowing it, so that a straight line stays straight.
     Raises InputError for a bandwidth that is not positive.
     """
-    if not (np.isfinite(bandwidth_hz) and bandwidth_hz > 0):
-        raise InputError(f"bandwidth_hz: expected a positive width, got {bandwidth_hz}")
+    bandwidth_hz = positive("bandwidth_hz", bandwidth_hz)
     frequency = np.asarray(frequency_hz, float)
     spacing = np.min(np.diff(frequency)) if len(frequency) > 1 else 1.0
     # One spacing beyond the outermost line: there a single line is left.
     room = np.minimum(frequency - frequency[0], frequency[-1] - frequency) + spacing
-    width = np.minimum(bandwidth_hz, room) * (1 - 1e-9)
+    # Far below the spacing a line stands alone, however narrow the window.
+    width = np.minimum(max(bandwidth_hz, 1e-3 * spacing), room) * (1 - 1e-9)
     first = np.searchsorted(frequency, frequency - width, side="right")
     count = np.searchsorted(frequency, frequency + width, side="left") - first
     start = np.concatenate([[0], np.cumsum(count)])
@@ -54,14 +55,13 @@ def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = No
 
     Raises InputError for a bandwidth that is not positive, a wrong or negative weight.
     """
-    frequency = dataset["frequency_hz"].values
+    frequency = estimate_of("dataset", dataset)["frequency_hz"].values
     alpha = hann_weights(frequency, bandwidth_hz)
     if weight is not None:
-        weight = np.asarray(weight, float)
+        what = f"{len(frequency)} numbers not below zero"
+        weight = reals("weight", weight, what, 1)
         if weight.shape != frequency.shape or not np.all(weight >= 0):
-            raise InputError(
-                f"weight: expected {len(frequency)} numbers not below zero, got {weight!r}"
-            )
+            raise InputError(f"weight: expected {what}, got {shown(weight.tolist())}")
         alpha = alpha @ diags_array(weight)
     response = dataset["response"].values
     good = np.isfinite(response).all(axis=(1, 2))

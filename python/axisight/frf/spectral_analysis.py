@@ -10,13 +10,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from axisight.arguments import Complex, Real, one_of
 from axisight.errors import InputError
 from axisight.frf._lines import (
     LARGE_CONDITION,
     SMALLEST,
-    Complex,
     Quantity,
-    Real,
+    expect_options,
     output_unit,
     provenance,
     spectra,
@@ -70,8 +70,8 @@ def spectral_analysis(
 
     Raises InputError for a bandwidth not positive or too narrow for the number of inputs.
     """
-    if taper not in ("none", "hann"):
-        raise InputError(f"taper: expected none or hann, got {taper!r}")
+    expect_options(records, quantity, remove_drift, threads)
+    one_of("taper", taper, ("none", "hann"))
     alpha = hann_weights(records.frequency_hz, bandwidth_hz)
     tapered = _tapered(records) if taper == "hann" else records
     u, y = spectra(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from axisight.arguments import Real, positive, words
 from axisight.errors import InputError
+from axisight.records.signal_checks import recorded
 
-Real = NDArray[np.float64]
+_AXES = ("experiment", "sample", "channel")
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,14 @@ class ArbitraryRecords:
 
     def __post_init__(self) -> None:
         """Check everything and hold contiguous float64 arrays."""
-        if not (np.isfinite(self.sample_time_s) and self.sample_time_s > 0):
-            raise InputError(f"sample_time_s: expected a positive time, got {self.sample_time_s}")
+        object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
         for name in ("input", "output"):
-            object.__setattr__(self, name, _signal(name, getattr(self, name)))
+            value = getattr(self, name)
+            single = isinstance(value, np.ndarray) and value.ndim == 2
+            value = recorded(name, value[None] if single else value, _AXES)
+            object.__setattr__(self, name, value)
+        for name in ("input_unit", "output_unit"):
+            words(name, getattr(self, name))
         if self.output.shape[:2] != self.input.shape[:2]:
             raise InputError(
                 f"output: expected (experiment, sample) {self.input.shape[:2]} as the input, "
@@ -67,21 +72,3 @@ class ArbitraryRecords:
     def n_outputs(self) -> int:
         """Number of outputs."""
         return int(self.output.shape[2])
-
-
-def _signal(name: str, value: Real) -> Real:
-    array = np.asarray(value, dtype=np.float64)
-    array = np.ascontiguousarray(array[None] if array.ndim == 2 else array)
-    if array.ndim != 3 or 0 in array.shape:
-        raise InputError(
-            f"{name}: expected axes (experiment, sample, channel), none empty, "
-            f"got shape {np.shape(value)}"
-        )
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        e, n, c = bad[0]
-        raise InputError(
-            f"{name}: expected finite numbers, got {array[e, n, c]} in experiment {e + 1}, "
-            f"sample {n + 1}, channel {c + 1} ({len(bad)} in all)"
-        )
-    return array

@@ -57,8 +57,6 @@ def keep_steady(
 ) -> int:
     """Return how many leading periods to drop, and add what was found."""
     if drop_periods is not None:
-        if drop_periods < 0:
-            raise InputError(f"drop_periods: expected no negative number, got {drop_periods}")
         return drop_periods
     dropped = wait
     for e, signals in enumerate(cut, 1):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import Real, reals
+from axisight.errors import InputError
 from axisight.logs.quality import quantization
-
-Real = NDArray[np.float64]
 
 _LEAST_RUN = 3  # equal samples at the extreme
 _LEAST_TIMES = 2  # times at the same extreme
@@ -24,6 +24,11 @@ def clipped_samples(signal: Real, meant: Real | None = None) -> int:
     a jump from level to level. ``meant`` (n,), e.g. the reference, excuses the samples at which
     it is itself as flat. Soft saturation is not seen.
     """
+    signal = reals("signal", signal, "numbers of shape (n,)", 1)
+    if meant is not None:
+        meant = reals("meant", meant, "numbers of shape (n,)", 1)
+        if meant.shape != signal.shape:
+            raise InputError(f"meant: expected shape {signal.shape} as signal, got {meant.shape}")
     found = quantization(signal)
     threshold = _STEPS * found.step if found is not None else 1e-6 * float(np.ptp(signal))
     flat = None if meant is None else np.diff(meant, append=meant[-1]) == 0.0

@@ -13,14 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from axisight.arguments import Complex, Lines, Real, instance, lines_below, reals, switch
 from axisight.errors import InputError
 from axisight.records.periodic import PeriodicRecords
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Lines = NDArray[np.int64]
 
 _LEAST_FIT = 0.9  # mean resultant length of the phases that are left
 
@@ -56,7 +52,13 @@ def estimate_delay(
     Raises InputError if shapes differ, nothing is excited, or the signal is no delayed copy of
     the excitation (mean resultant length of the remaining phases under 0.9).
     """
-    if signal.shape != excitation.shape or signal.ndim != 1:
+    signal = reals("signal", signal, "numbers of shape (N,)", 1)
+    excitation = reals("excitation", excitation, "numbers of shape (N,)", 1)
+    lines = lines_below("lines", lines, len(signal))
+    switch("free_sign", free_sign)
+    if not lines.size:
+        raise InputError("lines: expected at least one excited line, got none")
+    if signal.shape != excitation.shape:
         raise InputError(f"excitation: expected shape {signal.shape}, got {excitation.shape}")
     n = len(signal)
     cross = (np.fft.rfft(signal) * np.fft.rfft(excitation).conj())[lines]
@@ -100,13 +102,16 @@ def reference_delays(records: PeriodicRecords, excitation: Real | None = None) -
     The strongest reference channel of each experiment is compared. Raises InputError if there
     is no reference, shapes differ, or a reference is no delayed copy of its excitation.
     """
+    instance("records", records, PeriodicRecords)
     if records.reference is None:
         raise InputError("reference: expected one to synchronise by, got records without")
     mean = records.reference.mean(axis=1)
     power = np.abs(np.fft.rfft(mean, axis=1)[:, records.lines]) ** 2
     channel = power.sum(axis=1).argmax(axis=1)
     n_exp, n, n_ref = mean.shape
-    known = mean[0, :, channel[0]] if excitation is None else np.asarray(excitation, float)
+    known = mean[0, :, channel[0]]
+    if excitation is not None:
+        known = reals("excitation", excitation, f"shape ({n},) or ({n_exp}, {n}, {n_ref})", (1, 3))
     if known.shape not in ((n,), (n_exp, n, n_ref)):
         raise InputError(
             f"excitation: expected shape ({n},) or ({n_exp}, {n}, {n_ref}), got {known.shape}"

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from axisight.arguments import Real, real_array, shown
 from axisight.errors import InputError
-
-Real = NDArray[np.float64]
 
 
 def drift_per_period(signal: Real) -> Real:
@@ -20,9 +18,8 @@ def drift_per_period(signal: Real) -> Real:
 
     Raises InputError for fewer than two periods.
     """
+    signal = _periods(signal)
     n_periods = signal.shape[-3]
-    if n_periods < 2:
-        raise InputError(f"signal: expected at least two periods to see drift, got {n_periods}")
     means = signal.mean(axis=-2)
     first, last = np.triu_indices(n_periods, 1)
     slopes = (means[..., last, :] - means[..., first, :]) / (last - first)[:, None]
@@ -36,8 +33,25 @@ def remove_drift(signal: Real) -> Real:
     and acceleration responses then follow from the position DFT, times i w and (i w)^2.
     Raises InputError for fewer than two periods.
     """
+    signal = _periods(signal)
     slope = drift_per_period(signal)
     n_periods, n_samples = signal.shape[-3:-1]
     total = n_periods * n_samples
     ramp = (np.arange(total) - (total - 1) / 2).reshape(n_periods, n_samples) / n_samples
     return np.asarray(signal - ramp[..., None] * slope[..., None, None, :])
+
+
+def _periods(signal: object) -> Real:
+    array = real_array(signal)
+    if (
+        array is None
+        or array.ndim < 3
+        or 0 in array.shape
+        or array.shape[-3] < 2
+        or not np.isfinite(array).all()
+    ):
+        raise InputError(
+            "signal: expected finite numbers of shape (..., n_periods, n_samples, channels) with "
+            f"at least two periods to see drift, got {shown(signal)}"
+        )
+    return np.asarray(array, dtype=np.float64)

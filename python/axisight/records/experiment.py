@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from axisight.arguments import Real, instance, one_of, positive, real_array, words
 from axisight.errors import InputError
 from axisight.logs import Log
-
-Real = NDArray[np.float64]
+from axisight.records.signal_checks import recorded
 
 
 @dataclass(frozen=True)
@@ -39,12 +36,15 @@ class Experiment:
 
     def __post_init__(self) -> None:
         """Check everything and hold float64 arrays (n, channels)."""
-        if not (np.isfinite(self.sample_time_s) and self.sample_time_s > 0):
-            raise InputError(f"sample_time_s: expected a positive time, got {self.sample_time_s}")
+        object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
+        words("name", self.name)
         for name in ("input", "output", "reference"):
             value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, _signal(name, value))
+            if value is not None or name != "reference":
+                array = real_array(value)
+                rows = array[:, None] if array is not None and array.ndim == 1 else value
+                copy = recorded(name, rows, ("sample", "channel")).copy()
+                object.__setattr__(self, name, copy)
         for name in ("output", "reference"):
             value = getattr(self, name)
             if value is not None and len(value) != len(self.input):
@@ -58,21 +58,6 @@ class Experiment:
         return int(self.input.shape[0])
 
 
-def _signal(name: str, value: Real) -> Real:
-    array = np.array(value, dtype=np.float64)
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or 0 in array.shape:
-        raise InputError(f"{name}: expected shape (n, channels), none empty, got {array.shape}")
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        n, c = bad[0]
-        raise InputError(
-            f"{name}: expected finite numbers, got {array[n, c]} at sample {n + 1}, "
-            f"channel {c + 1} ({len(bad)} in all)"
-        )
-    return array
-
-
 def experiment_of_log(
     log: Log, *, output: Literal["position", "velocity", "joint_position"] = "position"
 ) -> Experiment:
@@ -81,11 +66,9 @@ def experiment_of_log(
     Channels are the log's axes. ``output`` names what is the output. Raises InputError if
     the log does not have it, or has it on some axes only.
     """
+    instance("log", log, Log)
+    one_of("output", output, ("position", "velocity", "joint_position"))
     field = {"velocity": "velocity_rad_s"}.get(output, f"{output}_rad")
-    if field not in ("position_rad", "velocity_rad_s", "joint_position_rad"):
-        raise InputError(
-            f"output: expected 'position', 'velocity' or 'joint_position', got {output!r}"
-        )
     values = getattr(log, field)
     if values is None:
         raise InputError(f"output: log {log.name!r} has no {output}")

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.stats import f as f_distribution
 
+from axisight.arguments import Lines, Real, between, number, reals
 from axisight.errors import InputError
-
-Real = NDArray[np.float64]
-Lines = NDArray[np.int64]
 
 _HALF_WIDTH = 10  # lines on either side that share one noise level
 
@@ -41,6 +39,8 @@ def repeating_lines(periods: Real, significance: float = 1e-4) -> NDArray[np.boo
     ``significance`` is the probability of one false line among all of them (Bonferroni).
     Line 0 is never reported.
     """
+    periods = reals("periods", periods, "numbers of shape (n_periods, n_samples)", 2)
+    significance = between("significance", significance, 0, 1)
     n_periods = len(periods)
     if n_periods < 2:
         raise InputError(
@@ -52,7 +52,7 @@ def repeating_lines(periods: Real, significance: float = 1e-4) -> NDArray[np.boo
     width = min(2 * _HALF_WIDTH + 1, len(variance))
     pooled = np.maximum(uniform_filter1d(variance, width, mode="nearest"), _rounding(mean))
     degrees = 2 * width * (n_periods - 1)
-    limit = f_distribution.isf(significance / len(mean), 2, degrees)
+    limit = scipy.stats.f.isf(significance / len(mean), 2, degrees)
     found: NDArray[np.bool_] = n_periods * mean > limit * pooled
     found[0] = False
     return found
@@ -73,7 +73,14 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
 
     Raises InputError if nothing is excited.
     """
+    what = "numbers of shape (n_experiments, n_periods, n_samples, n_channels)"
+    signal = reals("signal", signal, what, 4)
+    floor_db = number("floor_db", floor_db)
+    if floor_db >= 0:
+        raise InputError(f"floor_db: expected below zero, got {floor_db}")
     n_experiments, n_periods, n_samples, n_channels = signal.shape
+    if n_samples < 3:
+        raise InputError(f"signal: expected three samples a period or more, got {n_samples}")
     n_lines = (n_samples + 1) // 2
     spectra = np.abs(np.fft.rfft(signal.mean(1), axis=1))[:, :n_lines]
     spectra[:, 0] = 0.0

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+import scipy
 
+from axisight.arguments import Real, reals
 from axisight.errors import InputError
 from axisight.records.lines import repeating_lines
-
-Real = NDArray[np.float64]
 
 _LEAST_REPETITION = 0.5  # as much noise as signal
 _INTEGER_TOLERANCE = 0.05  # samples over the whole record
@@ -50,7 +48,7 @@ def autocorrelation(x: Real) -> Real:
     ``2 sum x(n) x(n + L) / sum (x(n)^2 + x(n + L)^2)`` over the overlap (McLeod and Wyvill,
     2005): within [-1, 1], and 1 only where the signal repeats exactly.
     """
-    products = fftconvolve(x, x[::-1])[len(x) - 1 :]
+    products = scipy.signal.fftconvolve(x, x[::-1])[len(x) - 1 :]
     energy = np.concatenate(([0.0], np.cumsum(x * x)))
     lags = np.arange(len(x))
     both = energy[len(x) - lags] + (energy[-1] - energy[lags])
@@ -71,7 +69,8 @@ def find_period(signal: Real) -> Period:
     Raises InputError if the signal is constant, does not repeat (autocorrelation below 0.5), or
     repeats after a number of samples that is not whole.
     """
-    x = np.atleast_2d(np.asarray(signal, float).T)
+    signal = reals("signal", signal, "numbers of shape (n,) or (n, channels)", (1, 2))
+    x = np.atleast_2d(signal.T)
     x = x - x.mean(axis=1, keepdims=True)
     scale = np.sqrt(np.mean(x * x, axis=1))
     active = scale > 1e-6 * max(scale.max(), np.finfo(float).tiny)

@@ -11,12 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from axisight.arguments import Lines, Real, lines_below, positive, words
 from axisight.errors import InputError
+from axisight.records.signal_checks import recorded
 
-Real = NDArray[np.float64]
-Lines = NDArray[np.int64]
+_AXES = ("experiment", "period", "sample", "channel")
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,11 @@ class PeriodicRecords:
 
     def __post_init__(self) -> None:
         """Check everything and hold contiguous float64 arrays."""
-        if not (np.isfinite(self.sample_time_s) and self.sample_time_s > 0):
-            raise InputError(f"sample_time_s: expected a positive time, got {self.sample_time_s}")
+        object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
         for name in ("input", "output", "reference"):
             value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, _signal(name, value))
+            if value is not None or name != "reference":
+                object.__setattr__(self, name, recorded(name, value, _AXES))
         for name in ("output", "reference"):
             value = getattr(self, name)
             if value is not None and value.shape[:3] != self.input.shape[:3]:
@@ -69,24 +68,14 @@ class PeriodicRecords:
                     f"as the input, got {value.shape[:3]}"
                 )
         for name in ("lines", "detection_lines"):
-            object.__setattr__(self, name, self._lines(name))
+            object.__setattr__(self, name, lines_below(name, getattr(self, name), self.n_samples))
         if not len(self.lines):
             raise InputError("lines: expected at least one excited line, got none")
-
-    def _lines(self, name: str) -> Lines:
-        lines = np.asarray(getattr(self, name))
-        if lines.ndim != 1 or (lines.size and not np.array_equal(lines, lines.astype(np.int64))):
-            raise InputError(f"{name}: expected a list of whole numbers, got {lines!r}")
-        lines = lines.astype(np.int64)
-        limit = self.n_samples / 2
-        outside = lines[(lines < 1) | (lines >= limit)]
-        if outside.size:
-            raise InputError(
-                f"{name}: expected lines from 1 to below {limit:g} (Nyquist), got {outside[0]}"
-            )
-        if np.any(np.diff(lines) <= 0):
-            raise InputError(f"{name}: expected ascending lines without repetition")
-        return lines
+        twice = np.intersect1d(self.lines, self.detection_lines)
+        if twice.size:
+            raise InputError(f"detection_lines: expected lines without excitation, got {twice[0]}")
+        for name in ("input_unit", "output_unit"):
+            words(name, getattr(self, name))
 
     @property
     def n_experiments(self) -> int:
@@ -117,20 +106,3 @@ class PeriodicRecords:
     def frequency_hz(self) -> Real:
         """Frequencies of the excited lines [Hz]."""
         return np.asarray(self.lines / (self.n_samples * self.sample_time_s))
-
-
-def _signal(name: str, value: Real) -> Real:
-    array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.ndim != 4 or 0 in array.shape:
-        raise InputError(
-            f"{name}: expected axes (experiment, period, sample, channel), none empty, "
-            f"got shape {array.shape}"
-        )
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        e, p, n, c = bad[0]
-        raise InputError(
-            f"{name}: expected finite numbers, got {array[e, p, n, c]} in experiment {e + 1}, "
-            f"period {p + 1}, sample {n + 1}, channel {c + 1} ({len(bad)} in all)"
-        )
-    return array

@@ -7,8 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from axisight.arguments import (
+    Lines,
+    Real,
+    between,
+    instance,
+    lines_below,
+    not_negative,
+    positive,
+    several,
+    switch,
+    whole,
+    words,
+)
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.records.checks import check_clipping, check_repetition, keep_steady
@@ -19,9 +31,6 @@ from axisight.records.findings import FindingKind, RecordFinding
 from axisight.records.lines import excited_lines
 from axisight.records.period import Period, find_period, not_whole
 from axisight.records.periodic import PeriodicRecords
-
-Real = NDArray[np.float64]
-Lines = NDArray[np.int64]
 
 _DRIFT_LIMIT = 0.01  # samples over the whole record that rounding of a given period may cost
 _CLEAR_MARGIN_DB = 6.0
@@ -103,30 +112,40 @@ def prepare_records(
     the field for signals that do not fit together, a period that is not whole, differs between
     experiments, does not fit the signals or exceeds them, and all that PeriodicRecords refuses.
     """
-    runs = [e if isinstance(e, Experiment) else experiment_of_log(e) for e in experiments]
+    given = several("experiments", experiments)
+    for e in given:
+        instance("experiments", e, Experiment, Log)
+    runs = [e if isinstance(e, Experiment) else experiment_of_log(e) for e in given]
     _expect_alike(runs)
     sample_time_s = runs[0].sample_time_s
-    if skip_s < 0 or waiting_time_s < 0:
-        raise InputError(
-            f"skip_s, waiting_time_s: expected no negative time, got {skip_s}, {waiting_time_s}"
-        )
-    start = math.ceil(skip_s / sample_time_s - 1e-6)
+    significance = between("significance", significance, 0, 1)
+    drift, synchronise = switch("drift", drift), switch("synchronise", synchronise)
+    for name, unit in (("input_unit", input_unit), ("output_unit", output_unit)):
+        words(name, unit)
+    if drop_periods is not None:
+        drop_periods = whole("drop_periods", drop_periods, 0)
+    start = _samples("skip_s", skip_s, runs, 1e-6)
     findings: list[RecordFinding] = []
-    period = _period(experiments, runs, period_s, start, findings)
+    period = _period(given, runs, period_s, start, findings)
     n = period.n_samples
+    free = lines_below("detection_lines", detection_lines, n)
+    if lines is not None:
+        lines = lines_below("lines", lines, n)
+        if not lines.size:
+            raise InputError("lines: expected at least one excited line, got none")
     starts = [start] * len(runs)
     cut = _cut(runs, starts, n)
     excited = _excited(cut, lines, findings)
     delays: list[Delay] = []
     if synchronise:
-        rough = _records(sample_time_s, _equal(cut), excited, detection_lines)
+        rough = _records(sample_time_s, _equal(cut), excited, free)
         delays = reference_delays(rough, excitation)
         starts = [start + round(d.samples) % n for d in delays]
         cut = _cut(runs, starts, n)
         findings += _delay_findings(delays)
     findings += check_clipping(runs, start)
-    wait = math.ceil(waiting_time_s / (n * sample_time_s) - 1e-9)
-    last = int(np.max([*excited, *detection_lines]))
+    wait = -(-_samples("waiting_time_s", waiting_time_s, runs, 1e-9 * n) // n)
+    last = int(np.max([*excited, *free]))
     judged = [_without_drift(c) for c in cut] if drift else cut
     dropped = keep_steady(judged, wait, drop_periods, last, significance, findings)
     counts = [len(c["input"]) - dropped for c in cut]
@@ -147,11 +166,16 @@ def prepare_records(
             {k: advance(v, d.samples - round(d.samples)) for k, v in c.items()}
             for c, d in zip(kept, delays, strict=True)
         ]
-    records = _records(
-        sample_time_s, _stack(kept), excited, detection_lines, (input_unit, output_unit)
-    )
+    records = _records(sample_time_s, _stack(kept), excited, free, (input_unit, output_unit))
     findings += check_repetition(records)
     return Prepared(records, period, dropped, tuple(delays), tuple(findings))
+
+
+def _samples(field: str, seconds: float, runs: list[Experiment], slack: float) -> int:
+    """Samples that begin in a time, at most all there are."""
+    count = not_negative(field, seconds) / runs[0].sample_time_s
+    longest = max(run.n_samples for run in runs)
+    return math.ceil(count - slack) if count < longest else longest
 
 
 def _expect_alike(runs: list[Experiment]) -> None:
@@ -174,7 +198,7 @@ def _expect_alike(runs: list[Experiment]) -> None:
 
 
 def _period(
-    experiments: Sequence[Experiment | Log],
+    experiments: list[Experiment | Log],
     runs: list[Experiment],
     period_s: float | None,
     start: int,
@@ -189,9 +213,9 @@ def _period(
         period_s = noted.pop() if noted else None
     if period_s is None:
         return _found_period(runs, start, findings)
-    if not (math.isfinite(period_s) and period_s > 0):
-        raise InputError(f"period_s: expected a positive time, got {period_s}")
-    samples = period_s / sample_time_s
+    samples = positive("period_s", period_s) / sample_time_s
+    if not math.isfinite(samples):
+        raise InputError(f"period_s: expected at most the experiment, got {period_s} s")
     n_periods = int((shortest + 0.5) // samples)
     if abs(samples - round(samples)) * max(n_periods, 1) > _DRIFT_LIMIT or round(samples) < 3:
         raise InputError(not_whole(samples))
@@ -265,7 +289,7 @@ def _records(
     sample_time_s: float,
     signals: Signals,
     lines: Lines,
-    detection_lines: Sequence[int] | Lines,
+    detection_lines: Lines,
     units: tuple[str, str] = ("", ""),
 ) -> PeriodicRecords:
     return PeriodicRecords(
@@ -276,15 +300,13 @@ def _records(
         reference=signals.get("reference"),
         input_unit=units[0],
         output_unit=units[1],
-        detection_lines=np.asarray(detection_lines, dtype=np.int64),
+        detection_lines=detection_lines,
     )
 
 
-def _excited(
-    cut: list[Signals], lines: Sequence[int] | Lines | None, findings: list[RecordFinding]
-) -> Lines:
+def _excited(cut: list[Signals], lines: Lines | None, findings: list[RecordFinding]) -> Lines:
     if lines is not None:
-        return np.asarray(lines)
+        return lines
     source = "reference" if "reference" in cut[0] else "input"
     found = excited_lines(_equal(cut)[source])
     unsure = found.margin_db < _CLEAR_MARGIN_DB

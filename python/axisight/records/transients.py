@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
 
+from axisight.arguments import Real, between, positive, reals, whole
 from axisight.errors import InputError
 
-Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _BAND = 8  # lines judged together
@@ -23,11 +23,14 @@ def mode_time_constant_s(frequency_hz: float, damping_ratio: float) -> float:
     ``frequency_hz`` is its undamped frequency, ``damping_ratio`` lies in (0, 1]. Raises
     InputError otherwise.
     """
-    _positive("frequency_hz", frequency_hz)
-    _positive("damping_ratio", damping_ratio)
+    positive("frequency_hz", frequency_hz)
+    positive("damping_ratio", damping_ratio)
     if damping_ratio > 1:
         raise InputError(f"damping_ratio: expected at most 1, got {damping_ratio}")
-    return 1.0 / (damping_ratio * 2 * math.pi * frequency_hz)
+    rate = damping_ratio * 2 * math.pi * frequency_hz
+    if not math.isfinite(1.0 / rate if rate else math.inf):
+        raise InputError(f"frequency_hz, damping_ratio: expected a decay, got {rate:g} 1/s")
+    return 1.0 / rate
 
 
 def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: float) -> float:
@@ -40,16 +43,14 @@ def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: flo
 
     Raises InputError unless all three are positive.
     """
-    _positive("time_constant_s", time_constant_s)
-    _positive("record_s", record_s)
-    _positive("signal_to_noise", signal_to_noise)
-    argument = signal_to_noise**2 * time_constant_s / (2 * record_s)
-    return max(0.0, 0.5 * time_constant_s * math.log(argument))
-
-
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise InputError(f"{name}: expected a positive number, got {value}")
+    tau, total = positive("time_constant_s", time_constant_s), positive("record_s", record_s)
+    # Logarithms one by one: the square of a large ratio overflows.
+    logarithm = 2 * math.log(positive("signal_to_noise", signal_to_noise))
+    logarithm += math.log(tau) - math.log(2) - math.log(total)
+    wait = max(0.0, 0.5 * tau * logarithm)
+    if not math.isfinite(wait):
+        raise InputError(f"time_constant_s: expected a shorter time, got {tau}")
+    return wait
 
 
 @dataclass(frozen=True)
@@ -99,12 +100,16 @@ def steady_state(
 
     Raises InputError for fewer than three periods.
     """
+    what = "numbers of shape (n_periods, n_samples, n_channels)"
+    signals = reals("signals", signals, what, 3)
     n_periods, n_samples, _ = signals.shape
     if n_periods < 3:
         raise InputError(f"signals: expected three periods or more, got {n_periods}")
-    if not 0 < significance < 1:
-        raise InputError(f"significance: expected a probability, got {significance}")
-    stop = (n_samples + 1) // 2 if last_line is None else last_line + 1
+    if n_samples < 3:
+        raise InputError(f"signals: expected three samples a period or more, got {n_samples}")
+    significance = between("significance", significance, 0, 1)
+    highest = (n_samples - 1) // 2
+    stop = 1 + (highest if last_line is None else whole("last_line", last_line, 1, highest))
     spectra = np.fft.rfft(signals, axis=1)[:, 1:stop]
     n_steady = max(2, (n_periods + 1) // 2)
     steady = spectra[-n_steady:]
@@ -134,5 +139,5 @@ def _worst_band(square: Real, noise: Real, n_steady: int) -> tuple[float, float]
     # E s^4 of a variance from R - 1 complex degrees of freedom is larger than its square.
     spread = np.add.reduceat(noise**2, edges, axis=0) / (1 + 1 / (n_steady - 1))
     lines = np.clip(level**2 / spread, 1.0, size)
-    p = np.asarray(f_distribution.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))
+    p = np.asarray(scipy.stats.f.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))
     return min(1.0, float(p.min()) * p.size), float(np.sqrt(ratio.max()))

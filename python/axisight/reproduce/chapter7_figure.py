@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 
 LABEL = "magnitude [rad s$^{-2}$/Nm]"
 # All responses of the chapter fit; the same for all figures, so that they can be compared.
-_LIMITS = (0.05, 3000.0)
+_LIMITS = (0.02, 8000.0)
 
 _REFERENCE: dict[str, object] = {"color": "#b4b4b4", "lw": 2.2}
 _THIN: dict[str, object] = {"color": AFTER, "lw": 0.7}

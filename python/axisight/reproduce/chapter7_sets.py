@@ -46,7 +46,7 @@ def different(
 
 
 def many(context: Context, design: Design = STANDARD, machine: Machine = REAL) -> Complex:
-    """Return estimates of twenty realizations, (realization, n_freq, 3, 3)."""
+    """Return estimates of twenty realizations (quick: six), (realization, n_freq, 3, 3)."""
     return different(context, design, machine, 6 if context.quick else 20)
 
 

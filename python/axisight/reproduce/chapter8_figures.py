@@ -78,6 +78,8 @@ def error_item(name: str, design: Design, found: list[Experiments], true: Comple
     mean = errors.mean(axis=0)
     curves = [Curve(frequency, errors[0], "one realization", FAINT)]
     name_of_mean = f"mean of {len(found)}"
+    if len(found) == 1:  # the mean of one is that one
+        curves, name_of_mean = [], "one realization"
     if design.square:
         at = square_lines(excited_lines())
         curves.append(Curve(frequency[~at], mean[~at], name_of_mean, MEAN))

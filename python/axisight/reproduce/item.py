@@ -25,7 +25,7 @@ class Claim:
     statement
         What it says, in own words.
     holds
-        What the computation gave.
+        What the computation gave; None where the spread over realizations decides neither way.
     evidence
         The computed figures behind it.
     """
@@ -33,8 +33,13 @@ class Claim:
     id: str
     section: str
     statement: str
-    holds: bool
+    holds: bool | None
     evidence: str
+
+    @property
+    def verdict(self) -> str:
+        """``"yes"``, ``"no"`` or ``"undecided"``."""
+        return "undecided" if self.holds is None else "yes" if self.holds else "no"
 
 
 @dataclass(frozen=True)
@@ -53,8 +58,8 @@ class Item:
 
 
 Make = Callable[[Context], Item]
-Result = tuple[bool, str]
-"""Whether a statement holds, and the evidence."""
+Result = tuple[bool | None, str]
+"""Whether a statement holds (None: undecided), and the evidence."""
 Check = Callable[[Context], Result]
 
 

@@ -1,6 +1,6 @@
 //! DFT lines of every period of every experiment.
 
-use crate::signal::{LineDft, LineDftScratch, Threads};
+use crate::signal::{LineDft, LineDftScratch, Threads, line_plan};
 use nalgebra::Complex;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -39,14 +39,8 @@ pub struct LineSpectra {
 impl LineSpectra {
     /// For signals of these numbers of channels, periods of `samples`.
     pub fn new(channels: &[usize], samples: usize, lines: &[usize]) -> Self {
-        let mut plans: Vec<Arc<LineDft>> = Vec::new();
-        for (i, count) in channels.iter().enumerate() {
-            let same = channels[..i].iter().position(|other| other == count);
-            plans.push(match same {
-                Some(same) => Arc::clone(&plans[same]),
-                None => Arc::new(LineDft::new(samples, *count, lines)),
-            });
-        }
+        let plan = |count: &usize| line_plan(samples, *count, lines);
+        let plans = channels.iter().map(plan).collect();
         Self {
             lines: lines.to_vec(),
             plans,

@@ -1,0 +1,203 @@
+"""Checks of arguments: what is wrong is named, whatever its type; nothing is guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Lines = NDArray[np.int64]
+T = TypeVar("T")
+
+_MOST_THREADS = 1024
+
+
+def shown(value: object) -> str:
+    """Return a value for a message, cut where it is long."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of {value.dtype} with shape {value.shape}"
+    text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _array(value: object, kinds: str) -> NDArray[Any] | None:
+    """Return an array of one of these kinds of numbers, or None."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):  # lists of unequal lengths, strange objects
+        return None
+    return array if array.dtype.kind in kinds or not array.size else None
+
+
+def real_array(value: object) -> NDArray[Any] | None:
+    """Return an array of real numbers of any shape, or None."""
+    return _array(value, "biuf")
+
+
+def complex_array(field: str, value: object) -> Complex:
+    """Return complex numbers of any shape, finite or not."""
+    array = _array(value, "biufc")
+    if array is None:
+        raise InputError(f"{field}: expected complex numbers, got {shown(value)}")
+    return np.asarray(array, dtype=np.complex128)
+
+
+def number(field: str, value: object, what: str = "a finite number") -> float:
+    """Return a finite number."""
+    array = _array(value, "iuf")
+    if array is None or array.ndim or not np.isfinite(array):
+        raise InputError(f"{field}: expected {what}, got {shown(value)}")
+    return float(array)
+
+
+def positive(field: str, value: object) -> float:
+    """Return a positive finite number."""
+    what = "a positive number"
+    if not (found := number(field, value, what)) > 0:
+        raise InputError(f"{field}: expected {what}, got {shown(value)}")
+    return found
+
+
+def not_negative(field: str, value: object) -> float:
+    """Return a finite number from zero on."""
+    what = "a number not below zero"
+    if not (found := number(field, value, what)) >= 0:
+        raise InputError(f"{field}: expected {what}, got {shown(value)}")
+    return found
+
+
+def between(field: str, value: object, low: float, high: float) -> float:
+    """Return a number between ``low`` and ``high``, neither included."""
+    what = f"a number between {low:g} and {high:g}"
+    if not low < (found := number(field, value, what)) < high:
+        raise InputError(f"{field}: expected {what}, got {shown(value)}")
+    return found
+
+
+def whole(field: str, value: object, least: int = 1, most: int = 2**31 - 1) -> int:
+    """Return a whole number from ``least`` to ``most``."""
+    array = _array(value, "iuf")
+    if (
+        array is None
+        or array.ndim
+        or not np.isfinite(array)
+        or int(array) != array
+        or not least <= int(array) <= most
+    ):
+        range_ = f"from {least}" if most == 2**31 - 1 else f"{least} to {most}"
+        raise InputError(f"{field}: expected a whole number {range_}, got {shown(value)}")
+    return int(array)
+
+
+def seed_of(field: str, seed: object) -> int:
+    """Return a seed or the number of a run."""
+    array = _array(seed, "iu")
+    if array is None or array.ndim or not 0 <= int(array) < 1 << 64:
+        raise InputError(f"{field}: expected a whole number, 0 to 2^64 - 1, got {shown(seed)}")
+    return int(array)
+
+
+def threads_of(value: object) -> int:
+    """Return a number of threads; 0 stands for every core."""
+    return whole("threads", value, 0, _MOST_THREADS)
+
+
+def switch(field: str, value: object) -> bool:
+    """Return True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{field}: expected True or False, got {shown(value)}")
+    return bool(value)
+
+
+def one_of(field: str, value: object, known: Iterable[str]) -> str:
+    """Return one of the known words."""
+    names = list(known)
+    if not isinstance(value, str) or value not in names:
+        raise InputError(f"{field}: expected one of {', '.join(names)}, got {shown(value)}")
+    return value
+
+
+def words(field: str, value: object) -> str:
+    """Return text."""
+    if not isinstance(value, str):
+        raise InputError(f"{field}: expected text, got {shown(value)}")
+    return value
+
+
+def instance(field: str, value: object, *kinds: type[T]) -> T:
+    """Return an object of one of these types."""
+    if not isinstance(value, kinds):
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"{field}: expected {expected}, got {type(value).__name__}")
+    return value
+
+
+def path_of(field: str, value: object) -> Path:
+    """Return a path."""
+    if not isinstance(value, str | PathLike) or "\0" in str(value):
+        raise InputError(f"{field}: expected a path, got {shown(value)}")
+    return Path(value)
+
+
+def several(field: str, value: object) -> list[Any]:
+    """Return the items of a list, tuple or array."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise InputError(f"{field}: expected a list, got {shown(value)}")
+    return list(value)
+
+
+def reals(field: str, value: object, what: str, ndim: int | tuple[int, ...]) -> Real:
+    """Return finite numbers (a copy only where needed); none of the axes is empty."""
+    array = _array(value, "biuf")
+    _expect(field, value, array, what, ndim)
+    return np.asarray(array, dtype=np.float64)
+
+
+def complexes(field: str, value: object, what: str, ndim: int | tuple[int, ...]) -> Complex:
+    """Return finite complex numbers (a copy only where needed); none of the axes is empty."""
+    array = _array(value, "biufc")
+    _expect(field, value, array, what, ndim)
+    return np.asarray(array, dtype=np.complex128)
+
+
+def _expect(
+    field: str, value: object, array: NDArray[Any] | None, what: str, ndim: int | tuple[int, ...]
+) -> None:
+    allowed = (ndim,) if isinstance(ndim, int) else ndim
+    if array is None or array.ndim not in allowed or 0 in array.shape:
+        got = shown(value) if array is None else f"shape {array.shape}"
+        raise InputError(f"{field}: expected {what}, got {got}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        place = ", ".join(str(i) for i in bad[0])
+        where = f" at [{place}] ({len(bad)} in all)" if array.ndim else ""
+        raise InputError(f"{field}: expected {what}, finite, got {array[tuple(bad[0])]}{where}")
+
+
+def lines_below(field: str, value: object, n_samples: int) -> Lines:
+    """Return ascending lines from 1 to below the Nyquist line of ``n_samples``; may be none."""
+    array = _array(value, "iuf")
+    if (
+        array is None
+        or array.ndim != 1
+        or not np.isfinite(array).all()
+        or not np.array_equal(array, np.round(array))
+    ):
+        raise InputError(f"{field}: expected a list of whole numbers, got {shown(value)}")
+    outside = array[(array < 1) | (array >= n_samples / 2)]
+    if outside.size:
+        raise InputError(
+            f"{field}: expected lines from 1 to below {n_samples / 2:g} (Nyquist), got {outside[0]}"
+        )
+    lines = array.astype(np.int64)
+    if np.any(np.diff(lines) <= 0):
+        raise InputError(f"{field}: expected ascending lines without repetition")
+    return lines

@@ -1,0 +1,75 @@
+"""Verdicts from the spread over realizations, and what a quick run writes and draws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from scipy import stats
+
+from axisight.reproduce import Claim, Item, write_claims, write_item
+from axisight.reproduce.chapter8_figures import error_item
+from axisight.reproduce.chapter8_setting import Design, excited_lines
+from axisight.reproduce.chapter8_study import Experiments
+from axisight.reproduce.decision import all_of, interval, positive
+
+
+def test_verdict_is_that_of_students_test():
+    rng = np.random.default_rng(1)
+    seen = set()
+    for mean in np.linspace(-2, 2, 41):
+        values = mean + rng.normal(size=6)
+        expected = stats.ttest_1samp(values, 0).pvalue < 0.05
+        verdict = positive(values)
+        assert (verdict is not None) == expected
+        assert verdict is None or verdict == (values.mean() > 0)
+        seen.add(verdict)
+    assert seen == {True, False, None}
+
+
+def test_one_value_decides_nothing_and_equal_ones_do():
+    assert positive([1.0]) is None
+    assert positive([1.0, 1.0]) is True
+    assert interval([1.0, 2.0, 3.0]) == f"+2.00 ± {stats.t.ppf(0.975, 2) / np.sqrt(3):.2f}"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [((True, True), True), ((True, None), None), ((None, False), False), ((False, True), False)],
+)
+def test_several_verdicts(verdicts, expected):
+    assert all_of(verdicts) is expected
+
+
+def test_claims_say_undecided(tmp_path):
+    claims = [Claim(str(v), "1", "x", v, "y") for v in (True, False, None)]
+    table, page = write_claims(claims, tmp_path)
+    assert list(pd.read_csv(table)["holds"]) == ["yes", "no", "undecided"]
+    assert "1 of 3 hold on this robot, 1 are undecided." in page.read_text()
+    assert "**undecided**" in page.read_text()
+
+
+def test_quick_writes_one_small_picture(tmp_path):
+    figure = Figure(figsize=(2, 1))
+    made = Item("figure-1.1", "x", {}, {"": figure})
+    (only,) = write_item(made, tmp_path, quick=True)
+    assert only.suffix == ".png"
+    both = write_item(made, tmp_path)
+    assert [path.suffix for path in both] == [".pdf", ".png"]
+    assert both[0].stat().st_size > 0
+
+
+def test_the_mean_of_one_realization_is_not_drawn():
+    lines = excited_lines()
+    nothing = np.ones((len(lines), 3, 3), complex)
+    one = Experiments(lines / 10, nothing, nothing, nothing, nothing, 1.1 * nothing)
+    design = Design("T1", square=False)
+
+    def labels(found):
+        figure = error_item("figure-8.4", design, found, nothing).figures[""]
+        return [text.get_text() for text in figure.legends[0].get_texts()]
+
+    assert labels([one]) == ["one realization"]
+    two = [one, replace(one, estimate=0.8 * nothing)]
+    assert labels(two) == ["one realization", "mean of 2"]
