@@ -23,6 +23,8 @@ SAMPLE_S = 5e-4
 # Table 9.1: model m3, and the initial model m0.
 TRUTH = np.array([0.0121, 1130.0, 1.46e6, 3.72e10, 2630.0, 0.013, 0.644])
 START = np.array([0.0123, 790.0, 0.814e6, 5.4e10, 0.0, 0.0136, 0.642])
+KP, KI = 1.0, 20.0
+# Runge-Kutta steps per sample of the records.
 CRUMBS = 64
 
 
@@ -57,11 +59,11 @@ def simulate(p, u, r, h, out):
 
 
 @numba.njit(error_model="numpy")
-def closed_loop(p, reference, noise, r, h, kp, ki, crumbs, u, y):
-    """PI velocity loop; ``y`` is the measured velocity, noise in the loop."""
+def closed_loop(p, reference, r, h, kp, ki, crumbs, u, y):
+    """PI velocity loop; ``y`` is the motor velocity at the samples."""
     x1, x2, x3, integral = 0.0, 0.0, 0.0, 0.0
     for k in range(reference.size):
-        y[k] = x2 + noise[k]
+        y[k] = x2
         error = reference[k] - y[k]
         u[k] = kp * error + ki * integral
         integral += h * error
@@ -147,13 +149,12 @@ def references(seed: int = 1) -> list[Array]:
     return out
 
 
-def records(noise: list[Array] | None = None, seed: int = 1) -> list[Record]:
-    """The three records of the loop, with velocity noise in the loop if any."""
+def records(crumbs: int = CRUMBS, seed: int = 1) -> list[Record]:
+    """The three records of the loop, the plant in ``crumbs`` steps per sample."""
     out = []
-    for i, reference in enumerate(references(seed)):
+    for reference in references(seed):
         u, y = np.empty_like(reference), np.empty_like(reference)
-        e = np.zeros_like(reference) if noise is None else noise[i]
-        closed_loop(TRUTH, reference, e, RATIO, SAMPLE_S, 1.0, 20.0, CRUMBS, u, y)
+        closed_loop(TRUTH, reference, RATIO, SAMPLE_S, KP, KI, crumbs, u, y)
         out.append(Record(u, y))
     return out
 

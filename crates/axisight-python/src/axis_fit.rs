@@ -7,6 +7,7 @@ use axisight_graybox::axis::{
     SearchResult, SearchStatus, search,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 /// Structure of the model, as Python hands it over.
@@ -93,7 +94,10 @@ fn status(status: SearchStatus) -> &'static str {
 }
 
 fn fit_error(error: AxisError) -> PyErr {
-    input_error(error)
+    match error {
+        AxisError::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
+        other => input_error(other),
+    }
 }
 
 /// Outcome of a search: status, parameters, loss, initial loss, iterations, evaluations,

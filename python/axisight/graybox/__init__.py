@@ -18,6 +18,7 @@ from axisight.graybox.landmarks import (
     find_resonance,
     high_frequency_gain,
 )
+from axisight.graybox.multistart import AxisMultistart, multistart_axis
 from axisight.graybox.prediction_error import FitSettings, fit_axis
 from axisight.graybox.procedure import (
     AxisIdentification,
@@ -42,6 +43,7 @@ __all__ = [
     "AxisFit",
     "AxisIdentification",
     "AxisModel",
+    "AxisMultistart",
     "AxisParameter",
     "ChainFit",
     "Collocated",
@@ -69,6 +71,7 @@ __all__ = [
     "identify_axis",
     "initial_flexibility",
     "initial_model",
+    "multistart_axis",
     "reconstruct_chain",
     "residual_tests",
     "rigid_body_friction",

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Output = Literal["velocity", "velocity_difference", "position"]
 Hold = Literal["zero", "first"]
 
-MOST_MASSES = 5
+MOST_MASSES = 4
 # Torque, output, sample time, weight, samples of a block.
 CoreRecord: TypeAlias = tuple[Array, Array, float, float, int]
 OUTPUT_UNIT = {"velocity": "rad/s", "velocity_difference": "rad/s", "position": "rad"}
@@ -47,7 +47,7 @@ class AxisModel:
     springs and the speeds of the masses; the motor angle is one where something needs it.
 
     =========================  ===========================================================
-    ``n_masses``               2 to 5, the motor included
+    ``n_masses``               2 to 4, the motor included
     ``gear_ratio``             r, positive; known unless ``r`` is freed in the fit
     ``cubic``                  which springs have a cubic term (one flag each; gear first)
     ``friction_smoothing_rad_s``  0: F_c sgn(speed), the sign followed exactly, a standing motor

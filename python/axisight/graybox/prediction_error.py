@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 NoiseKind = Literal["output_error", "innovations", "ar"]
 
 # Shares of the speed error fed back in rounds before the fit proper, see `FitSettings`.
-GRADUAL = (0.05, 0.005)
+GRADUAL = (0.2, 0.02)
 # Where the search for the innovations gains starts.
 FIRST_GAIN = 0.02
 
@@ -145,10 +145,7 @@ def fit_axis(
         )
     token = _core.CancelToken()
     point = first_point(task, values)
-    for gain in task.settings.gradual:
-        held = replace(point, gains=rigid_gains(model, values["r"], gain), predicts=True)
-        point = search(task, held, token)
-    point = search(task, replace(point, gains=(), predicts=False), token)
+    point = search_rounds(task, point, values["r"], token)
     if noise_model == "innovations":
         gains = rigid_gains(model, values["r"], FIRST_GAIN)
         point = search(task, replace(point, gains=gains, predicts=True, free_gains=True), token)
@@ -313,6 +310,15 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
         iterations=point.iterations + iterations,
         evaluations=point.evaluations + evaluations,
     )
+
+
+def search_rounds(task: Task, point: Point, ratio: float, token: _core.CancelToken) -> Point:
+    """Minimize the output error, in the rounds that the settings ask for."""
+    rough = replace(task, settings=replace(task.settings, loss_tolerance=1e-4))
+    for gain in task.settings.gradual:
+        held = replace(point, gains=rigid_gains(task.model, ratio, gain), predicts=True)
+        point = search(rough, held, token)
+    return search(task, replace(point, gains=(), predicts=False), token)
 
 
 def free_run(task: Task, point: Point, i: int) -> Array:

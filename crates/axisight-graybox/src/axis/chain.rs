@@ -18,6 +18,7 @@ pub(super) struct State<S, const N: usize> {
 
 impl<S: Number, const N: usize> State<S, N> {
     /// From motor angle, deflections and speeds, one after the other.
+    #[inline(always)]
     pub fn new(entry: impl Fn(usize) -> S) -> Self {
         Self {
             place: from_fn(&entry),
@@ -38,7 +39,18 @@ impl<S: Number, const N: usize> State<S, N> {
         out
     }
 
+    /// Entry by its place as in [`State::new`].
+    #[inline(always)]
+    pub fn entry(&self, i: usize) -> S {
+        if i < N {
+            self.place[i]
+        } else {
+            self.speed[i - N]
+        }
+    }
+
     /// `self + h * rate` where `h` carries derivatives.
+    #[inline(always)]
     pub fn shifted(&self, rate: &Self, h: S) -> Self {
         Self {
             place: from_fn(|i| rate.place[i].fma(h, self.place[i])),
@@ -47,6 +59,7 @@ impl<S: Number, const N: usize> State<S, N> {
     }
 
     /// The values without derivatives.
+    #[inline(always)]
     pub fn values(&self) -> State<f64, N> {
         State {
             place: from_fn(|i| self.place[i].lane(0)),
@@ -95,6 +108,7 @@ const EDGE: f64 = 0.05;
 
 impl<S: Number, const N: usize> Chain<S, N> {
     /// Chain with the parameters that `value` gives by their place.
+    #[inline(always)]
     pub fn new(model: &AxisModel, value: impl Fn(usize) -> S) -> Self {
         let layout = model.layout();
         let spring = |place: &dyn Fn(usize) -> usize| {
@@ -246,18 +260,21 @@ impl<S: Number, const N: usize> Chain<S, N> {
     }
 
     /// Torque on a standing motor but for the friction.
+    #[inline(always)]
     pub fn standing_drive<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> S {
         let (_, springs) = self.springs::<EXTENDED>(x);
         self.drive::<EXTENDED>(x, springs[1], torque)
     }
 
     /// Torque that the friction of a standing motor withstands.
+    #[inline(always)]
     pub fn breakaway(&self) -> S {
         self.coulomb + self.excess
     }
 }
 
 /// Deflection beyond a gap of half width `b`, and its slope.
+#[inline(always)]
 fn dead_zone<S: Number>(delta: S, b: S) -> (S, S) {
     let (zero, one) = (S::zero(), S::one());
     let edge = b * EDGE;

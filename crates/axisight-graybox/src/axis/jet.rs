@@ -2,59 +2,125 @@
 
 use super::problem::LANES;
 use axisight_core::scalar::{Lanes, Scalar};
+use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-type Partials = Lanes<LANES>;
+/// Eight doubles in registers.
+pub(super) trait Partials:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The same number in every lane.
+    fn splat(x: f64) -> Self;
+    /// `self * b + c` with one rounding.
+    #[must_use]
+    fn fma(self, b: Self, c: Self) -> Self;
+    /// From an array.
+    fn load(from: &[f64; LANES]) -> Self;
+    /// As an array.
+    fn store(self) -> [f64; LANES];
+}
+
+impl Partials for Lanes<LANES> {
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Lanes([x; LANES])
+    }
+    #[inline(always)]
+    fn fma(self, b: Self, c: Self) -> Self {
+        Scalar::fma(self, b, c)
+    }
+    #[inline(always)]
+    fn load(from: &[f64; LANES]) -> Self {
+        Lanes(*from)
+    }
+    #[inline(always)]
+    fn store(self) -> [f64; LANES] {
+        self.0
+    }
+}
 
 /// A scalar that steps of an integrator are cheap with.
 pub(super) trait Number: Scalar {
+    /// The same in registers that every processor has.
+    type Plain: Number;
+    /// As such.
+    fn plain(self) -> Self::Plain;
+    /// Back again.
+    fn from_plain(x: Self::Plain) -> Self;
     /// `self * h + onto`.
     #[must_use]
     fn times_plus(self, h: f64, onto: Self) -> Self;
 }
 
 impl Number for f64 {
+    type Plain = f64;
+    #[inline(always)]
+    fn plain(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn from_plain(x: f64) -> Self {
+        x
+    }
     #[inline(always)]
     fn times_plus(self, h: f64, onto: Self) -> Self {
         self.mul_add(h, onto)
     }
 }
 
-impl Number for Jet {
+impl<P: Partials> Number for Jet<P> {
+    type Plain = Jet<Lanes<LANES>>;
+    #[inline(always)]
+    fn plain(self) -> Self::Plain {
+        Jet {
+            value: self.value,
+            partials: Lanes(self.partials.store()),
+        }
+    }
+    #[inline(always)]
+    fn from_plain(x: Self::Plain) -> Self {
+        Self {
+            value: x.value,
+            partials: P::load(&x.partials.0),
+        }
+    }
     #[inline(always)]
     fn times_plus(self, h: f64, onto: Self) -> Self {
         Self {
             value: self.value.mul_add(h, onto.value),
-            partials: self.partials.fma(splat(h), onto.partials),
+            partials: self.partials.fma(P::splat(h), onto.partials),
         }
     }
 }
 
 /// `value + sum_i partials[i] eps_i` with `eps_i eps_j = 0`: a dual number of the core whose
 /// partials are lanes, which the compiler keeps in registers through a whole step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Jet {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Jet<P> {
     pub value: f64,
-    pub partials: Partials,
+    pub partials: P,
 }
 
-impl Jet {
+impl<P: Partials> Jet<P> {
     /// `f(self)` given value and slope of `f`.
     #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {
         Self {
             value,
-            partials: self.partials * slope,
+            partials: self.partials * P::splat(slope),
         }
     }
 }
 
-#[inline(always)]
-fn splat(x: f64) -> Partials {
-    Lanes([x; LANES])
-}
-
-impl Add for Jet {
+impl<P: Partials> Add for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -64,7 +130,7 @@ impl Add for Jet {
         }
     }
 }
-impl Sub for Jet {
+impl<P: Partials> Sub for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
@@ -74,17 +140,19 @@ impl Sub for Jet {
         }
     }
 }
-impl Mul for Jet {
+impl<P: Partials> Mul for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
         Self {
             value: self.value * b.value,
-            partials: self.partials.fma(splat(b.value), b.partials * self.value),
+            partials: self
+                .partials
+                .fma(P::splat(b.value), b.partials * P::splat(self.value)),
         }
     }
 }
-impl Div for Jet {
+impl<P: Partials> Div for Jet<P> {
     type Output = Self;
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl)] // the product rule with the reciprocal
@@ -92,7 +160,7 @@ impl Div for Jet {
         self * b.recip()
     }
 }
-impl Neg for Jet {
+impl<P: Partials> Neg for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -102,19 +170,19 @@ impl Neg for Jet {
         }
     }
 }
-impl AddAssign for Jet {
+impl<P: Partials> AddAssign for Jet<P> {
     #[inline(always)]
     fn add_assign(&mut self, b: Self) {
         *self = *self + b;
     }
 }
-impl SubAssign for Jet {
+impl<P: Partials> SubAssign for Jet<P> {
     #[inline(always)]
     fn sub_assign(&mut self, b: Self) {
         *self = *self - b;
     }
 }
-impl Add<f64> for Jet {
+impl<P: Partials> Add<f64> for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: f64) -> Self {
@@ -124,14 +192,14 @@ impl Add<f64> for Jet {
         }
     }
 }
-impl Sub<f64> for Jet {
+impl<P: Partials> Sub<f64> for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: f64) -> Self {
         self + (-b)
     }
 }
-impl Mul<f64> for Jet {
+impl<P: Partials> Mul<f64> for Jet<P> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: f64) -> Self {
@@ -139,7 +207,7 @@ impl Mul<f64> for Jet {
     }
 }
 
-impl Scalar for Jet {
+impl<P: Partials> Scalar for Jet<P> {
     const LANES: usize = 1;
     const PARTIALS: usize = LANES;
 
@@ -147,7 +215,7 @@ impl Scalar for Jet {
     fn constant(x: f64) -> Self {
         Self {
             value: x,
-            partials: splat(0.0),
+            partials: P::splat(0.0),
         }
     }
     #[inline(always)]
@@ -160,21 +228,23 @@ impl Scalar for Jet {
     }
     #[inline(always)]
     fn partial(&self, partial: usize, _lane: usize) -> f64 {
-        self.partials.0.get(partial).copied().unwrap_or(0.0)
+        self.partials.store().get(partial).copied().unwrap_or(0.0)
     }
     #[inline(always)]
     fn seeded(mut self, partial: usize) -> Self {
-        if let Some(p) = self.partials.0.get_mut(partial) {
+        let mut partials = self.partials.store();
+        if let Some(p) = partials.get_mut(partial) {
             *p = 1.0;
         }
+        self.partials = P::load(&partials);
         self
     }
     #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
-        let inner = b.partials.fma(splat(self.value), c.partials);
+        let inner = b.partials.fma(P::splat(self.value), c.partials);
         Self {
             value: self.value.mul_add(b.value, c.value),
-            partials: self.partials.fma(splat(b.value), inner),
+            partials: self.partials.fma(P::splat(b.value), inner),
         }
     }
     #[inline(always)]

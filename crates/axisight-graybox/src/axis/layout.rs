@@ -3,7 +3,7 @@
 use super::AxisError;
 
 /// Most masses of a chain.
-pub const MOST_MASSES: usize = 5;
+pub const MOST_MASSES: usize = 4;
 
 /// What is measured at the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,6 +14,8 @@ mod motion;
 mod predictor;
 mod problem;
 mod search;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 pub use error::AxisError;
 pub use gram::Normal;

@@ -13,9 +13,15 @@ use super::jet::Number;
 /// Changes of regime within one step; beyond, the rest is done in the last regime.
 const MOST_CHANGES: usize = 8;
 
-/// A chain, and itself without derivatives for the search of instants.
-#[derive(Debug, Clone)]
-pub(super) struct Motion<S, const N: usize> {
+/// A chain in three kinds of numbers: for the steps, for the steps in which the regime changes,
+/// and without derivatives for the search of the instants.
+pub(super) struct Motion<S: Number, const N: usize> {
+    chain: Chain<S, N>,
+    changes: Changes<S::Plain, N>,
+}
+
+/// Steps in which the regime changes.
+struct Changes<S, const N: usize> {
     chain: Chain<S, N>,
     plain: Chain<f64, N>,
 }
@@ -59,6 +65,7 @@ fn runge_kutta4<S: Number, const N: usize, const EXTENDED: bool>(
 }
 
 /// Positive while `regime` lasts.
+#[inline(always)]
 fn guard<S: Number, const N: usize, const EXTENDED: bool>(
     chain: &Chain<S, N>,
     x: &State<S, N>,
@@ -73,42 +80,51 @@ fn guard<S: Number, const N: usize, const EXTENDED: bool>(
 }
 
 impl<S: Number, const N: usize> Motion<S, N> {
-    pub fn new(chain: Chain<S, N>, plain: Chain<f64, N>) -> Self {
-        Self { chain, plain }
+    #[inline(always)]
+    pub fn new(chain: Chain<S, N>, careful: Chain<S::Plain, N>, plain: Chain<f64, N>) -> Self {
+        Self {
+            chain,
+            changes: Changes {
+                chain: careful,
+                plain,
+            },
+        }
     }
 
     /// The state a time `h` later.
     #[inline(always)]
     pub fn step<const EXTENDED: bool>(&self, x: &State<S, N>, ramp: Ramp, h: f64) -> State<S, N> {
-        let regime = self.regime::<EXTENDED>(x, ramp.torque);
-        let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime);
-        let lasts = match regime {
-            Regime::Smooth => true,
-            Regime::Slip(sign) => next.speed[0].lane(0) * sign >= 0.0,
-            Regime::Stick => self.lasts::<EXTENDED>(&next, ramp.at(h), regime),
-        };
-        if lasts {
-            next
-        } else {
-            self.change::<EXTENDED>(x, ramp, h, regime)
-        }
-    }
-
-    #[inline(always)]
-    fn regime<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> Regime {
         let speed = x.speed[0].lane(0);
-        if self.chain.inverse_smoothing.is_some() {
+        let regime = if self.chain.inverse_smoothing.is_some() {
             Regime::Smooth
         } else if speed != 0.0 {
             Regime::Slip(speed.signum())
         } else {
-            self.from_standstill::<EXTENDED>(x, torque)
+            self.changes
+                .from_standstill::<EXTENDED>(&x.values(), ramp.torque)
+        };
+        let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime);
+        let lasts = match regime {
+            Regime::Smooth => true,
+            Regime::Slip(sign) => next.speed[0].lane(0) * sign >= 0.0,
+            Regime::Stick => self
+                .changes
+                .lasts::<EXTENDED>(&next.values(), ramp.at(h), regime),
+        };
+        if lasts {
+            next
+        } else {
+            let x = State::new(|i| x.entry(i).plain());
+            let next = self.changes.change::<EXTENDED>(&x, ramp, h, regime);
+            State::new(|i| S::from_plain(next.entry(i)))
         }
     }
+}
 
+impl<S: Number, const N: usize> Changes<S, N> {
     #[inline(never)]
-    fn from_standstill<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> Regime {
-        let drive = self.plain.standing_drive::<EXTENDED>(&x.values(), torque);
+    fn from_standstill<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64) -> Regime {
+        let drive = self.plain.standing_drive::<EXTENDED>(x, torque);
         if drive.abs() <= self.plain.breakaway() {
             Regime::Stick
         } else {
@@ -116,8 +132,9 @@ impl<S: Number, const N: usize> Motion<S, N> {
         }
     }
 
-    fn lasts<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64, regime: Regime) -> bool {
-        guard::<f64, N, EXTENDED>(&self.plain, &x.values(), torque, regime) >= 0.0
+    #[inline(never)]
+    fn lasts<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64, regime: Regime) -> bool {
+        guard::<f64, N, EXTENDED>(&self.plain, x, torque, regime) >= 0.0
     }
 
     /// A step in which the regime changes.
@@ -134,12 +151,12 @@ impl<S: Number, const N: usize> Motion<S, N> {
         // much the state stands behind its nominal time, zero but for its derivatives.
         let mut late = S::zero();
         for _ in 0..MOST_CHANGES {
-            let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, &x, ramp, left, regime);
-            if self.lasts::<EXTENDED>(&next, ramp.at(left), regime) {
+            let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
+            if self.lasts::<EXTENDED>(&next.values(), ramp.at(left), regime) {
                 break;
             }
             let (instant, slope) = self.instant::<EXTENDED>(&x.values(), ramp, left, regime);
-            x = runge_kutta4::<S, N, EXTENDED>(&self.chain, &x, ramp, instant, regime);
+            x = self.advance::<EXTENDED>(&x, ramp, instant, regime);
             ramp = ramp.later(instant);
             left -= instant;
             if slope != 0.0 {
@@ -151,7 +168,7 @@ impl<S: Number, const N: usize> Motion<S, N> {
             }
             if matches!(regime, Regime::Slip(_)) {
                 x.speed[0] = S::zero();
-                regime = self.from_standstill::<EXTENDED>(&x, ramp.torque);
+                regime = self.from_standstill::<EXTENDED>(&x.values(), ramp.torque);
             } else {
                 let drive = self
                     .plain
@@ -159,13 +176,25 @@ impl<S: Number, const N: usize> Motion<S, N> {
                 regime = Regime::Slip(drive.signum());
             }
         }
-        let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, &x, ramp, left, regime);
+        let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
         let rate = self.chain.rate::<EXTENDED>(&next, ramp.at(left), regime);
         next.shifted(&rate, -late)
     }
 
+    #[inline(never)]
+    fn advance<const EXTENDED: bool>(
+        &self,
+        x: &State<S, N>,
+        ramp: Ramp,
+        h: f64,
+        regime: Regime,
+    ) -> State<S, N> {
+        runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime)
+    }
+
     /// When the guard of `regime` falls through zero within `h`, and its slope there; slope
     /// zero where it does so at once.
+    #[inline(never)]
     fn instant<const EXTENDED: bool>(
         &self,
         x: &State<f64, N>,

@@ -24,7 +24,7 @@ pub struct Trajectory {
 }
 
 /// A run in progress.
-pub(super) struct Predictor<'a, S, const N: usize> {
+pub(super) struct Predictor<'a, S: Number, const N: usize> {
     model: &'a AxisModel,
     motion: Motion<S, N>,
     start: State<S, N>,
@@ -33,6 +33,7 @@ pub(super) struct Predictor<'a, S, const N: usize> {
 
 impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
     /// From all parameters by their place; the start is that of data set `set`.
+    #[inline(always)]
     pub fn new(
         model: &'a AxisModel,
         theta: &[f64],
@@ -51,7 +52,11 @@ impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
         };
         Self {
             model,
-            motion: Motion::new(Chain::new(model, &value), plain),
+            motion: Motion::new(
+                Chain::new(model, &value),
+                Chain::new(model, |i| value(i).plain()),
+                plain,
+            ),
             start: State::new(|i| value(layout.start(set) + i)),
             gains: predicts.then(|| State::new(gain)),
         }
@@ -59,6 +64,7 @@ impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
 
     /// Run through the samples, handing over the predicted output at each; `visit` gets the
     /// sample, the state and the output.
+    #[inline(always)]
     pub fn run<const EXTENDED: bool>(
         &self,
         data: &AxisSet,

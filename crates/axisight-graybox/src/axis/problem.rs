@@ -2,10 +2,12 @@
 
 use super::AxisError;
 use super::gram::{Normal, Rows};
-use super::jet::Jet;
+use super::jet::{Jet, Partials};
 use super::layout::{AxisModel, Layout};
 use super::predictor::{Predictor, Trajectory};
-use axisight_core::scalar::Scalar;
+#[cfg(target_arch = "x86_64")]
+use super::wide;
+use axisight_core::scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
@@ -167,8 +169,7 @@ impl<'a> AxisProblem<'a> {
         match self.model.masses {
             2 => self.trajectory_of::<2>(theta, set),
             3 => self.trajectory_of::<3>(theta, set),
-            4 => self.trajectory_of::<4>(theta, set),
-            _ => self.trajectory_of::<5>(theta, set),
+            _ => self.trajectory_of::<4>(theta, set),
         }
     }
 
@@ -218,10 +219,8 @@ impl<'a> AxisProblem<'a> {
             (2, true) => self.rows_of::<2, true>(theta, free, set, memory),
             (3, false) => self.rows_of::<3, false>(theta, free, set, memory),
             (3, true) => self.rows_of::<3, true>(theta, free, set, memory),
-            (4, false) => self.rows_of::<4, false>(theta, free, set, memory),
-            (4, true) => self.rows_of::<4, true>(theta, free, set, memory),
-            (_, false) => self.rows_of::<5, false>(theta, free, set, memory),
-            (_, true) => self.rows_of::<5, true>(theta, free, set, memory),
+            (_, false) => self.rows_of::<4, false>(theta, free, set, memory),
+            (_, true) => self.rows_of::<4, true>(theta, free, set, memory),
         }
     }
 
@@ -242,26 +241,76 @@ impl<'a> AxisProblem<'a> {
         for pass in 0..passes {
             let seeds = slots.iter().skip(pass * LANES).take(LANES);
             let seeds: Vec<usize> = seeds.map(|s| free[*s]).collect();
-            let value = |i: usize| {
-                let number = Jet::constant(theta.get(i).copied().unwrap_or(0.0));
-                let seed = seeds.iter().position(|s| *s == i);
-                seed.map_or(number, |s| number.seeded(s))
+            let task = Pass {
+                theta,
+                seeds: &seeds,
+                set,
+                first: pass == 0,
             };
-            let run = Predictor::<_, N>::new(&self.model, theta, set, value, self.predicts);
-            let Rows {
-                residual, partials, ..
-            } = &mut rows;
-            run.run::<EXTENDED>(data, self.cancel, |k, _, y| {
-                if pass == 0 {
-                    residual.push(y.value - data.output[k]);
-                }
-                partials.push(y.partials.0);
-            })?;
+            self.pass::<N, EXTENDED>(&task, &mut rows)?;
         }
         rows.whiten(&self.whitening);
         rows.weigh(data.weight.sqrt());
         Ok(rows)
     }
+
+    /// One pass, in the widest registers there are.
+    fn pass<const N: usize, const EXTENDED: bool>(
+        &self,
+        task: &Pass<'_>,
+        rows: &mut Rows,
+    ) -> Result<(), AxisError> {
+        #[cfg(target_arch = "x86_64")]
+        if N <= 3 && !EXTENDED && wide::available() {
+            // SAFETY: the processor has the instructions.
+            #[allow(unsafe_code)]
+            return unsafe { self.wide_pass::<N, EXTENDED>(task, rows) };
+        }
+        self.pass_of::<Lanes<LANES>, N, EXTENDED>(task, rows)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn wide_pass<const N: usize, const EXTENDED: bool>(
+        &self,
+        task: &Pass<'_>,
+        rows: &mut Rows,
+    ) -> Result<(), AxisError> {
+        self.pass_of::<wide::Wide, N, EXTENDED>(task, rows)
+    }
+
+    #[inline(always)]
+    fn pass_of<P: Partials, const N: usize, const EXTENDED: bool>(
+        &self,
+        task: &Pass<'_>,
+        rows: &mut Rows,
+    ) -> Result<(), AxisError> {
+        let (theta, data) = (task.theta, &self.sets[task.set]);
+        let value = |i: usize| {
+            let number = Jet::<P>::constant(theta.get(i).copied().unwrap_or(0.0));
+            let seed = task.seeds.iter().position(|s| *s == i);
+            seed.map_or(number, |s| number.seeded(s))
+        };
+        let run = Predictor::<_, N>::new(&self.model, theta, task.set, value, self.predicts);
+        let Rows {
+            residual, partials, ..
+        } = rows;
+        run.run::<EXTENDED>(data, self.cancel, |k, _, y: Jet<P>| {
+            if task.first {
+                residual.push(y.value - data.output[k]);
+            }
+            partials.push(y.partials.store());
+        })
+    }
+}
+
+/// Up to eight parameters to be differentiated in one run of one data set.
+struct Pass<'a> {
+    theta: &'a [f64],
+    seeds: &'a [usize],
+    set: usize,
+    /// The run also gives the residuals.
+    first: bool,
 }
 
 fn check(i: usize, set: &AxisSet) -> Result<(), AxisError> {

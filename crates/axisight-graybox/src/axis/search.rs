@@ -26,6 +26,21 @@ pub struct SearchParameter {
     pub free: bool,
 }
 
+/// Largest factor by which one step changes a parameter that cannot change its sign.
+const LARGEST_FACTOR: f64 = 5.0;
+
+impl SearchParameter {
+    /// A step far from the minimum may promise nonsense: half of the inertias of none. What is
+    /// left near zero may go there.
+    fn restrained(&self, from: f64, to: f64) -> f64 {
+        if self.lower >= 0.0 && from > 1e-3 * self.scale {
+            to.clamp(from / LARGEST_FACTOR, from * LARGEST_FACTOR)
+        } else {
+            to
+        }
+    }
+}
+
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
@@ -227,7 +242,7 @@ impl Search<'_> {
             let mut hit = false;
             for (slot, i) in self.free.iter().enumerate() {
                 let p = &self.parameters[*i];
-                let wanted = theta[*i] + step[slot];
+                let wanted = p.restrained(theta[*i], theta[*i] + step[slot]);
                 next[*i] = wanted.clamp(p.lower, p.upper);
                 let outward = (wanted < p.lower && theta[*i] <= p.lower)
                     || (wanted > p.upper && theta[*i] >= p.upper);
