@@ -84,7 +84,7 @@ def figure_9_2(context: Context) -> Item:
         lines.append(
             _Line(f"set_{number}", label, 2 * np.pi * frequency, np.abs(value), _STYLES[number])
         )
-    drawing = _figure(lines, "|G| [rad s$^{-2}$/Nm]", (1.0, 600.0))
+    drawing = _figure(lines, "|G| [rad s$^{-2}$/Nm]", (0.5, 800.0))
     title = "Response from motor torque to motor acceleration, data sets 2 and 3"
     return Item("figure-9.2", title, {"": _table(lines)}, {"": drawing})
 
@@ -104,7 +104,7 @@ def figure_9_3(context: Context) -> Item:
     grid = np.geomspace(1.0, 40.0, 400)
     model = np.abs(two_mass_velocity(models(context, STANDARD)["m3"], grid))
     lines.append(_Line("m3", "model m3 without k$_3$ and F$_c$", 2 * np.pi * grid, model, _MODEL))
-    drawing = _figure(lines, "|G| [rad s$^{-1}$/Nm]", (0.02, 12.0))
+    drawing = _figure(lines, "|G| [rad s$^{-1}$/Nm]", (0.01, 15.0))
     title = "Response from motor torque to motor velocity, data sets 2 and 3, and model m3"
     return Item("figure-9.3", title, {"": _table(lines)}, {"": drawing})
 
