@@ -2,10 +2,18 @@
 
 mod direct;
 mod hold;
+mod minimize;
 mod modal;
+mod problem;
 mod response;
 mod second_order;
+mod weighting;
 
 pub use hold::Hold;
+pub use minimize::{FrequencyFit, SearchOptions, SearchStatus, minimize};
+pub use problem::{
+    FrequencyFitError, FrequencyOptions, FrequencyParameter, FrequencyProblem, Normal, Scatter,
+};
 pub use response::{Columns, evaluate};
 pub use second_order::{Linearizer, SecondOrder, SecondOrderDerivative, SecondOrderError};
+pub use weighting::{Criterion, PoseResponse, Uncertainty};
