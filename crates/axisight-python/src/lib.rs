@@ -8,6 +8,7 @@ mod effects;
 mod entry;
 mod excitation;
 mod fit;
+mod frequency_fit;
 mod frf;
 mod local_models;
 mod montecarlo;
@@ -54,5 +55,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
+    module.add_class::<frequency_fit::FrequencyFitResult>()?;
+    module.add_function(wrap_pyfunction!(frequency_fit::fit_frequency_responses, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::frequency_information, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::frequency_response, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::design_poses, module)?)?;
     Ok(())
 }
