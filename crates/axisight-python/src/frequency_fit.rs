@@ -43,19 +43,20 @@ pub struct FrequencyOptionSpec {
     step_tolerance: f64,
 }
 
-/// Joint angles, frequencies, response, variance, covariance, derivative order; arrays of all
-/// lines and elements flat.
+/// Joint angles, frequencies, response, variance, covariance, reference of logarithmic weights,
+/// derivative order; arrays of all lines and elements flat.
 type PoseTuple<'py> = (
     Vec<f64>,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, Complex64>,
     Option<PyReadonlyArray1<'py, f64>>,
     Option<PyReadonlyArray1<'py, Complex64>>,
+    Option<PyReadonlyArray1<'py, Complex64>>,
     u8,
 );
 
 fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
-    let (joint_angle, frequency_hz, response, variance, covariance, order) = tuple;
+    let (joint_angle, frequency_hz, response, variance, covariance, reference, order) = tuple;
     let plain = |a: &PyReadonlyArray1<'_, f64>| a.as_array().to_vec();
     let complex = |a: &PyReadonlyArray1<'_, Complex64>| a.as_array().to_vec();
     let uncertainty = match (variance, covariance) {
@@ -69,6 +70,7 @@ fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
         frequency_hz: plain(&frequency_hz),
         response: complex(&response),
         uncertainty,
+        reference: reference.as_ref().map(complex),
         order,
     })
 }

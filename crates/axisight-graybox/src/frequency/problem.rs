@@ -555,6 +555,13 @@ fn check_pose(
     if let Some(g) = pose.response.iter().find(|g| !(g.re.is_finite() && g.im.is_finite())) {
         return Err(invalid(&field("response"), "finite numbers", g));
     }
+    if let Some(reference) = &pose.reference {
+        let usable = |g: &C| g.re.is_finite() && g.im.is_finite() && *g != C::default();
+        if reference.len() != elements || !reference.iter().all(usable) {
+            let expected = format!("{elements} finite numbers other than zero");
+            return Err(invalid(&field("reference"), &expected, "others"));
+        }
+    }
     let (length, wanted) = match &pose.uncertainty {
         Uncertainty::Unknown => (0, 0),
         Uncertainty::Variance(v) => (v.len(), elements),

@@ -36,6 +36,9 @@ pub struct PoseResponse {
     pub response: Vec<C>,
     /// Its error.
     pub uncertainty: Uncertainty,
+    /// What the error of a logarithm is taken relative to; `None` for the response itself.
+    /// Weights by the measured magnitude favour lines where the error adds to it, a model's do not.
+    pub reference: Option<Vec<C>>,
     /// Derivative of the motor angle that is the output: 0, 1 or 2.
     pub order: u8,
 }
@@ -56,10 +59,12 @@ pub(super) fn whitening(
     weighted: bool,
     number: usize,
 ) -> Result<(Whitening, Option<Vec<f64>>), FrequencyFitError> {
-    let relative = |k: usize| match criterion {
-        Criterion::Linear => 1.0,
-        Criterion::Logarithmic => pose.response[k].norm(),
+    let reference = pose.reference.as_ref().unwrap_or(&pose.response);
+    let size = |k: usize| match criterion {
+        Criterion::Linear => C::new(1.0, 0.0),
+        Criterion::Logarithmic => reference[k],
     };
+    let relative = |k: usize| size(k).norm();
     let variance = diagonal(pose);
     let known = |k: usize| variance.as_ref().map_or(1.0, |v| v[k]);
     if !weighted {
@@ -82,12 +87,9 @@ pub(super) fn whitening(
             let n = pose.response.len() / pose.frequency_hz.len().max(1);
             let line = |line: usize| {
                 let block = &all[line * n * n..(line + 1) * n * n];
-                let size = |i: usize| match criterion {
-                    Criterion::Linear => C::new(1.0, 0.0),
-                    Criterion::Logarithmic => pose.response[line * n + i],
-                };
+                let own = |i: usize| size(line * n + i);
                 let matrix = DMatrix::from_fn(n, n, |i, j| {
-                    block[i * n + j] * 0.5 / (size(i) * size(j).conj())
+                    block[i * n + j] * 0.5 / (own(i) * own(j).conj())
                 });
                 inverse_factor(matrix)
                     .ok_or(FrequencyFitError::Covariance { pose: number + 1, line: line + 1 })
