@@ -31,8 +31,9 @@ pub(super) struct Modal {
     pub(super) places: Vec<Place>,
     /// Pairs `j < k` of poles too close together for partial fractions.
     pub(super) close: Vec<(usize, usize)>,
-    right: DMatrix<C>,
-    left: DMatrix<C>,
+    /// `[Re u, Im u]` and `[Re y, Im y]^T`.
+    right_parts: DMatrix<f64>,
+    left_parts: DMatrix<f64>,
     /// `E^T u` and `E^T y`, `(axes, poles)`.
     output: DMatrix<C>,
     input: DMatrix<C>,
@@ -73,9 +74,13 @@ impl Modal {
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
         let poles: Vec<C> = (0..2 * n).map(|k| C::new(values[k].re, values[k].im)).collect();
         let places = places(&poles)?;
-        let shape = DMatrix::from_fn(2 * n, 2 * n, |i, k| {
+        let mut shape = DMatrix::from_fn(2 * n, 2 * n, |i, k| {
             C::new(vectors[(i, k)].re, vectors[(i, k)].im)
         });
+        for mut column in shape.column_iter_mut() {
+            let size = column.norm();
+            column /= C::new(size, 0.0);
+        }
         let inverse = shape.clone().try_inverse()?;
         let condition = shape.norm() * inverse.norm();
         if !(condition < LARGEST_CONDITION) {
@@ -98,8 +103,8 @@ impl Modal {
             places,
             output: &port * &right,
             input: &port * &left,
-            right,
-            left,
+            right_parts: parts(&right),
+            left_parts: parts(&left).transpose(),
         })
     }
 
@@ -207,11 +212,17 @@ struct Moved {
 
 impl Moved {
     fn new(modal: &Modal, change: &SecondOrderDerivative) -> Self {
+        let n = modal.poles.len();
+        // Real products over real and imaginary parts side by side.
         let seen = |matrix: &DMatrix<f64>| {
             if matrix.iter().all(|x| *x == 0.0) {
                 return None;
             }
-            Some(modal.left.transpose() * (matrix.map(|x| C::new(x, 0.0)) * &modal.right))
+            let all = &modal.left_parts * (matrix * &modal.right_parts);
+            Some(DMatrix::from_fn(n, n, |j, k| {
+                let re = all[(j, k)] - all[(n + j, n + k)];
+                C::new(re, all[(j, n + k)] + all[(n + j, k)])
+            }))
         };
         let parts = [seen(&change.stiffness), seen(&change.damping), seen(&change.mass)];
         Self { parts }
@@ -251,6 +262,14 @@ fn add_scaled(sum: &mut [C], x: &[C], factor: C) {
     for (sum, x) in sum.iter_mut().zip(x) {
         *sum += x * factor;
     }
+}
+
+/// Real and imaginary parts side by side.
+fn parts(matrix: &DMatrix<C>) -> DMatrix<f64> {
+    let n = matrix.ncols();
+    DMatrix::from_fn(matrix.nrows(), 2 * n, |i, k| {
+        if k < n { matrix[(i, k)].re } else { matrix[(i, k - n)].im }
+    })
 }
 
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {

@@ -90,34 +90,29 @@ fn basis(modal: &Modal, frequency_hz: &[f64], hold: Hold, with_slopes: bool) -> 
     let (n, n_poles) = (frequency_hz.len(), modal.poles.len());
     let points: Vec<C> = frequency_hz.iter().map(|f| point(*f, hold)).collect();
     let mut out = DMatrix::zeros(2 * n, n_poles * (1 + usize::from(with_slopes)));
-    let mut columns = out.as_mut_slice().chunks_exact_mut((2 * n).max(1));
-    let mut slopes: Vec<Vec<f64>> = Vec::new();
+    let mut column = 0;
     for place in &modal.places {
         let pole = modal.poles[place.index];
         let mirrored: Option<Pole> = place.conjugate.then(|| pole.conjugate());
-        let count = 1 + usize::from(place.conjugate);
-        for imaginary in 0..count {
-            let Some(column) = columns.next() else { continue };
-            let mut slope = vec![0.0; 2 * n];
-            for (line, at) in points.iter().enumerate() {
-                let (mut g, mut d) = pole.evaluate(*at);
-                if let Some(mirrored) = &mirrored {
-                    let (h, e) = mirrored.evaluate(*at);
-                    (g, d) = if imaginary == 1 {
-                        let i = C::new(0.0, 1.0);
-                        ((g - h) * i, (d - e) * i)
-                    } else {
-                        (g + h, d + e)
-                    };
+        for (line, at) in points.iter().enumerate() {
+            let mut put = |column: usize, (g, slope): (C, C)| {
+                (out[(line, column)], out[(n + line, column)]) = (g.re, g.im);
+                if with_slopes {
+                    let column = column + n_poles;
+                    (out[(line, column)], out[(n + line, column)]) = (slope.re, slope.im);
                 }
-                (column[line], column[n + line]) = (g.re, g.im);
-                (slope[line], slope[n + line]) = (d.re, d.im);
-            }
-            slopes.push(slope);
+            };
+            let (g, slope) = pole.evaluate(*at);
+            let Some(mirrored) = &mirrored else {
+                put(column, (g, slope));
+                continue;
+            };
+            let (h, other) = mirrored.evaluate(*at);
+            let i = C::new(0.0, 1.0);
+            put(column, (g + h, slope + other));
+            put(column + 1, ((g - h) * i, (slope - other) * i));
         }
-    }
-    for (column, slope) in columns.zip(&slopes) {
-        column.copy_from_slice(slope);
+        column += 1 + usize::from(place.conjugate);
     }
     out
 }
