@@ -7,18 +7,18 @@ at 5 operating points, 391 lines of 3 by 3 elements each, with 5 % of noise, fro
 50 % off: weighted logarithmic least squares, the same residuals and starts for both.
 
 The peer is ``scipy.optimize.least_squares`` over the logarithms of the parameters, counted
-from the start (with ``x_scale="jac"`` or from zero its first steps overshoot), with the same model in NumPy (`common/linear_arm.py`): one batched ``numpy.linalg.solve`` over the lines
-of an operating point. *2-point* leaves the Jacobian to SciPy's finite differences, *analytic*
-computes it (exact in the response; only the small matrices are differenced). Tolerances of
-1e-10, with which it meets our optimum; at the default of 1e-8 it may stop earlier, so that is
-shown as well. One thread, CPU time.
+from the start (with ``x_scale="jac"``, or counted from one, its first steps overshoot), with
+the same model in NumPy (`common/linear_arm.py`): one batched ``numpy.linalg.solve`` over the
+lines of an operating point. *2-point* leaves the Jacobian to SciPy's finite differences,
+*analytic* computes it (exact in the response; only the small matrices are differenced). One
+thread, CPU time.
 """
 
 import argparse
 import os
 
-for name in ("OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("RAYON_NUM_THREADS", "1")
 
 from importlib import resources
 
@@ -30,7 +30,9 @@ from scipy.optimize import least_squares
 import axisight
 from axisight.frequency_fit import FrequencyFitOptions, MeasuredResponse, fit_responses
 
-POSES = np.array([[0, 0, 0], [0.5, 0.6, -0.4], [0.2, -0.7, 0.5], [-0.4, 0.3, 0.9], [0.1, 0.9, -0.9]])
+POSES = np.array(
+    [[0, 0, 0], [0.5, 0.6, -0.4], [0.2, -0.7, 0.5], [-0.4, 0.3, 0.9], [0.1, 0.9, -0.9]]
+)
 NAMES = (
     "axis1.stiffness",
     "axis1.damping",

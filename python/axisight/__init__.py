@@ -1,6 +1,6 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
-from axisight import excitation, frf, montecarlo, records
+from axisight import excitation, frequency_fit, frf, montecarlo, records
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -58,6 +58,7 @@ __all__ = [
     "effect_table",
     "excitation",
     "fit",
+    "frequency_fit",
     "frf",
     "load_robot",
     "montecarlo",

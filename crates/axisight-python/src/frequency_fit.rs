@@ -11,7 +11,9 @@ use axisight_graybox::frequency::{
     FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, SearchStatus,
     Uncertainty, minimize,
 };
-use numpy::{Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
@@ -63,7 +65,11 @@ fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
         (None, None) => Uncertainty::Unknown,
         (Some(variance), None) => Uncertainty::Variance(plain(&variance)),
         (None, Some(covariance)) => Uncertainty::Covariance(complex(&covariance)),
-        _ => return Err(InputError::new_err("expected a variance or a covariance, got both")),
+        _ => {
+            return Err(InputError::new_err(
+                "expected a variance or a covariance, got both",
+            ));
+        }
     };
     Ok(PoseResponse {
         joint_angle,
@@ -95,7 +101,10 @@ fn problem(
             frozen: spec.frozen,
         })
     };
-    let parameters = parameters.into_iter().map(parameter).collect::<PyResult<_>>()?;
+    let parameters = parameters
+        .into_iter()
+        .map(parameter)
+        .collect::<PyResult<_>>()?;
     let loss = match options.loss.as_str() {
         "squared" => Loss::Squared,
         "huber" => Loss::Huber(options.loss_scale),
@@ -107,8 +116,16 @@ fn problem(
     };
     let sampled = Hold::ZeroOrder(description.sample_time);
     let options = FrequencyOptions {
-        hold: if options.sampled { sampled } else { Hold::Continuous },
-        criterion: if options.logarithmic { Criterion::Logarithmic } else { Criterion::Linear },
+        hold: if options.sampled {
+            sampled
+        } else {
+            Hold::Continuous
+        },
+        criterion: if options.logarithmic {
+            Criterion::Logarithmic
+        } else {
+            Criterion::Linear
+        },
         weighted: options.weighted,
         loss,
         block_lines: options.block_lines,
@@ -121,9 +138,7 @@ fn problem(
 
 fn failure(e: FrequencyFitError) -> PyErr {
     match e {
-        FrequencyFitError::Cancelled => {
-            pyo3::exceptions::PyKeyboardInterrupt::new_err("cancelled")
-        }
+        FrequencyFitError::Cancelled => pyo3::exceptions::PyKeyboardInterrupt::new_err("cancelled"),
         other => input_error(other),
     }
 }
@@ -189,9 +204,14 @@ impl FrequencyFitResult {
     }
     /// Covariance of the gradient by the response's uncertainty, if known.
     #[getter]
-    fn expected_scatter<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn expected_scatter<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let known = self.fit.scatter.expected.as_ref();
-        known.map(|m| matrix(py, m.shape(), |i, j| m[(i, j)])).transpose()
+        known
+            .map(|m| matrix(py, m.shape(), |i, j| m[(i, j)]))
+            .transpose()
     }
     /// Covariance of the gradient by its scatter over blocks of lines.
     #[getter]
@@ -227,7 +247,9 @@ pub fn fit_frequency_responses(
         step_tolerance: options.step_tolerance,
     };
     let fit = detached(py, &cancel, || minimize(&problem, search))?;
-    Ok(FrequencyFitResult { fit: fit.map_err(failure)? })
+    Ok(FrequencyFitResult {
+        fit: fit.map_err(failure)?,
+    })
 }
 
 /// Information each pose gives on the free parameters, `(n_poses, n_free, n_free)`.
@@ -244,8 +266,15 @@ pub fn frequency_information<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let cancel = flag(cancel);
     let start = parameters.iter();
-    let theta: Vec<f64> =
-        start.map(|p| if p.logarithmic { p.initial.ln() } else { p.initial }).collect();
+    let theta: Vec<f64> = start
+        .map(|p| {
+            if p.logarithmic {
+                p.initial.ln()
+            } else {
+                p.initial
+            }
+        })
+        .collect();
     let n = parameters.iter().filter(|p| !p.frozen).count();
     let problem = problem(robot, effects, parameters, poses, &options, &cancel)?;
     let found = detached(py, &cancel, || problem.information(&theta))?.map_err(failure)?;
@@ -266,10 +295,15 @@ pub fn frequency_response<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     use axisight_graybox::frequency::{Linearizer, SecondOrderError, evaluate};
     let sample_time = robot.description.sample_time;
-    let hold = if sampled { Hold::ZeroOrder(sample_time) } else { Hold::Continuous };
+    let hold = if sampled {
+        Hold::ZeroOrder(sample_time)
+    } else {
+        Hold::Continuous
+    };
     let linearizer = Linearizer::new(&robot.description, &settings(effects), &[], &[]);
-    let (model, _) =
-        linearizer.and_then(|l| l.at(&joint_angle)).map_err(input_error)?;
+    let (model, _) = linearizer
+        .and_then(|l| l.at(&joint_angle))
+        .map_err(input_error)?;
     let found = evaluate(&model, &[], &frequency_hz, hold)
         .ok_or_else(|| input_error(SecondOrderError::Mass))?;
     let n = robot.description.n_axes();
@@ -300,12 +334,21 @@ pub fn design_poses<'py>(
     let view = information.as_array();
     let p = view.shape()[1];
     let square = |values: Vec<f64>| InformationMatrix::from_row_slice(p, p, &values);
-    let planes = view.outer_iter().map(|plane| square(plane.iter().copied().collect()));
+    let planes = view
+        .outer_iter()
+        .map(|plane| square(plane.iter().copied().collect()));
     let matrices: Vec<_> = planes.collect();
     let prior = square(prior.as_array().iter().copied().collect());
-    let options = DesignOptions { count, repeats, gap_tolerance, max_iterations };
-    let found = detached(py, &AtomicBool::new(false), || design(&matrices, &prior, options))?
-        .map_err(input_error)?;
+    let options = DesignOptions {
+        count,
+        repeats,
+        gap_tolerance,
+        max_iterations,
+    };
+    let found = detached(py, &AtomicBool::new(false), || {
+        design(&matrices, &prior, options)
+    })?
+    .map_err(input_error)?;
     let out = PyDict::new(py);
     out.set_item("weights", array1(py, found.weights))?;
     out.set_item("sensitivity", array1(py, found.sensitivity))?;

@@ -56,8 +56,14 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
     module.add_class::<frequency_fit::FrequencyFitResult>()?;
-    module.add_function(wrap_pyfunction!(frequency_fit::fit_frequency_responses, module)?)?;
-    module.add_function(wrap_pyfunction!(frequency_fit::frequency_information, module)?)?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::fit_frequency_responses,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::frequency_information,
+        module
+    )?)?;
     module.add_function(wrap_pyfunction!(frequency_fit::frequency_response, module)?)?;
     module.add_function(wrap_pyfunction!(frequency_fit::design_poses, module)?)?;
     Ok(())

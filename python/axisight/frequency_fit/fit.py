@@ -53,7 +53,7 @@ def fit_responses(
         :class:`MeasuredResponse`, or pairs of the angles of the driven joints [rad] and what
         an estimator of `axisight.frf` returns (a Dataset, or a DataArray with units). Torque
         to position, velocity or acceleration of the motors, told by the units.
-    parameters
+    parameters to fit
         Names (starting at the robot's values), a dict of names and starts, or
         :class:`axisight.Parameter` with bounds and priors. Names are those of
         :func:`axisight.robot_parameters`. All but centres of mass are searched over their
@@ -84,8 +84,11 @@ def fit_responses(
                     "use least_squares or log_least_squares"
                 )
     model = [*robot.effects, *effects]
+    chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
 
-    def search(start: Sequence[Spec], reference: Sequence[Complex | None]) -> _core.FrequencyFitResult:
+    def search(
+        start: Sequence[Spec], reference: Sequence[Complex | None]
+    ) -> _core.FrequencyFitResult:
         return _core.fit_frequency_responses(
             robot.core,
             core_effects(model),
@@ -96,6 +99,7 @@ def fit_responses(
 
     results = _from_starts(wanted, chosen, lambda start: search(start, [None] * len(data)))
     result = results[0]
+    passes = [result]
     if chosen.weighted and chosen.logarithmic:
         for _ in range(chosen.reweightings):
             fitted = _with_values(robot, wanted, result.values)
@@ -115,7 +119,21 @@ def fit_responses(
                 for s, v in zip(wanted, result.values, strict=True)
             ]
             result = search(start, reference)
-    return _wrap(robot, wanted, data, chosen, result, _table(results))
+            passes.append(result)
+    return _wrap(robot, wanted, data, chosen, passes, _table(results))
+
+
+BLOCKS_PER_PARAMETER = 5
+"""Fewer blocks of residuals leave the sandwich covariance without degrees of freedom."""
+
+
+def _block_lines(
+    options: FrequencyFitOptions, wanted: Sequence[Spec], data: Sequence[MeasuredResponse]
+) -> int:
+    """Return the block length wanted, or what leaves enough blocks."""
+    lines = sum(len(one.frequency_hz) for one in data)
+    blocks = BLOCKS_PER_PARAMETER * sum(not spec.frozen for spec in wanted)
+    return max(1, min(options.block_lines, lines // blocks))
 
 
 def _from_starts(
@@ -165,17 +183,19 @@ def _wrap(
     wanted: Sequence[Spec],
     data: Sequence[MeasuredResponse],
     options: FrequencyFitOptions,
-    result: _core.FrequencyFitResult,
+    passes: Sequence[_core.FrequencyFitResult],
     starts: pd.DataFrame,
 ) -> FrequencyFit:
+    result = passes[-1]
     free = [wanted[i] for i in result.free]
     prior = np.array([_prior_information(spec) for spec in free])
-    found = covariances(result, prior, weighted=options.weighted)
+    blocks = sum(-(-len(one.frequency_hz) // options.block_lines) for one in data)
+    found = covariances(result, prior, blocks)
     known = all(one.variance is not None or one.covariance is not None for one in data)
     excess = found.misfit / _explained(data) if options.weighted and known else None
     sandwich = options.uncertainty == "sandwich" or (
         options.uncertainty == "auto"
-        and (excess is not None and excess > MISFIT_EXPLAINED or options.loss != "squared")
+        and ((excess is not None and excess > MISFIT_EXPLAINED) or options.loss != "squared")
     )
     own = found.sandwich if sandwich else found.response
     scale = 1.0 if options.weighted else found.misfit
@@ -199,10 +219,10 @@ def _wrap(
         status=result.status,
         misfit=found.misfit,
         loss=result.loss,
-        initial_loss=result.initial_loss,
+        initial_loss=passes[0].initial_loss,
         n_residuals=result.n_residuals,
-        iterations=result.iterations,
-        evaluations=result.evaluations,
+        iterations=sum(one.iterations for one in passes),
+        evaluations=sum(one.evaluations for one in passes),
         at_bound=at_bound,
         identifiability=identifiable,
         warnings=warn(

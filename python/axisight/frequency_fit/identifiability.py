@@ -31,7 +31,7 @@ UNKNOWN_BEYOND = 0.5
 """A relative standard deviation from which on a combination counts as not identified."""
 NUMERICAL_RANK = 1e-13
 """Eigenvalues of information, scaled to unit diagonal, below this share of the largest are zero."""
-SHOWN = 0.25
+SHOWN = 0.1
 """Parameters with at least this share of the largest exponent are named."""
 
 
@@ -169,14 +169,30 @@ def assess(chosen: Sequence[Spec], information: Real, scale: float = 1.0) -> Ide
             if np.sqrt(s) > UNKNOWN_BEYOND:
                 combinations.append(_combination(names, direction, float(np.sqrt(s))))
     else:
-        for index in np.flatnonzero(singular):
-            direction = vectors[:, index] / np.where(size > 0, size, np.inf)
-            if not np.any(direction):
-                direction = np.where(size > 0, 0.0, np.abs(vectors[:, index]))
+        # A parameter without influence is its own direction, whatever its scale.
+        natural = (
+            vectors[:, singular]
+            / np.where(size > 0, size, size[size > 0].min(initial=1.0))[:, None]
+        )
+        for direction in _sparse(natural):
             combinations.append(_combination(names, direction, np.inf))
     return Identifiability(
         names, std, correlation, condition, tuple(combinations), np.asarray(information)
     )
+
+
+def _sparse(directions: Real) -> Real:
+    """Return directions (n_directions, n) of the same span, each with a parameter of its own."""
+    rows = directions.T.copy()
+    for row in range(len(rows)):
+        rest = np.abs(rows[row:])
+        best, pivot = divmod(int(np.argmax(rest)), rest.shape[1])
+        rows[[row, row + best]] = rows[[row + best, row]]
+        rows[row] /= rows[row, pivot]
+        for other in range(len(rows)):
+            if other != row:
+                rows[other] -= rows[other, pivot] * rows[row]
+    return rows
 
 
 def _combination(names: Sequence[str], direction: Real, std: float) -> Combination:
@@ -215,9 +231,7 @@ def pose_information(
         ) from None
     if not (error > 0).all():
         raise InputError("relative_std: expected positive numbers, got others")
-    model = Robot(
-        robot.core.with_parameters([(s.name, s.initial) for s in chosen]), robot.effects
-    )
+    model = Robot(robot.core.with_parameters([(s.name, s.initial) for s in chosen]), robot.effects)
     poses: list[PoseTuple] = []
     for point, share in zip(points, error, strict=True):
         response = model_response(
@@ -226,9 +240,7 @@ def pose_information(
         variance = (share * np.abs(response)) ** 2
         response = np.where(response == 0, 1.0, response)
         variance = np.where(variance > 0, variance, np.inf)
-        poses.append(
-            MeasuredResponse(tuple(point), f, response, quantity, variance).core()
-        )
+        poses.append(MeasuredResponse(tuple(point), f, response, quantity, variance).core())
     options = FrequencyFitOptions(criterion="weighted_least_squares", sampling=sampling)
     return _core.frequency_information(
         robot.core,

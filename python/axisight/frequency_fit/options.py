@@ -43,7 +43,8 @@ class FrequencyFitOptions:
         count more: a bias of the order of the relative variance.
     uncertainty
         ``response`` takes standard deviations from the variance of the response, ``sandwich``
-        from the scatter of the residuals over blocks of ``block_lines`` lines, ``auto`` the
+        from the scatter of the residuals over blocks of ``block_lines`` lines (fewer where that
+        would leave less than five blocks a parameter), ``auto`` the
         first, and the second where the residuals are larger than the variance explains.
     starts, start_spread, seed
         Searches from ``starts`` starting points; the first as given, the others with factors

@@ -28,9 +28,7 @@ class Spec:
     frozen: bool
 
 
-def specs(
-    robot: Robot, parameters: Sequence[str | Parameter] | Mapping[str, float]
-) -> list[Spec]:
+def specs(robot: Robot, parameters: Sequence[str | Parameter] | Mapping[str, float]) -> list[Spec]:
     """Return what to fit; a name starts at the value of the robot."""
     known = robot_parameters(robot)
     items: Sequence[str | Parameter | tuple[str, float]]
@@ -89,7 +87,9 @@ def _from_parameter(item: Parameter, known: Mapping[str, float]) -> Spec:
                 f"got {item.initial}"
             )
         lower = max(lower, item.initial * 1e-6)
-    if item.prior is not None and (item.prior[1] <= 0 or (is_positive(name) and item.prior[0] <= 0)):
+    if item.prior is not None and (
+        item.prior[1] <= 0 or (is_positive(name) and item.prior[0] <= 0)
+    ):
         raise InputError(f"{name}: expected a prior of positive deviation, got {item.prior}")
     prior = None if item.prior is None else (float(item.prior[0]), float(item.prior[1]))
     return Spec(

@@ -39,14 +39,15 @@ class FrequencyFit:
     misfit
         Mean square of a whitened residual, degrees of freedom counted: 1 if model and
         uncertainty are right.
-    loss, initial_loss, n_residuals, iterations, evaluations
-        Of the last search; real and imaginary part of a residual count as two.
+    loss, initial_loss, n_residuals
+        At the end and at the start; real and imaginary part of a residual count as two.
+    iterations, evaluations
+        Of all passes from the best start.
     at_bound
         Names of parameters on a bound.
-    identifiability
-        Of the data that was used, with combinations that it does not determine.
-    warnings
-        What to mind, in words.
+    identifiability, warnings
+        Of the data that was used, with combinations that it does not determine; and what to
+        mind, in words.
     starts
         Loss, status and iterations of the search from every starting point, best first.
     robot
@@ -122,10 +123,11 @@ class Covariances:
     misfit: float
 
 
-def covariances(result: _core.FrequencyFitResult, prior: Real, *, weighted: bool) -> Covariances:
+def covariances(result: _core.FrequencyFitResult, prior: Real, blocks: int) -> Covariances:
     """Return covariances from the normal equations; infinite where these are singular.
 
-    ``prior`` is the information of the priors, (n_parameters,).
+    ``prior`` is the information of the priors, (n_parameters,); ``blocks`` is the number of
+    blocks of the sandwich, which loses a degree of freedom for every parameter.
     """
     information = result.information
     n = len(information)
@@ -143,14 +145,11 @@ def covariances(result: _core.FrequencyFitResult, prior: Real, *, weighted: bool
     expected = result.expected_scatter
     if expected is None:
         expected = misfit * (information - np.diag(prior))
-    elif not weighted:
-        expected = np.asarray(expected)
-    middle = result.block_scatter
-    return Covariances(
-        inverse @ (expected + np.diag(prior)) @ inverse,
-        inverse @ (middle + np.diag(prior)) @ inverse,
-        misfit,
-    )
+    sandwich = nothing
+    if blocks > n:
+        middle = result.block_scatter * (blocks / (blocks - n))
+        sandwich = inverse @ (middle + np.diag(prior)) @ inverse
+    return Covariances(inverse @ (expected + np.diag(prior)) @ inverse, sandwich, misfit)
 
 
 MISFIT_EXPLAINED = 1.1

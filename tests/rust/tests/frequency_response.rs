@@ -50,7 +50,11 @@ fn variations() -> Vec<(&'static str, RobotDescription)> {
     }
     let mut weightless = nominal.clone();
     weightless.gravity = [0.0; 3];
-    vec![("nominal", nominal), ("frictionless", free), ("weightless", weightless)]
+    vec![
+        ("nominal", nominal),
+        ("frictionless", free),
+        ("weightless", weightless),
+    ]
 }
 
 /// The core linearizes the equations of motion with duals and solves every line; both round
@@ -61,8 +65,9 @@ fn sampled_response_is_that_of_the_core() {
         let f = frequencies();
         let found = columns(&robot, &[], &[], &f, Hold::ZeroOrder(robot.sample_time));
         let linear = linearize(&robot, &[], &POSE).expect("linear");
-        for (line, wanted) in
-            zoh_frequency_response(&linear, robot.sample_time, &f).into_iter().enumerate()
+        for (line, wanted) in zoh_frequency_response(&linear, robot.sample_time, &f)
+            .into_iter()
+            .enumerate()
         {
             let wanted = wanted.expect("no pole");
             let error = (at(&found, 0, line) - &wanted).norm() / wanted.norm();
@@ -80,7 +85,10 @@ fn continuous_response_is_that_of_the_state_space_model() {
         let lift = |m: &DMatrix<f64>| m.map(|x| C::new(x, 0.0));
         for (line, f) in f.iter().enumerate() {
             let s = DMatrix::from_diagonal_element(20, 20, C::new(0.0, TAU * f));
-            let x = (s - lift(&linear.a)).lu().solve(&lift(&linear.b)).expect("no pole");
+            let x = (s - lift(&linear.a))
+                .lu()
+                .solve(&lift(&linear.b))
+                .expect("no pole");
             let wanted = lift(&linear.c) * x;
             let error = (at(&found, 0, line) - &wanted).norm() / wanted.norm();
             assert!(error < 1e-10, "{name}: {error:.1e} at {f} Hz");
@@ -114,7 +122,11 @@ fn derivatives_agree_with_finite_differences() {
                     let exact = at(&found, i + 1, line);
                     let error = (exact - slope).norm() * size / at(&found, 0, line).norm();
                     let parameter = values[i].0.name(&robot);
-                    assert!(error < 1e-7, "{name} {hold:?} {parameter} {}: {error:.1e}", f[line]);
+                    assert!(
+                        error < 1e-7,
+                        "{name} {hold:?} {parameter} {}: {error:.1e}",
+                        f[line]
+                    );
                 }
             }
         }

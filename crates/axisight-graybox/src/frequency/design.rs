@@ -79,7 +79,12 @@ pub fn design(
 }
 
 fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
-    2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>()
+    2.0 * factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|x| x.ln())
+        .sum::<f64>()
 }
 
 /// `tr(A B)` of symmetric matrices.
@@ -100,7 +105,13 @@ impl<'a> Relaxed<'a> {
         let weights = vec![1.0 / matrices.len() as f64; matrices.len()];
         let factor = factor(matrices, &prior, &weights)?;
         let inverse = factor.inverse();
-        Ok(Self { matrices, prior, weights, factor, inverse })
+        Ok(Self {
+            matrices,
+            prior,
+            weights,
+            factor,
+            inverse,
+        })
     }
 
     fn renew(&mut self) -> Result<(), DesignError> {
@@ -114,19 +125,34 @@ impl<'a> Relaxed<'a> {
     }
 
     fn sensitivity(&self) -> Vec<f64> {
-        self.matrices.iter().map(|m| trace(&self.inverse, m)).collect()
+        self.matrices
+            .iter()
+            .map(|m| trace(&self.inverse, m))
+            .collect()
     }
 
     /// Bound on what the relaxation still lacks.
     fn gap(&self) -> f64 {
         let sensitivity = self.sensitivity();
-        let mean: f64 = sensitivity.iter().zip(&self.weights).map(|(d, w)| d * w).sum();
-        sensitivity.iter().copied().fold(f64::NEG_INFINITY, f64::max) - mean
+        let mean: f64 = sensitivity
+            .iter()
+            .zip(&self.weights)
+            .map(|(d, w)| d * w)
+            .sum();
+        sensitivity
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max)
+            - mean
     }
 
     fn multiply(&mut self) -> Result<(), DesignError> {
         let sensitivity = self.sensitivity();
-        let mean: f64 = sensitivity.iter().zip(&self.weights).map(|(d, w)| d * w).sum();
+        let mean: f64 = sensitivity
+            .iter()
+            .zip(&self.weights)
+            .map(|(d, w)| d * w)
+            .sum();
         for (w, d) in self.weights.iter_mut().zip(&sensitivity) {
             *w *= d / mean;
         }
@@ -137,7 +163,9 @@ impl<'a> Relaxed<'a> {
     fn exchange(&mut self) -> Result<(), DesignError> {
         let sensitivity = self.sensitivity();
         let order = |i: &usize, j: &usize| sensitivity[*i].total_cmp(&sensitivity[*j]);
-        let used = (0..self.weights.len()).filter(|i| self.weights[*i] > 0.0).min_by(order);
+        let used = (0..self.weights.len())
+            .filter(|i| self.weights[*i] > 0.0)
+            .min_by(order);
         let (Some(from), Some(to)) = (used, (0..self.weights.len()).max_by(order)) else {
             return Ok(());
         };
@@ -212,7 +240,9 @@ fn whole(
                 trial[from] -= 1;
                 trial[to] += 1;
                 let result = value(&trial);
-                if result > best + 1e-12 * best.abs().max(1.0) || best == f64::NEG_INFINITY && result > best {
+                if result > best + 1e-12 * best.abs().max(1.0)
+                    || best == f64::NEG_INFINITY && result > best
+                {
                     best = result;
                     found = Some(trial);
                 }
@@ -226,6 +256,9 @@ fn whole(
     if best == f64::NEG_INFINITY {
         return Err(DesignError);
     }
-    let chosen = counts.iter().enumerate().flat_map(|(i, c)| std::iter::repeat_n(i, *c));
+    let chosen = counts
+        .iter()
+        .enumerate()
+        .flat_map(|(i, c)| std::iter::repeat_n(i, *c));
     Ok((chosen.collect(), best))
 }

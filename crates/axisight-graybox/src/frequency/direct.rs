@@ -55,11 +55,7 @@ struct Held {
     output: DMatrix<f64>,
 }
 
-fn held(
-    model: &SecondOrder,
-    derivatives: &[SecondOrderDerivative],
-    step: f64,
-) -> Option<Held> {
+fn held(model: &SecondOrder, derivatives: &[SecondOrderDerivative], step: f64) -> Option<Held> {
     let (n, m) = (model.mass.nrows(), model.input.ncols());
     let factor = model.mass.clone().cholesky()?.l();
     let whiten = |x: &DMatrix<f64>| -> Option<DMatrix<f64>> {
@@ -88,7 +84,11 @@ fn held(
     joint.view_mut((0, n), (n, n)).fill_diagonal(step);
     let mut output = DMatrix::zeros(m, 2 * n);
     output.view_mut((0, 0), (m, n)).copy_from(&e.transpose());
-    Some(Held { joint, derivatives: changes, output })
+    Some(Held {
+        joint,
+        derivatives: changes,
+        output,
+    })
 }
 
 fn sampled(
@@ -97,7 +97,11 @@ fn sampled(
     frequency_hz: &[f64],
     step: f64,
 ) -> Option<Columns> {
-    let Held { joint, derivatives, output } = held(model, derivatives, step)?;
+    let Held {
+        joint,
+        derivatives,
+        output,
+    } = held(model, derivatives, step)?;
     let (m, nx, size) = (output.nrows(), output.ncols(), joint.nrows());
     let discrete = joint.clone().exp();
     // exp [J dJ; 0 J] holds the derivative of exp J in its upper right corner.
@@ -111,8 +115,8 @@ fn sampled(
             complex(&both.exp().view((0, size), (size, size)).into_owned())
         })
         .collect();
-    let shift = complex(&discrete.view((0, 0), (nx, nx)).into_owned())
-        - DMatrix::<C>::identity(nx, nx);
+    let shift =
+        complex(&discrete.view((0, 0), (nx, nx)).into_owned()) - DMatrix::<C>::identity(nx, nx);
     let input = complex(&discrete.view((0, nx), (nx, m)).into_owned());
     let output = complex(&output);
     let mut out = Columns::zeros(m, frequency_hz.len(), derivatives.len());
@@ -124,7 +128,11 @@ fn sampled(
         if changes.is_empty() {
             continue;
         }
-        let from = resolvent.transpose().lu().solve(&output.transpose())?.transpose();
+        let from = resolvent
+            .transpose()
+            .lu()
+            .solve(&output.transpose())?
+            .transpose();
         for (p, change) in changes.iter().enumerate() {
             let moved = change.view((0, 0), (nx, nx)) * &into + change.view((0, nx), (nx, m));
             out.set(line, p + 1, &(&from * moved));

@@ -35,7 +35,13 @@ impl Pole {
         let Hold::ZeroOrder(step) = hold else {
             let (zero, one) = (C::new(0.0, 0.0), C::new(1.0, 0.0));
             let (shift, shift_slope) = (value, one);
-            return Self { value, shift, phi: one, phi_slope: zero, shift_slope };
+            return Self {
+                value,
+                shift,
+                phi: one,
+                phi_slope: zero,
+                shift_slope,
+            };
         };
         let x = value * step;
         let (first, second) = if x.norm() < SERIES_BELOW {

@@ -79,7 +79,13 @@ pub fn minimize(
     let status = search.run(options)?;
     let scatter = problem.scatter(&search.theta)?;
     let values = problem.values(&search.theta);
-    let slope = |i: &usize| if problem.parameters[*i].logarithmic { values[*i] } else { 1.0 };
+    let slope = |i: &usize| {
+        if problem.parameters[*i].logarithmic {
+            values[*i]
+        } else {
+            1.0
+        }
+    };
     Ok(FrequencyFit {
         status,
         slopes: problem.free.iter().map(slope).collect(),
@@ -149,11 +155,25 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(problem: &'a FrequencyProblem) -> Result<Self, FrequencyFitError> {
         let start = problem.parameters.iter();
-        let theta: Vec<f64> =
-            start.map(|p| if p.logarithmic { p.initial.ln() } else { p.initial }).collect();
+        let theta: Vec<f64> = start
+            .map(|p| {
+                if p.logarithmic {
+                    p.initial.ln()
+                } else {
+                    p.initial
+                }
+            })
+            .collect();
         let limits = Limits::new(problem);
         let point = evaluate(problem, &limits, &theta)?;
-        Ok(Self { problem, limits, theta, point, iterations: 0, evaluations: 1 })
+        Ok(Self {
+            problem,
+            limits,
+            theta,
+            point,
+            iterations: 0,
+            evaluations: 1,
+        })
     }
 
     fn total(&self, point: &Normal, theta: &[f64]) -> f64 {
@@ -209,12 +229,17 @@ impl<'a> Search<'a> {
         for _ in 0..=n {
             let step = damped(&self.point, damping, &held);
             let longest = step.amax();
-            let shrink = if longest > LONGEST_STEP { LONGEST_STEP / longest } else { 1.0 };
+            let shrink = if longest > LONGEST_STEP {
+                LONGEST_STEP / longest
+            } else {
+                1.0
+            };
             let mut theta = self.theta.clone();
             let mut hit = false;
             for (slot, i) in free.iter().enumerate() {
                 let wanted = self.theta[*i] + shrink * step[slot];
-                let outward = (wanted < self.limits.lower[*i] && self.theta[*i] <= self.limits.lower[*i])
+                let outward = (wanted < self.limits.lower[*i]
+                    && self.theta[*i] <= self.limits.lower[*i])
                     || (wanted > self.limits.upper[*i] && self.theta[*i] >= self.limits.upper[*i]);
                 if outward && !held[slot] {
                     held[slot] = true;
@@ -267,7 +292,9 @@ fn damped(point: &Normal, damping: f64, held: &[bool]) -> DVector<f64> {
     }
     // Scaled to unit diagonal, the matrix loses no digits to units.
     let scale = matrix.diagonal().map(|x| 1.0 / x.sqrt());
-    let unit = DMatrix::from_fn(held.len(), held.len(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let unit = DMatrix::from_fn(held.len(), held.len(), |i, j| {
+        matrix[(i, j)] * scale[i] * scale[j]
+    });
     let right = gradient.component_mul(&scale);
     unit.cholesky().map_or_else(
         || DVector::zeros(held.len()),

@@ -72,7 +72,9 @@ impl Modal {
         });
         let eigen = state.eigen().ok()?;
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
-        let poles: Vec<C> = (0..2 * n).map(|k| C::new(values[k].re, values[k].im)).collect();
+        let poles: Vec<C> = (0..2 * n)
+            .map(|k| C::new(values[k].re, values[k].im))
+            .collect();
         let places = places(&poles)?;
         let mut shape = DMatrix::from_fn(2 * n, 2 * n, |i, k| {
             C::new(vectors[(i, k)].re, vectors[(i, k)].im)
@@ -224,7 +226,11 @@ impl Moved {
                 C::new(re, all[(j, n + k)] + all[(n + j, k)])
             }))
         };
-        let parts = [seen(&change.stiffness), seen(&change.damping), seen(&change.mass)];
+        let parts = [
+            seen(&change.stiffness),
+            seen(&change.damping),
+            seen(&change.mass),
+        ];
         Self { parts }
     }
 
@@ -249,7 +255,10 @@ impl Moved {
     /// `y_k^T dZ(s) u_k` and its slope over `s`.
     fn own(&self, k: usize, s: C) -> (C, C) {
         let [stiffness, damping, mass] = self.polynomial(k, k);
-        (stiffness + (damping + mass * s) * s, damping + mass * s * 2.0)
+        (
+            stiffness + (damping + mass * s) * s,
+            damping + mass * s * 2.0,
+        )
     }
 }
 
@@ -268,7 +277,11 @@ fn add_scaled(sum: &mut [C], x: &[C], factor: C) {
 fn parts(matrix: &DMatrix<C>) -> DMatrix<f64> {
     let n = matrix.ncols();
     DMatrix::from_fn(matrix.nrows(), 2 * n, |i, k| {
-        if k < n { matrix[(i, k)].re } else { matrix[(i, k - n)].im }
+        if k < n {
+            matrix[(i, k)].re
+        } else {
+            matrix[(i, k - n)].im
+        }
     })
 }
 
@@ -284,5 +297,11 @@ fn places(poles: &[C]) -> Option<Vec<Place>> {
         return None;
     }
     let all = poles.iter().enumerate().filter(|(_, p)| p.im >= 0.0);
-    Some(all.map(|(index, p)| Place { index, conjugate: p.im > 0.0 }).collect())
+    Some(
+        all.map(|(index, p)| Place {
+            index,
+            conjugate: p.im > 0.0,
+        })
+        .collect(),
+    )
 }

@@ -46,7 +46,9 @@ pub enum FrequencyFitError {
         got: String,
     },
     /// A weighted criterion without uncertainty.
-    #[error("response {pose}: expected a variance or covariance for a weighted criterion, got none")]
+    #[error(
+        "response {pose}: expected a variance or covariance for a weighted criterion, got none"
+    )]
     NoVariance {
         /// Operating point, from 1.
         pose: usize,
@@ -177,9 +179,15 @@ impl FrequencyProblem {
             check_pose(&data, robot.n_axes(), number, options)?;
             let (whitening, expected) =
                 whitening(&data, options.criterion, options.weighted, number)?;
-            prepared.push(Prepared { data, whitening, expected });
+            prepared.push(Prepared {
+                data,
+                whitening,
+                expected,
+            });
         }
-        let free = (0..parameters.len()).filter(|i| !parameters[*i].frozen).collect();
+        let free = (0..parameters.len())
+            .filter(|i| !parameters[*i].frozen)
+            .collect();
         Ok(Self {
             free,
             parameters,
@@ -196,7 +204,11 @@ impl FrequencyProblem {
 
     /// Values of all parameters in their own units; `theta` are those of the search.
     pub fn values(&self, theta: &[f64]) -> Vec<f64> {
-        let natural = |(p, x): (&FrequencyParameter, &f64)| if p.logarithmic { x.exp() } else { *x };
+        let natural = |(p, x): (&FrequencyParameter, &f64)| match (p.frozen, p.logarithmic) {
+            (true, _) => p.initial,
+            (false, true) => x.exp(),
+            (false, false) => *x,
+        };
         self.parameters.iter().zip(theta).map(natural).collect()
     }
 
@@ -273,7 +285,13 @@ impl FrequencyProblem {
         let seeds: &[usize] = if derivatives { &self.free } else { &[] };
         let linearizer = Linearizer::new(&self.robot, &self.settings, &overrides, seeds)
             .map_err(|source| FrequencyFitError::Robot { pose: 1, source })?;
-        let slope = |i: &usize| if self.parameters[*i].logarithmic { values[*i] } else { 1.0 };
+        let slope = |i: &usize| {
+            if self.parameters[*i].logarithmic {
+                values[*i]
+            } else {
+                1.0
+            }
+        };
         let slopes: Vec<f64> = seeds.iter().map(slope).collect();
         let one = |(number, pose): (usize, &Prepared)| {
             let residuals = self.residuals(number, pose, &linearizer, &slopes)?;
@@ -289,7 +307,10 @@ impl FrequencyProblem {
         linearizer: &Linearizer<'_>,
         slopes: &[f64],
     ) -> Result<Residuals, FrequencyFitError> {
-        let failed = |source| FrequencyFitError::Robot { pose: number + 1, source };
+        let failed = |source| FrequencyFitError::Robot {
+            pose: number + 1,
+            source,
+        };
         let (model, derivatives) = linearizer.at(&pose.data.joint_angle).map_err(failed)?;
         let columns = evaluate(&model, &derivatives, &pose.data.frequency_hz, self.hold)
             .ok_or(failed(SecondOrderError::Mass))?;
@@ -317,7 +338,12 @@ impl FrequencyProblem {
         let size = 2 * lines * m * m;
         let mut values = vec![0.0; size];
         let mut jacobian = vec![vec![0.0; size]; slopes.len()];
-        let powers: Vec<C> = pose.data.frequency_hz.iter().map(|f| power(*f, pose.data.order)).collect();
+        let powers: Vec<C> = pose
+            .data
+            .frequency_hz
+            .iter()
+            .map(|f| power(*f, pose.data.order))
+            .collect();
         let mut factor = vec![C::default(); lines];
         for element in 0..m * m {
             let (a, b) = (element / m, element % m);
@@ -355,7 +381,12 @@ impl FrequencyProblem {
                 }
             }
         }
-        Residuals { values, weight: Vec::new(), loss: 0.0, jacobian }
+        Residuals {
+            values,
+            weight: Vec::new(),
+            loss: 0.0,
+            jacobian,
+        }
     }
 }
 
@@ -409,7 +440,10 @@ impl Residuals {
             return;
         }
         self.weight = vec![1.0; self.values.len()];
-        let pairs = self.values.chunks(2 * lines).zip(self.weight.chunks_mut(2 * lines));
+        let pairs = self
+            .values
+            .chunks(2 * lines)
+            .zip(self.weight.chunks_mut(2 * lines));
         for (values, weight) in pairs {
             for line in 0..lines {
                 let (value, w) = loss.evaluate(values[line].hypot(values[lines + line]));
@@ -418,9 +452,15 @@ impl Residuals {
             }
         }
         for column in &mut self.jacobian {
-            column.iter_mut().zip(&self.weight).for_each(|(x, w)| *x *= w.sqrt());
+            column
+                .iter_mut()
+                .zip(&self.weight)
+                .for_each(|(x, w)| *x *= w.sqrt());
         }
-        self.values.iter_mut().zip(&self.weight).for_each(|(r, w)| *r *= w.sqrt());
+        self.values
+            .iter_mut()
+            .zip(&self.weight)
+            .for_each(|(r, w)| *r *= w.sqrt());
     }
 
     fn normal(self) -> Normal {
@@ -434,7 +474,11 @@ impl Residuals {
             }
         }
         let gradient = self.jacobian.iter().map(|column| dot(column, &self.values));
-        Normal { loss: self.loss, gradient: DVector::from_iterator(n, gradient), matrix }
+        Normal {
+            loss: self.loss,
+            gradient: DVector::from_iterator(n, gradient),
+            matrix,
+        }
     }
 
     /// `J^T V J` with the variances `V` that the response's uncertainty leaves.
@@ -460,7 +504,8 @@ impl Residuals {
             let last = (first + block).min(lines);
             let part = |column: &Vec<f64>| -> f64 {
                 let rows = column.chunks(lines).zip(self.values.chunks(lines));
-                rows.map(|(c, r)| dot(&c[first..last], &r[first..last])).sum()
+                rows.map(|(c, r)| dot(&c[first..last], &r[first..last]))
+                    .sum()
             };
             let gradient = DVector::from_iterator(n, self.jacobian.iter().map(part));
             sum += &gradient * gradient.transpose();
@@ -506,7 +551,11 @@ fn check_parameters(
     robot: &RobotDescription,
 ) -> Result<(), FrequencyFitError> {
     if parameters.iter().all(|p| p.frozen) {
-        return Err(invalid("parameters", "at least one that is not frozen", parameters.len()));
+        return Err(invalid(
+            "parameters",
+            "at least one that is not frozen",
+            parameters.len(),
+        ));
     }
     for (i, p) in parameters.iter().enumerate() {
         let name = p.parameter.name(robot);
@@ -519,10 +568,20 @@ fn check_parameters(
             let expected = "a positive lower bound for a search over the logarithm";
             return Err(invalid(&name, expected, p.lower));
         }
-        if p.prior.is_some_and(|(mean, std)| !(mean.is_finite() && std > 0.0 && std.is_finite())) {
-            return Err(invalid(&name, "a prior of finite mean and positive deviation", "another"));
+        if p.prior
+            .is_some_and(|(mean, std)| !(mean.is_finite() && std > 0.0 && std.is_finite()))
+        {
+            return Err(invalid(
+                &name,
+                "a prior of finite mean and positive deviation",
+                "another",
+            ));
         }
-        if parameters.iter().take(i).any(|other| other.parameter == p.parameter) {
+        if parameters
+            .iter()
+            .take(i)
+            .any(|other| other.parameter == p.parameter)
+        {
             return Err(invalid(&name, "each parameter once", "it twice"));
         }
     }
@@ -545,14 +604,26 @@ fn check_pose(
         Hold::Continuous => f64::INFINITY,
         Hold::ZeroOrder(step) => 0.5 / step,
     };
-    if let Some(f) = pose.frequency_hz.iter().find(|f| !(**f > 0.0 && **f < highest)) {
+    if let Some(f) = pose
+        .frequency_hz
+        .iter()
+        .find(|f| !(**f > 0.0 && **f < highest))
+    {
         let expected = format!("frequencies above zero and below {highest} Hz");
         return Err(invalid(&field("frequency_hz"), &expected, f));
     }
     if pose.response.len() != elements {
-        return Err(invalid(&field("response"), &format!("{elements} numbers"), pose.response.len()));
+        return Err(invalid(
+            &field("response"),
+            &format!("{elements} numbers"),
+            pose.response.len(),
+        ));
     }
-    if let Some(g) = pose.response.iter().find(|g| !(g.re.is_finite() && g.im.is_finite())) {
+    if let Some(g) = pose
+        .response
+        .iter()
+        .find(|g| !(g.re.is_finite() && g.im.is_finite()))
+    {
         return Err(invalid(&field("response"), "finite numbers", g));
     }
     if let Some(reference) = &pose.reference {
@@ -568,7 +639,11 @@ fn check_pose(
         Uncertainty::Covariance(v) => (v.len(), elements * n_axes * n_axes),
     };
     if length != wanted {
-        return Err(invalid(&field("variance"), &format!("{wanted} numbers"), length));
+        return Err(invalid(
+            &field("variance"),
+            &format!("{wanted} numbers"),
+            length,
+        ));
     }
     let mut left_out = vec![false; elements];
     if let Uncertainty::Variance(v) = &pose.uncertainty {
@@ -577,9 +652,14 @@ fn check_pose(
         }
         left_out = v.iter().map(|v| v.is_infinite()).collect();
     }
-    let zero = pose.response.iter().zip(&left_out).any(|(g, out)| *g == C::default() && !out);
+    let zero = pose
+        .response
+        .iter()
+        .zip(&left_out)
+        .any(|(g, out)| *g == C::default() && !out);
     if options.criterion == Criterion::Logarithmic && zero {
-        let expected = "elements other than zero for a logarithm (an infinite variance leaves one out)";
+        let expected =
+            "elements other than zero for a logarithm (an infinite variance leaves one out)";
         return Err(invalid(&field("response"), expected, 0));
     }
     Ok(())

@@ -20,7 +20,11 @@ pub struct Columns {
 impl Columns {
     pub(super) fn zeros(n_axes: usize, n_lines: usize, n_derivatives: usize) -> Self {
         let columns = (n_derivatives + 1) * n_axes * (n_axes + 1) / 2;
-        Self { n_axes, n_lines, data: DMatrix::zeros(2 * n_lines, columns) }
+        Self {
+            n_axes,
+            n_lines,
+            data: DMatrix::zeros(2 * n_lines, columns),
+        }
     }
 
     pub(super) fn set(&mut self, line: usize, p: usize, value: &DMatrix<C>) {
@@ -75,9 +79,20 @@ fn by_poles(
     all.extend(derivatives.iter().map(|d| modal.derivative(d)));
     let mut coefficients = DMatrix::zeros(basis.ncols(), all.len() * n_elements);
     for (p, found) in all.iter().enumerate() {
-        fill(&mut coefficients, p * n_elements, n_elements, modal, found, with_slopes);
+        fill(
+            &mut coefficients,
+            p * n_elements,
+            n_elements,
+            modal,
+            found,
+            with_slopes,
+        );
     }
-    let mut out = Columns { n_axes, n_lines: frequency_hz.len(), data: basis * coefficients };
+    let mut out = Columns {
+        n_axes,
+        n_lines: frequency_hz.len(),
+        data: basis * coefficients,
+    };
     if with_slopes {
         add_pairs(&mut out, modal, &all, frequency_hz, hold);
     }

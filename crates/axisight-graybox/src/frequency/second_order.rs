@@ -18,7 +18,12 @@ const WIDTH: usize = 8;
 type D = Dual<f64, WIDTH>;
 
 /// Effects that only change masses, springs or dampers, so that the robot stays linear.
-const LINEAR_EFFECTS: [&str; 4] = ["payload", "joint_stiffness", "joint_damping", "motor_inertia"];
+const LINEAR_EFFECTS: [&str; 4] = [
+    "payload",
+    "joint_stiffness",
+    "joint_damping",
+    "motor_inertia",
+];
 
 /// `M p'' + D p' + K p = E u`, motor angles `E^T p`.
 #[derive(Debug, Clone)]
@@ -96,7 +101,9 @@ impl<'a> Linearizer<'a> {
         values: &[(Parameter, f64)],
         seeds: &[usize],
     ) -> Result<Self, SecondOrderError> {
-        let foreign = settings.iter().find(|s| !LINEAR_EFFECTS.contains(&s.name.as_str()));
+        let foreign = settings
+            .iter()
+            .find(|s| !LINEAR_EFFECTS.contains(&s.name.as_str()));
         if let Some(setting) = foreign {
             return Err(SecondOrderError::Effect(setting.name.clone()));
         }
@@ -199,7 +206,11 @@ impl<'a> Linearizer<'a> {
     fn matrices<S: Scalar>(&self, plant: &Plant<S>, q: &[S]) -> Matrices<S> {
         let (motors, joints, n) = (plant.n_motors(), q.len(), plant.n_angles());
         let zero = vec![S::zero(); n * n];
-        let mut out = Matrices { mass: zero.clone(), damping: zero.clone(), stiffness: zero };
+        let mut out = Matrices {
+            mass: zero.clone(),
+            damping: zero.clone(),
+            stiffness: zero,
+        };
         let inertia = plant.dynamics.evaluate(q, &vec![S::zero(); joints]).inertia;
         let gravity = self.gravity_stiffness(&plant.chain, q);
         for i in 0..joints {
@@ -216,9 +227,10 @@ impl<'a> Linearizer<'a> {
             let Some(gear) = &axis.gear else { continue };
             let joint = motors + axis.joint;
             let (r, cross) = (axis.ratio, slot * n + joint);
-            for (matrix, value) in
-                [(&mut out.stiffness, gear.stiffness), (&mut out.damping, gear.damping)]
-            {
+            for (matrix, value) in [
+                (&mut out.stiffness, gear.stiffness),
+                (&mut out.damping, gear.damping),
+            ] {
                 matrix[own] += value * (r * r);
                 matrix[cross] += value * (-r);
                 matrix[joint * n + slot] += value * (-r);
@@ -249,7 +261,9 @@ impl<'a> Linearizer<'a> {
                 first += com.scale(body.mass);
             }
             let push = match self.motion[j] {
-                Motion::Revolute => poses[j].axis.cross(&(first - poses[j].position.scale(mass))),
+                Motion::Revolute => poses[j]
+                    .axis
+                    .cross(&(first - poses[j].position.scale(mass))),
                 Motion::Prismatic => poses[j].axis.scale(mass),
             };
             for i in 0..=j {

@@ -72,7 +72,11 @@ pub(super) fn whitening(
         let factor = (0..pose.response.len()).map(used).collect();
         let left = variance.as_ref().map(|v| {
             let half = |(k, v): (usize, &f64)| 0.5 * v / relative(k).powi(2);
-            v.iter().enumerate().map(half).map(|x| if x.is_finite() { x } else { 0.0 }).collect()
+            v.iter()
+                .enumerate()
+                .map(half)
+                .map(|x| if x.is_finite() { x } else { 0.0 })
+                .collect()
         });
         return Ok((Whitening::Elements(factor), left));
     }
@@ -91,11 +95,18 @@ pub(super) fn whitening(
                 let matrix = DMatrix::from_fn(n, n, |i, j| {
                     block[i * n + j] * 0.5 / (own(i) * own(j).conj())
                 });
-                inverse_factor(matrix)
-                    .ok_or(FrequencyFitError::Covariance { pose: number + 1, line: line + 1 })
+                inverse_factor(matrix).ok_or(FrequencyFitError::Covariance {
+                    pose: number + 1,
+                    line: line + 1,
+                })
             };
-            let lines = (0..pose.frequency_hz.len()).map(line).collect::<Result<_, _>>()?;
-            Ok((Whitening::Lines(lines), Some(vec![1.0; pose.response.len()])))
+            let lines = (0..pose.frequency_hz.len())
+                .map(line)
+                .collect::<Result<_, _>>()?;
+            Ok((
+                Whitening::Lines(lines),
+                Some(vec![1.0; pose.response.len()]),
+            ))
         }
     }
 }
@@ -109,7 +120,10 @@ fn inverse_factor(matrix: DMatrix<C>) -> Option<DMatrix<C>> {
         return None;
     }
     let inverse = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
-    inverse.iter().all(|x| x.re.is_finite() && x.im.is_finite()).then_some(inverse)
+    inverse
+        .iter()
+        .all(|x| x.re.is_finite() && x.im.is_finite())
+        .then_some(inverse)
 }
 
 fn diagonal(pose: &PoseResponse) -> Option<Vec<f64>> {
