@@ -9,6 +9,7 @@ mod effects;
 mod entry;
 mod excitation;
 mod fit;
+mod frequency_fit;
 mod frf;
 mod local_models;
 mod montecarlo;
@@ -63,5 +64,16 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(axis_fit::axis_fit, module)?)?;
     module.add_function(wrap_pyfunction!(axis_fit::axis_linearize, module)?)?;
     module.add_function(wrap_pyfunction!(axis_fit::axis_simulate, module)?)?;
+    module.add_class::<frequency_fit::FrequencyFitResult>()?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::fit_frequency_responses,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::frequency_information,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::frequency_response, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::design_poses, module)?)?;
     Ok(())
 }
