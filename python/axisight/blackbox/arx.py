@@ -27,7 +27,7 @@ from axisight.blackbox._data import (
     lines,
     order_matrix,
 )
-from axisight.blackbox.state_space import StateSpaceModel, expect_experiment
+from axisight.blackbox._model import StateSpaceModel, expect_experiment
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment

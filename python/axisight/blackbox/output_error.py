@@ -30,7 +30,7 @@ from axisight.blackbox._data import (
     order_matrix,
     whole,
 )
-from axisight.blackbox.state_space import StateSpaceModel
+from axisight.blackbox._model import StateSpaceModel
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment

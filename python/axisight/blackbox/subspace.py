@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from axisight.blackbox._data import Complex, Real, fit_percent, gathered, whole
-from axisight.blackbox.state_space import StateSpaceModel
+from axisight.blackbox._model import StateSpaceModel
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
 
