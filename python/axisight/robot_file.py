@@ -19,11 +19,11 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
 from axisight import _core
@@ -31,13 +31,13 @@ from axisight.effects import Effect
 from axisight.errors import InputError, RobotError
 from axisight.fitting import Fitted
 from axisight.robot import Robot, load_robot
+from axisight.robot_sidecar import Sidecar, first_fault, text_hash
 from axisight.storage import write_whole
-from axisight.toml_spans import Span, value_spans
+from axisight.toml_spans import value_spans
 
 Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 
-SCHEMA = "axisight.identified/1"
 INERTIA = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
 _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
     "mass": (("link", "mass"), "kg"),
@@ -160,7 +160,9 @@ def identified_by_fit(
         if "@" in name and name.rpartition(".")[0] not in labels:
             raise InputError(f"effects: expected the effect of {name!r}, got {labels}")
     known = bool(np.isfinite(fitted.covariance).all())
-    errors = {n: s for n, s in zip(fitted.names, fitted.std.tolist(), strict=True) if np.isfinite(s)}
+    errors = {
+        n: s for n, s in zip(fitted.names, fitted.std.tolist(), strict=True) if np.isfinite(s)
+    }
     return identified(
         values,
         provenance,
@@ -219,7 +221,7 @@ def write_identified(
     kept = [effect for effect in robot.effects if effect.label not in labels]
     found = replace(found, provenance=stamped, effects=(*found.effects, *kept))
     text = render(robot, found, sidecar.name)
-    report = _Sidecar.of(found, robot, text, path.name)
+    report = Sidecar.of(found, robot, text, path.name)
     try:
         dumped = report.model_dump_json(indent=1, by_alias=True)
     except PydanticSerializationError as error:
@@ -269,7 +271,9 @@ def _changes(
     """Return new values and comments by the place they belong to."""
     changes: dict[Key, float] = {}
     notes: dict[Key, list[str]] = {}
-    labels = {f"{effect.label}.{name}" for effect in found.effects for name in effect.parameters or {}}
+    labels = {
+        f"{effect.label}.{name}" for effect in found.effects for name in effect.parameters or {}
+    }
     for name, value, error in zip(found.names, found.values, found.standard_errors, strict=True):
         if name in labels:
             continue
@@ -278,7 +282,9 @@ def _changes(
         if quantity == "inertia_scale":
             inertia: Key = (*base, "link", "inertia")
             if any((*inertia, k) in changes for k in range(6)):
-                raise InputError(f"{name}: expected either a scale or moments of one link, got both")
+                raise InputError(
+                    f"{name}: expected either a scale or moments of one link, got both"
+                )
             if value <= 0:
                 raise RobotError(f"{name}: expected a positive factor, got {value}")
             for k, old in enumerate(_at(document, inertia)):
@@ -295,8 +301,8 @@ def _changes(
         changes[full] = float(value)
         notes.setdefault(full, []).append(_note(name, value, error, unit, old))
         _refuse(name, quantity, float(value), rigid="stiffness" not in document["joint"][joint])
-    for joint in {key[1] for key in changes}:
-        _refuse_inertia(document, changes, int(joint))
+    for place in {int(key[1]) for key in changes}:
+        _refuse_inertia(document, changes, place)
     return changes, notes
 
 
@@ -350,7 +356,9 @@ def _check(text: str, before: dict[str, Any], changes: dict[Key, float]) -> None
     for key, value in changes.items():
         wanted = _replaced(wanted, key, value)
     if not _equal(tomllib.loads(text), wanted):
-        raise RobotError("source: its text cannot be edited faithfully; write it in plain TOML tables")
+        raise RobotError(
+            "source: its text cannot be edited faithfully; write it in plain TOML tables"
+        )
     _core.Robot.from_toml(text)
 
 
@@ -367,7 +375,7 @@ def _equal(a: Any, b: Any) -> bool:
 def _replaced(node: Any, key: Key, value: float) -> Any:
     if not key:
         return value
-    copy = dict(node) if isinstance(node, dict) else list(node)
+    copy: Any = dict(node) if isinstance(node, dict) else list(node)
     copy[key[0]] = _replaced(node[key[0]], key[1:], value)
     return copy
 
@@ -429,82 +437,13 @@ def _number(name: str, value: float) -> float:
 def _covariance(value: ArrayLike, n: int) -> Array:
     matrix = np.asarray(value, np.float64)
     if matrix.shape != (n, n) or not np.isfinite(matrix).all():
-        raise InputError(f"covariance: expected finite numbers, shape ({n}, {n}), got {matrix.shape}")
+        raise InputError(
+            f"covariance: expected finite numbers, shape ({n}, {n}), got {matrix.shape}"
+        )
     size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
     if np.any(np.abs(matrix - matrix.T) > 1e-9 * size) or np.any(np.diag(matrix) < 0):
         raise InputError("covariance: expected a symmetric matrix of non-negative variances")
     return matrix
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class _Parameter(_Strict):
-    name: str
-    value: float
-    standard_error: float | None
-
-
-class _EffectEntry(_Strict):
-    name: str
-    axis: int | None
-    parameters: dict[str, float]
-
-
-class _Source(_Strict):
-    method: str
-    data: dict[str, str]
-    settings: dict[str, Any]
-    created: str
-    axisight_version: str
-    notes: str
-
-
-class _Sidecar(_Strict):
-    # The name `schema` is taken by pydantic itself; the file says "schema".
-    model_config = ConfigDict(extra="forbid", strict=True, populate_by_name=True)
-    format: Literal["axisight.identified/1"] = Field(alias="schema")
-    robot: str
-    robot_sha256: str
-    source_sha256: str
-    parameters: list[_Parameter]
-    covariance: list[list[float]] | None
-    effects: list[_EffectEntry]
-    provenance: _Source
-
-    @classmethod
-    def of(cls, found: Identified, robot: Robot, text: str, name: str) -> _Sidecar:
-        given = found.provenance
-        created = given.created.isoformat() if given.created else ""
-        try:
-            return cls(
-                format=SCHEMA,
-                robot=name,
-                robot_sha256=_hash(text),
-                source_sha256=_hash(robot.core.toml),
-                parameters=[
-                    _Parameter(name=n, value=float(v), standard_error=_known(e))
-                    for n, v, e in zip(
-                        found.names, found.values, found.standard_errors, strict=True
-                    )
-                ],
-                covariance=None if found.covariance is None else found.covariance.tolist(),
-                effects=[
-                    _EffectEntry(name=e.name, axis=e.axis, parameters=dict(e.parameters or {}))
-                    for e in found.effects
-                ],
-                provenance=_Source(
-                    method=given.method,
-                    data=dict(given.data),
-                    settings=dict(given.settings),
-                    created=created,
-                    axisight_version=given.axisight_version,
-                    notes=given.notes,
-                ),
-            )
-        except ValidationError as error:
-            raise InputError(f"provenance: {_first(error)}") from None
 
 
 def load_identified(path: Path | str, *, check: bool = True) -> Identified:
@@ -526,13 +465,13 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"path: expected the sidecar {sidecar}: {error}") from error
     try:
-        report = _Sidecar.model_validate_json(text)
+        report = Sidecar.model_validate_json(text)
     except ValidationError as error:
-        raise InputError(f"{sidecar}: {_first(error)}") from None
+        raise InputError(f"{sidecar}: {first_fault(error)}") from None
     if Path(report.robot).name != report.robot:
         raise InputError(f"{sidecar}: robot: expected a file beside it, got {report.robot!r}")
     robot = load_robot(sidecar.with_name(report.robot))
-    if check and _hash(robot.core.toml) != report.robot_sha256:
+    if check and text_hash(robot.core.toml) != report.robot_sha256:
         raise InputError(
             f"{sidecar}: the robot {report.robot} was changed after it was written: identify again, "
             "or pass check=False to take both as they are"
@@ -569,17 +508,3 @@ def _created(text: str, sidecar: Path) -> datetime:
         raise InputError(
             f"{sidecar}: provenance.created: expected an ISO date, got {text!r}"
         ) from None
-
-
-def _known(number: float) -> float | None:
-    return float(number) if np.isfinite(number) else None
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8")).hexdigest()
-
-
-def _first(error: ValidationError) -> str:
-    item = error.errors()[0]
-    where = ".".join(str(part) for part in item["loc"]) or "file"
-    return f"{where}: {item['msg']}"

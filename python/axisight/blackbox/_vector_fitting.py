@@ -29,7 +29,7 @@ def relocated(problem: Weighted, sections: Sections) -> Complex:
     known = np.broadcast_to(columns, (len(g), *columns.shape))
     rows = problem.rows(np.concatenate([known, -basis * g, -g], axis=2))
     # Of each element only what its own numerators cannot explain is left.
-    r = np.linalg.qr(rows, mode="r")
+    r = np.asarray(np.linalg.qr(rows, mode="r"))
     stacked = r[:, n_known:, n_known:].reshape(-1, n + 1)
     # The constraint, as heavy as the data.
     weight = np.linalg.norm(stacked[:, n]) / len(x)

@@ -127,8 +127,8 @@ class ARXModel:
         """
         f = lines(frequency_hz, self.sample_time_s)
         z = np.exp(2j * np.pi * f * self.sample_time_s)
-        inverse = np.linalg.inv(_polynomial(self.a, z))
-        g = inverse @ _polynomial(self.b, z)
+        inverse = np.asarray(np.linalg.inv(_polynomial(self.a, z)), np.complex128)
+        g = np.asarray(inverse @ _polynomial(self.b, z), np.complex128)
         return frequency_response(
             f,
             g,
@@ -148,8 +148,10 @@ class ARXModel:
             if kind == "u":
                 slope[:, :, channel, k] = inverse[:, :, i] * delayed[:, None]
             else:
-                slope[..., k] = -inverse[:, :, i, None] * (delayed[:, None] * g[:, channel])[:, None]
-        return np.einsum("foik,kl,foil->foi", slope, self.covariance, slope.conj()).real
+                slope[..., k] = (
+                    -inverse[:, :, i, None] * (delayed[:, None] * g[:, channel])[:, None]
+                )
+        return np.asarray(np.einsum("foik,kl,foil->foi", slope, self.covariance, slope.conj()).real)
 
     def predict(self, experiment: Experiment) -> Real:
         """Return the one-step prediction (n, p), (3.35); NaN before the largest lag.
@@ -234,7 +236,9 @@ def _orders(
     k = order_matrix("nk", nk, (p, m), 0)
     for i in range(p):
         if a[i].sum() + b[i].sum() == 0:
-            raise InputError(f"na, nb: expected at least one parameter for output {i + 1}, got none")
+            raise InputError(
+                f"na, nb: expected at least one parameter for output {i + 1}, got none"
+            )
     return a, b, k
 
 

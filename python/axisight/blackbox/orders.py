@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from axisight.blackbox._data import gathered, whole
+from axisight.blackbox._data import Integers, gathered, whole
 from axisight.blackbox.arx import prediction_covariance, solved, triangularized
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
@@ -28,26 +28,26 @@ def arx_orders(
 ) -> xr.Dataset:
     """Return a table of ARX orders, every combination, all judged on the same samples.
 
-    experiments
-        Data to fit, as in `axisight.blackbox.arx`.
-    na, nb, nk
-        Candidates, the same for every pair of channels.
-    validation
-        Fresh data for ``validation_loss``; without it that column is NaN.
+      experiments
+          Data to fit, as in `axisight.blackbox.arx`.
+      na, nb, nk
+          Candidates, the same for every pair of channels.
+      validation
+          Fresh data for ``validation_loss``; without it that column is NaN.
 
-    Variables over ``candidate``, with d parameters, N equations, L the covariance of the
-    one-step prediction errors (not corrected for d):
+      Variables over ``candidate``, with d parameters, N equations, L the covariance of the
+      one-step prediction errors (not corrected for d):
 
-    - ``na``, ``nb``, ``nk``, ``n_parameters``
-    - ``loss``: det L, ``validation_loss``: the same on validation data
-    - ``aic``: ln det L + 2 d / N, ``bic``: ln det L + d ln N / N, ``fpe``:
-  XX
-    - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
+      - ``na``, ``nb``, ``nk``, ``n_parameters``
+      - ``loss``: det L, ``validation_loss``: the same on validation data
+      - ``aic``: ln det L + 2 d / N, ``bic``: ln det L + d ln N / N, ``fpe``:
+    XX
+      - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
 
-    ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.
-    AIC and FPE tend to a high order with much data, BIC to the true one if it is among them.
+      ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.
+      AIC and FPE tend to a high order with much data, BIC to the true one if it is among them.
 
-    Raises InputError for misuse and experiments too short for the largest order.
+      Raises InputError for misuse and experiments too short for the largest order.
     """
     data = gathered(experiments, "experiments")
     fresh = None if validation is None else gathered(validation, "validation")
@@ -64,16 +64,16 @@ def arx_orders(
     largest = [np.full(s, v[-1], np.int64) for s, v in zip(shapes, lists, strict=True)]
     reach = max(lists[0][-1], lists[1][-1] + lists[2][-1] - 1)
     # All delays from the smallest on, up to the last lag of the largest.
-    span = [largest[0], largest[1] + (lists[2][-1] - lists[2][0]), np.full((p, m), lists[2][0])]
-    triangle = triangularized(data, *span, lags=reach)
-    test = None if fresh is None else triangularized(fresh, *span, lags=reach)
+    first = np.full((p, m), lists[2][0], np.int64)
+    span = (largest[0], largest[1] + (lists[2][-1] - lists[2][0]), first)
+    triangle = triangularized(data, *span, reach)
+    test = None if fresh is None else triangularized(fresh, *span, reach)
     columns: dict[str, list[float]] = {name: [] for name in (*NAMES, *NUMBERS)}
     status = []
     for orders in product(*lists):
-        full = [np.full(s, v, np.int64) for s, v in zip(shapes, orders, strict=True)]
         row = dict(zip(NAMES, (*orders, p * (p * orders[0] + m * orders[1])), strict=True))
         try:
-            model = solved(triangle, *full, data[0].sample_time_s)
+            model = solved(triangle, *_full(orders, p, m), data[0].sample_time_s)
         except InputError:
             status.append("rank_deficient")
         else:
@@ -85,6 +85,15 @@ def arx_orders(
         for name, column in columns.items():
             column.append(row.get(name, np.nan))
     return _table(columns, status, triangle.n_rows)
+
+
+def _full(orders: tuple[int, ...], p: int, m: int) -> tuple[Integers, Integers, Integers]:
+    na, nb, nk = orders
+    return (
+        np.full((p, p), na, np.int64),
+        np.full((p, m), nb, np.int64),
+        np.full((p, m), nk, np.int64),
+    )
 
 
 def _judged(loss: float, d: int, p: int, n: int) -> dict[str, float]:

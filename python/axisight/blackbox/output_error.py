@@ -411,7 +411,8 @@ def _model(
     names: list[str] = []
     owners: list[tuple[int, str, int, int]] = []
     covariances, variances, warnings, statuses = [], [], [], []
-    for i, (problem, theta, status, _) in enumerate(found):
+    for i, (problem, theta, ended, _) in enumerate(found):
+        status = ended
         jacobian = problem.jacobian(theta)
         variance = float(np.sum(problem.residual(theta) ** 2) / (rows - len(theta)))
         size = np.linalg.norm(jacobian, axis=0)
@@ -432,7 +433,10 @@ def _model(
         statuses.append(status)
         variances.append(variance)
         for j in range(problem.n_inputs):
-            for kind, first, count in (("B", problem.nk[j], problem.nb[j]), ("F", 1, problem.nf[j])):
+            for kind, first, count in (
+                ("B", problem.nk[j], problem.nb[j]),
+                ("F", 1, problem.nf[j]),
+            ):
                 for lag in range(int(first), int(first + count)):
                     owners.append((i, kind, j, lag))
                     names.append(f"{kind}{i + 1}{j + 1}[{lag}]")

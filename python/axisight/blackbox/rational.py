@@ -131,7 +131,9 @@ class RationalModel:
             follow = inverse @ solved.q[e].T @ slopes[e]
             total = self.sections.slopes(x, theta[: self.order]) - columns @ follow
             variance[:, e] = self.noise_scale**2 * np.sum(np.abs(columns @ inverse) ** 2, axis=1)
-            variance[:, e] += np.einsum("fi,ij,fj->f", total, self.pole_covariance, total.conj()).real
+            variance[:, e] += np.einsum(
+                "fi,ij,fj->f", total, self.pole_covariance, total.conj()
+            ).real
         shape = (len(f), self.n_out, self.n_in)
         return frequency_response(
             f,
@@ -145,7 +147,7 @@ class RationalModel:
 
     @property
     def _direct(self) -> bool:
-        return self.problem.extra.shape[1] > self.integrators
+        return bool(self.problem.extra.shape[1] > self.integrators)
 
     @property
     def noise_scale(self) -> float:
@@ -170,7 +172,9 @@ class RationalModel:
         left = self.problem.residues(self.sections).left
         r = left[:, :n] + 1j * left[:, n:]
         power = np.sum(np.abs(r) ** 2, axis=1)
-        related = [np.abs(np.sum(r[:, lag:] * r[:, :-lag].conj(), axis=1)) for lag in range(1, most + 1)]
+        related = [
+            np.abs(np.sum(r[:, lag:] * r[:, :-lag].conj(), axis=1)) for lag in range(1, most + 1)
+        ]
         statistic = 2 * n * np.sum((np.stack(related) / power) ** 2, axis=0)
         shape = (self.n_out, self.n_in)
         known = self.weighting == "variance"
@@ -339,7 +343,9 @@ def _starts(
     for spread in (np.linspace, np.geomspace):
         centre = 2 * np.pi * spread(low, high, n // 2 + 2)[1:-1]
         upper = centre * (-0.01 + 1j)
-        poles = np.concatenate([upper, upper.conj(), [-centre.mean() if n > 1 else -2 * np.pi * low]])
+        poles = np.concatenate(
+            [upper, upper.conj(), [-centre.mean() if n > 1 else -2 * np.pi * low]]
+        )
         out.append(domain.from_continuous(poles[: 2 * (n // 2)] if n % 2 == 0 else poles))
     return out
 
@@ -439,7 +445,10 @@ def _packed(
         numerators=numerators,
         problem=problem,
         pole_covariance=covariance,
-        units=(str(response.attrs.get("input_unit", "")), str(response.attrs.get("output_unit", ""))),
+        units=(
+            str(response.attrs.get("input_unit", "")),
+            str(response.attrs.get("output_unit", "")),
+        ),
     )
 
 
@@ -456,9 +465,7 @@ def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Re
     return scale * root @ root.T, []
 
 
-def rational_orders(
-    response: xr.Dataset, orders: Iterable[int], **options: object
-) -> xr.Dataset:
+def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: object) -> xr.Dataset:
     """Return the losses of several orders of `fit_rational`, and which one to choose.
 
     response

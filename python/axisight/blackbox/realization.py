@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from scipy import linalg, signal
 
 from axisight.blackbox._data import Complex, Real, lines, whole
+from axisight.blackbox._model import control_module, evaluate
 from axisight.blackbox._sections import Weighted
 from axisight.blackbox.rational import RationalModel
-from axisight.blackbox._model import control_module, evaluate
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 
@@ -63,7 +63,7 @@ class Realization:
         """
         f = lines(frequency_hz, self.sample_time_s)
         s = 2j * np.pi * f
-        at = s if self.sample_time_s is None else np.exp(s * self.sample_time_s)
+        at = np.asarray(s if self.sample_time_s is None else np.exp(s * self.sample_time_s))
         return frequency_response(
             f,
             evaluate(self.a, self.b, self.c, self.d, at),
@@ -101,9 +101,7 @@ def realize(
     """
     most = None if rank is None else whole("rank", rank, 1)
     if not 0 <= rank_tolerance < 1:
-        raise InputError(
-            f"rank_tolerance: expected a number from 0 below 1, got {rank_tolerance}"
-        )
+        raise InputError(f"rank_tolerance: expected a number from 0 below 1, got {rank_tolerance}")
     p, m, n = model.n_out, model.n_in, model.order
     blocks = [
         _block(pole, residue, most, rank_tolerance)
@@ -144,9 +142,14 @@ def _residues(model: RationalModel) -> list[tuple[complex, Complex]]:
                 raise InputError(
                     "model: two real poles coincide, their residues are infinite: change the order"
                 )
-            out.append((complex(x), (first + second * x) / steep))
+            out.append((complex(x), np.asarray((first + second * x) / steep, np.complex128)))
     if len(model.sections.linear):
-        out.append((complex(poles[-1]), model.numerators[:, model.order - 1].reshape(shape) + 0j))
+        out.append(
+            (
+                complex(poles[-1]),
+                np.asarray(model.numerators[:, model.order - 1].reshape(shape), np.complex128),
+            )
+        )
     return out
 
 
@@ -230,7 +233,10 @@ def _weighted_solution(
         values = values - offset[:, None]
     rows = (weight[:, :, None] * columns).reshape(-1, columns.shape[2])
     target = (weight * values).ravel()
-    rows, target = np.concatenate([rows.real, rows.imag]), np.concatenate([target.real, target.imag])
+    rows, target = (
+        np.concatenate([rows.real, rows.imag]),
+        np.concatenate([target.real, target.imag]),
+    )
     size = np.linalg.norm(rows, axis=0)
     size = np.where(size > 0, size, 1.0)
     return np.asarray(np.linalg.lstsq(rows / size, target, rcond=1e-13)[0] / size)

@@ -350,7 +350,7 @@ def _input_matrices(
         if largest > 1:
             length = int(min(length, max(4 * n, np.log(1e6) / np.log(largest))))
         r = np.zeros((0, n + width + 1))
-        x = np.hstack([np.eye(n), np.zeros((n, n * m))])
+        x: Real = np.hstack([np.eye(n), np.zeros((n, n * m))])
         push = np.zeros((m, n, n + n * m))
         for j in range(m):
             push[j][:, n + j * n : n + (j + 1) * n] = np.eye(n)
@@ -362,7 +362,7 @@ def _input_matrices(
                 block[:, n + n * m : -1] = np.kron(u[t], np.eye(p))
             block[:, -1] = y[t]
             rows.append(block)
-            x = a @ x + np.tensordot(u[t], push, axes=1)
+            x = np.asarray(a @ x + np.tensordot(u[t], push, axes=1))
             if len(rows) == CHUNK or t == length - 1:
                 (r,) = linalg.qr(np.vstack([r, *rows]), mode="r", check_finite=False)
                 r, rows = r[: n + width + 1], []
