@@ -349,8 +349,8 @@ def _input_matrices(
         length = len(u)
         if largest > 1:
             length = int(min(length, max(4 * n, np.log(1e6) / np.log(largest))))
-        r = np.zeros((0, n + width + 1))
-        x: Real = np.hstack([np.eye(n), np.zeros((n, n * m))])
+        r: Real = np.zeros((0, n + width + 1))
+        x: Real = np.eye(n, n + n * m)
         push = np.zeros((m, n, n + n * m))
         for j in range(m):
             push[j][:, n + j * n : n + (j + 1) * n] = np.eye(n)
@@ -364,8 +364,8 @@ def _input_matrices(
             rows.append(block)
             x = np.asarray(a @ x + np.tensordot(u[t], push, axes=1))
             if len(rows) == CHUNK or t == length - 1:
-                (r,) = linalg.qr(np.vstack([r, *rows]), mode="r", check_finite=False)
-                r, rows = r[: n + width + 1], []
+                (low,) = linalg.qr(np.vstack([r, *rows]), mode="r", check_finite=False)
+                r, rows = np.asarray(low[: n + width + 1], np.float64), []
         factors.append(r[n:, n:])
     both = np.vstack(factors)
     theta = _solve(both[:, :-1], both[:, -1:])[:, 0]
