@@ -22,6 +22,8 @@ NUMERICAL_RANK = 1e-11
 are rounding of the derivatives."""
 POOR = 0.5
 """A combination not known to half its scale is poorly identifiable."""
+TILT = 0.05
+"""Shares below this, relative to the scales, are left out of what is poorly known."""
 SIMPLE_POWERS = (0.5, 1.0, 2.0, 3.0)
 
 
@@ -152,10 +154,7 @@ def identifiability(
     relative[unseen] = np.inf
     correlation[unseen] = np.nan
     correlation[:, unseen] = np.nan
-    found = [
-        *_combinations(experiment, v, s, lost, form, "unidentifiable"),
-        *_combinations(experiment, v, s, ~lost & (spread > limit), form, "poor"),
-    ]
+    found = _combinations(experiment, v, spread, limit, form)
     return Identifiability(
         names=names,
         scales=experiment.scales,
@@ -194,59 +193,50 @@ def decomposed(experiment: Information) -> tuple[Array, Array, int]:
 
 
 def _combinations(
-    experiment: Information,
-    v: Array,
-    s: Array,
-    chosen: NDArray[np.bool_],
-    form: Form,
-    kind: Literal["unidentifiable", "poor"],
+    experiment: Information, v: Array, spread: Array, limit: float, form: Form
 ) -> list[Combination]:
-    """Return the entangled groups of a subspace, each parameter expressed by chosen ones."""
+    """Return the entangled groups of what is not known, parameters expressed by chosen ones."""
+    chosen, lost = spread > limit, np.isinf(spread)
     if not chosen.any():
         return []
-    names, scales = experiment.names, experiment.scales
-    space = v[:, chosen]
+    names, space = experiment.names, v[:, chosen]
     n, k = space.shape
     # Among equals the later parameter is expressed by the earlier ones.
     later = 1 + 0.1 * np.arange(n) / n
     _, _, pivots = linalg.qr(space.T * later, mode="economic", pivoting=True)
     free = np.sort(pivots[:k])
     shares = space @ np.linalg.inv(space[free])
-    shares[np.abs(shares) < (1e-6 if kind == "unidentifiable" else 0.05)] = 0.0
+    # An exact null space is sharp; what is merely poor tilts a little.
+    shares[np.abs(shares) < (1e-6 if lost[chosen].all() else TILT)] = 0.0
     linked = np.zeros((n, n))
     linked[:, free] = np.abs(shares)
     _, group = csgraph.connected_components(linked, directed=False)
-    strong = s > 0
-    strong &= ~chosen
     out = []
     for label in np.unique(group[free]):
         members = np.flatnonzero(group == label)
         own = np.flatnonzero(group[free] == label)
         seen, stds = [], []
-        for i in (i for i in members if i not in free):
+        for i in (int(i) for i in members if i not in free):
             powers = shares[i, own]
-            involved = np.flatnonzero(powers)
+            used = np.flatnonzero(powers)
             seen.append(
-                _expression(names, scales, int(i), free[own][involved], powers[involved], form)
+                _expression(names, experiment.scales, i, free[own][used], powers[used], form)
             )
             contrast = np.zeros(n)
             contrast[i] = 1.0
             contrast[free[own]] = -powers
-            along = v[:, strong].T @ contrast
-            stds.append(float(np.linalg.norm(along / s[strong])))
-        worst = np.inf
-        if kind == "poor":
-            within = space[members]
-            _, sizes, directions = np.linalg.svd(within)
-            mixed = directions[sizes > 0.5] if np.any(sizes > 0.5) else directions[:1]
-            worst = float(np.max(np.linalg.norm(mixed / s[chosen], axis=1)))
+            stds.append(float(np.linalg.norm(v[:, ~chosen].T @ contrast * spread[~chosen])))
+        unseen = np.linalg.norm(v[np.ix_(members, lost)], axis=0) > 0.5
+        # The longest axis of what is lost of these parameters.
+        poor = chosen & ~lost
+        worst = float(np.linalg.norm(v[np.ix_(members, poor)] * spread[poor], ord=2))
         out.append(
             Combination(
-                kind,
-                tuple(names[i] for i in members),
+                "unidentifiable" if unseen.any() else "poor",
+                tuple(names[int(i)] for i in members),
                 tuple(seen),
                 tuple(stds),
-                worst,
+                np.inf if unseen.any() else worst,
                 shares[:, own].T,
             )
         )

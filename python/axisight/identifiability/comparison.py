@@ -60,7 +60,7 @@ def compare_experiments(
         for _, a, _, gain, _ in rows
     ]
     best = min(range(len(rows)), key=order.__getitem__)
-    helps = bool(rows[best][2]) or rows[best][1].rank > before.rank or before.identifiable
+    helps = _unknown(rows[best][1]) < _unknown(before) or before.identifiable
     return xr.Dataset(
         {
             "rank": ("candidate", [a.rank for _, a, *_ in rows]),
@@ -75,6 +75,11 @@ def compare_experiments(
     )
 
 
+def _unknown(found: Identifiability) -> int:
+    """Return how many directions are not known to the limit."""
+    return sum(len(c.directions) for c in found.combinations)
+
+
 def _sentence(
     candidate: Information,
     label: str,
@@ -87,8 +92,10 @@ def _sentence(
         worst = max(after.relative_std[after.names.index(n)] for n in gained)
         left = "" if after.identifiable else f"; what stays: {'; '.join(after.words())}"
         return f"{what}: separates {', '.join(gained)} (to {percent(float(worst))} or better){left}"
-    if after.rank > before.rank:
-        return f"{what}: {after.rank - before.rank} more combinations are seen, none well enough"
+    more = _unknown(before) - _unknown(after)
+    if more > 0:
+        plural = "combination is" if more == 1 else "combinations are"
+        return f"{what}: {more} more {plural} known, no parameter by itself"
     return f"{what}: separates nothing"
 
 
