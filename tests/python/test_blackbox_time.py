@@ -133,7 +133,6 @@ def test_subspace_is_exact_on_exact_data(method) -> None:
 
 
 def test_moesp_estimates_what_acts_within_the_sample() -> None:
-    a, b, c = known.modal_system()
     direct = np.array([[0.5, 0.0], [-0.2, 1.0]])
     e = known.modal_experiment(500, 0.0, 2)
     data = Experiment(1.0, e.input, e.output + e.input @ direct.T)

@@ -20,6 +20,7 @@ from axisight.identifiability import (
     of_regressor,
     of_simulation,
     recommend_experiments,
+    sources,
 )
 
 NAMES = ("axis1.stiffness", "axis1.link_inertia", "axis1.damping", "axis1.motor_inertia")
@@ -282,24 +283,17 @@ def test_coulomb_friction_and_viscous_need_two_speeds() -> None:
     assert abs(both.correlation[0, 1]) < abs(alone.correlation[0, 1])
 
 
-def test_information_of_a_finished_fit() -> None:
+def test_information_of_a_finished_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = load_robot("two_mass_axis")
     plan_of = [robot_parameter(robot, n) for n in ("axis1.stiffness", "axis1.motor_inertia")]
-    plan = of_simulation(robot, reference(robot, (2, 5)), plan_of, torque_std_nm=0.02)
-    from axisight.identifiability import sources
-
     logs = []
-    real = sources.fit
 
     def spy(robot, given, *args, **options):
         logs.extend(given)
-        return real(robot, given, *args, **options)
+        return fit_logs(robot, given, *args, **options)
 
-    sources.fit = spy
-    try:
-        of_simulation(robot, reference(robot, (2, 5)), plan_of, torque_std_nm=0.02)
-    finally:
-        sources.fit = real
+    monkeypatch.setattr(sources, "fit", spy)
+    plan = of_simulation(robot, reference(robot, (2, 5)), plan_of, torque_std_nm=0.02)
     fitted = fit_logs(
         robot,
         logs,

@@ -54,9 +54,9 @@ def compare_experiments(
         rows.append(
             (label, after, gained, gain, _sentence(candidate, label, after, gained, before))
         )
-    # Most parameters known; then the least worst of them; then most information.
+    # Least unknown; then the least worst parameter; then most information.
     order = [
-        (-int(np.sum(a.relative_std <= limit)), float(np.max(a.relative_std)), -gain)
+        (_unknown(a), -int(np.sum(a.relative_std <= limit)), float(np.max(a.relative_std)), -gain)
         for _, a, _, gain, _ in rows
     ]
     best = min(range(len(rows)), key=order.__getitem__)
