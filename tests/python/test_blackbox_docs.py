@@ -22,10 +22,13 @@ def run(repository: Path, folder: Path, page: str) -> dict[str, Any]:
 
 def test_black_box_page(repository: Path, tmp_path: Path) -> None:
     shown = run(repository, tmp_path, "black_box.md")
-    judge = shown["judge"]
-    # The axis has Coulomb friction and a cubic spring: a linear model is good, not perfect.
-    assert blackbox.fit_percent(judge.output, shown["arx"].simulate(judge))[0] > 70
-    assert blackbox.fit_percent(judge.output, shown["states"].model.simulate(judge))[0] > 70
+    judge, states, arx = (shown[name] for name in ("judge", "states", "arx"))
+    assert blackbox.fit_percent(judge.output, states.model.simulate(judge))[0] > 95
+    mode = states.model.modes().isel(mode=1)
+    assert abs(mode["frequency_hz"] - shown["robot"].modes()["frequency_hz"][2]) < 0.1
+    assert blackbox.fit_percent(judge.output, arx.predict(judge))[0] > 80
+    assert blackbox.fit_percent(judge.output, arx.simulate(judge))[0] < 0
+    assert len(shown["tests"].advice()) == 2
     assert np.isfinite(shown["response"]["variance"].values).all()
     assert shown["model"].status == "converged" and shown["least"].order == 6
     mode = shown["model"].modes().isel(mode=0)
