@@ -166,7 +166,10 @@ class AxisModel:
             (AxisParameter("F_v", "Nm s/rad", "viscous friction", 0.0, neutral=0), True),
             (AxisParameter("F_c", "Nm", "Coulomb friction", 0.0, neutral=0), True),
             (AxisParameter("r", "1", "gear ratio", 0.0, neutral=self.gear_ratio), True),
-            (AxisParameter("b", "rad", "half width of the backlash", 0.0, neutral=0), self.backlash),
+            (
+                AxisParameter("b", "rad", "half width of the backlash", 0.0, neutral=0),
+                self.backlash,
+            ),
             (
                 AxisParameter("F_s", "Nm", "excess friction at standstill", 0.0, neutral=0),
                 self.stribeck,
@@ -218,7 +221,9 @@ class AxisModel:
         for p in self.parameters:
             value = values.get(p.name, p.neutral)
             if value is None:
-                raise InputError(f"parameters: expected a value of {p.name} ({p.meaning}), got none")
+                raise InputError(
+                    f"parameters: expected a value of {p.name} ({p.meaning}), got none"
+                )
             value = number(p.name, value)
             if value < p.lower or (p.neutral is None and value <= 0):
                 least = "a positive number" if p.neutral is None else f"at least {p.lower:g}"
@@ -364,7 +369,9 @@ def samples(field: str, value: ArrayLike) -> Array:
     array = np.ascontiguousarray(array, np.float64)
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
-        raise InputError(f"{field}: expected finite numbers, got {array[bad[0]]} at sample {bad[0]}")
+        raise InputError(
+            f"{field}: expected finite numbers, got {array[bad[0]]} at sample {bad[0]}"
+        )
     return array
 
 

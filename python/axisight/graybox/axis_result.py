@@ -114,7 +114,9 @@ class AxisFit:
         start = np.zeros(2 * self.model.n_masses)
         start[0] = data.start_angle_rad()
         theta = [*self.model.vector(self.parameters, self.noise.gains), *start.tolist()]
-        return _core.axis_simulate(self.model.core(), data.core(self.model), theta, predicts=predicts)[0]
+        return _core.axis_simulate(
+            self.model.core(), data.core(self.model), theta, predicts=predicts
+        )[0]
 
     def fit_to(self, data: AxisData, *, predicted: bool = False) -> float:
         """Return the model fit (3.54) [%] to a record started at rest, for cross-validation."""
@@ -163,9 +165,7 @@ def fit_percent(measured: Array, modelled: Array) -> float:
     return 100 * (1 - error / spread) if spread > 0 else -np.inf
 
 
-def conclude(
-    task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]
-) -> AxisFit:
+def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]) -> AxisFit:
     """Turn the end of a search into a result."""
     from axisight.graybox.prediction_error import free_run
 

@@ -81,7 +81,11 @@ def multistart_axis(
     otherwise. Errors and other arguments as in `fit_axis`.
     """
     chosen = settings or FitSettings(gradual=GRADUAL)
-    for field, value, least in (("n_starts", n_starts, 1), ("seed", seed, 0), ("threads", threads, 0)):
+    for field, value, least in (
+        ("n_starts", n_starts, 1),
+        ("seed", seed, 0),
+        ("threads", threads, 0),
+    ):
         if not isinstance(value, (int, np.integer)) or value < least:
             raise InputError(f"{field}: expected a whole number from {least}, got {value!r}")
     if number("spread", spread) < 1:
@@ -166,9 +170,7 @@ def _draw(
     return out
 
 
-def _table(
-    task: Task, starts: Sequence[Mapping[str, float]], ends: Sequence[Point]
-) -> xr.Dataset:
+def _table(task: Task, starts: Sequence[Mapping[str, float]], ends: Sequence[Point]) -> xr.Dataset:
     names, places = list(task.free_names), task.model.places()
     return xr.Dataset(
         {
