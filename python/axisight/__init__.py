@@ -1,6 +1,7 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
 from axisight import calibration, excitation, frf, montecarlo, records, rigid_body
+from axisight import excitation, frequency_fit, frf, montecarlo, records
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -59,6 +60,7 @@ __all__ = [
     "effect_table",
     "excitation",
     "fit",
+    "frequency_fit",
     "frf",
     "load_robot",
     "montecarlo",

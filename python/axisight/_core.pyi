@@ -394,6 +394,171 @@ class FitResult:
     def block_loss(self) -> _Array:
         """Loss by block, shape (n_blocks,)."""
 
+@type_check_only
+class FrequencyParameterSpec(Protocol):
+    """A parameter of a frequency-domain fit; ``prior`` is mean and standard deviation."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def initial(self) -> float: ...
+    @property
+    def lower(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def logarithmic(self) -> bool: ...
+    @property
+    def prior(self) -> tuple[float, float] | None: ...
+    @property
+    def frozen(self) -> bool: ...
+
+@type_check_only
+class FrequencyOptionSpec(Protocol):
+    """Settings of a frequency-domain fit.
+
+    ``sampled``: G(e^{i w T}), else G(i w); ``logarithmic``: residuals are log(model / measured);
+    ``weighted``: by variance or covariance. ``loss`` is "squared", "huber" or "soft_l1".
+    """
+
+    @property
+    def sampled(self) -> bool: ...
+    @property
+    def logarithmic(self) -> bool: ...
+    @property
+    def weighted(self) -> bool: ...
+    @property
+    def loss(self) -> str: ...
+    @property
+    def loss_scale(self) -> float: ...
+    @property
+    def block_lines(self) -> int: ...
+    @property
+    def max_iterations(self) -> int: ...
+    @property
+    def gain_tolerance(self) -> float: ...
+    @property
+    def step_tolerance(self) -> float: ...
+
+@type_check_only
+class PoseDesign(TypedDict):
+    """Chosen operating points: relaxed weights, sensitivities, certificate, whole choice."""
+
+    weights: _Array
+    sensitivity: _Array
+    gap: float
+    bound: float
+    chosen: list[int]
+    log_det: float
+    iterations: int
+
+# Joint angles [rad], frequencies [Hz], then flat over line, output, input: response, variance,
+# covariance (line, element, element), reference of logarithmic weights; order of derivative.
+_PoseResponse: TypeAlias = tuple[
+    _Numbers,
+    _Array,
+    NDArray[np.complex128],
+    _Array | None,
+    NDArray[np.complex128] | None,
+    NDArray[np.complex128] | None,
+    int,
+]
+
+@final
+class FrequencyFitResult:
+    """Result of a frequency-domain fit. Arrays are copies.
+
+    Matrices are over the ``free`` parameters as searched: logarithms where asked for.
+    """
+
+    @property
+    def status(self) -> Literal["loss_converged", "step_converged", "max_iterations", "stalled"]:
+        """How the search ended."""
+    @property
+    def values(self) -> _Array:
+        """All parameters, frozen ones included, in their units, shape (n_parameters,)."""
+    @property
+    def slopes(self) -> _Array:
+        """Slope of the value over the searched number, shape (n_free,)."""
+    @property
+    def free(self) -> list[int]:
+        """Indices (from 0) of the free parameters."""
+    @property
+    def loss(self) -> float:
+        """Loss at the end, prior excluded."""
+    @property
+    def initial_loss(self) -> float:
+        """Loss at the start, prior excluded."""
+    @property
+    def iterations(self) -> int:
+        """Accepted steps."""
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the model with its derivatives."""
+    @property
+    def n_residuals(self) -> int:
+        """Residuals that count; real and imaginary part are two."""
+    @property
+    def at_bound(self) -> list[int]:
+        """Indices (from 0) of the free parameters that ended on a bound."""
+    @property
+    def information(self) -> _Array:
+        """J^T W J with priors, shape (n_free, n_free)."""
+    @property
+    def expected_scatter(self) -> _Array | None:
+        """Covariance of J^T W r by the response's uncertainty; None if that is unknown."""
+    @property
+    def block_scatter(self) -> _Array:
+        """The same from the scatter of the residuals over blocks of lines."""
+    @property
+    def residual(self) -> _Array:
+        """Whitened residuals, shape (n, 2): real and imaginary parts."""
+
+def fit_frequency_responses(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[FrequencyParameterSpec],
+    poses: Sequence[_PoseResponse],
+    options: FrequencyOptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> FrequencyFitResult:
+    """Fit the linearized robot to responses at several operating points."""
+
+def frequency_information(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[FrequencyParameterSpec],
+    poses: Sequence[_PoseResponse],
+    options: FrequencyOptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> _Array:
+    """Information each pose gives at the initial values, shape (n_poses, n_free, n_free)."""
+
+def frequency_response(
+    robot: Robot,
+    effects: _Effects,
+    joint_angle: _Numbers,
+    frequency_hz: _Numbers,
+    sampled: bool,
+) -> _Array:
+    """Response from torque to motor angle [rad/Nm], shape (n_freq, n_axes, 2 n_axes).
+
+    Real and imaginary parts are interleaved along the last axis.
+    """
+
+def design_poses(
+    information: _Array,
+    prior: _Array,
+    count: int,
+    *,
+    repeats: bool,
+    gap_tolerance: float,
+    max_iterations: int,
+) -> PoseDesign:
+    """Choose ``count`` operating points by information (n, p, p), besides a prior (p, p)."""
+
 def effect_table() -> list[EffectInfo]:
     """Every effect with its description and parameters."""
 
@@ -772,3 +937,52 @@ def inertial_parameters(robot: Robot) -> tuple[list[int], _Array]:
 
     Mass, first moments x y z, inertia about the link frame xx yy zz xy xz yz.
     """
+
+class _AxisModelSpec(Protocol):
+    masses: int
+    output: str
+    hold: str
+    smoothing: float
+    ripple_orders: list[float]
+    substeps: int
+
+def axis_fit(
+    model: _AxisModelSpec,
+    sets: Sequence[tuple[_Array, _Array, float, float, int]],
+    parameters: Sequence[tuple[float, float, float, float, bool]],
+    *,
+    whitening: Sequence[float],
+    predicts: bool,
+    max_iterations: int,
+    loss_tolerance: float,
+    step_tolerance: float,
+    cancel: CancelToken | None = None,
+) -> tuple[str, _Array, float, float, int, int, _Array, _Array, _Array]:
+    """Minimize the prediction error of an axis from one start.
+
+    ``sets``: torque, output, sample time, weight, samples of a block. ``parameters``: initial,
+    lower, upper, scale, free. Returns status, parameters, loss, initial loss, iterations,
+    evaluations, normal matrix of the free parameters, residuals, gradients of the blocks.
+    """
+
+def axis_linearize(
+    model: _AxisModelSpec,
+    sets: Sequence[tuple[_Array, _Array, float, float, int]],
+    theta: Sequence[float],
+    free: Sequence[int],
+    *,
+    whitening: Sequence[float],
+    predicts: bool,
+    cancel: CancelToken | None = None,
+) -> tuple[_Array, _Array]:
+    """Residuals, model minus measurement, and derivatives (n_free, n), record after record."""
+
+def axis_simulate(
+    model: _AxisModelSpec,
+    set: tuple[_Array, _Array, float, float, int],
+    theta: Sequence[float],
+    *,
+    predicts: bool,
+    cancel: CancelToken | None = None,
+) -> tuple[_Array, _Array]:
+    """Output (n,) and states (n, 2 masses) of one record."""

@@ -21,6 +21,11 @@ MODULES = (
     axisight.montecarlo,
     axisight.records,
     axisight.rigid_body,
+    axisight.excitation,
+    axisight.frequency_fit,
+    axisight.frf,
+    axisight.montecarlo,
+    axisight.records,
 )
 PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}
 # The word says it all.

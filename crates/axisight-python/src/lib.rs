@@ -3,11 +3,13 @@
 // PyO3 hands over owned values and names the lifetime of the interpreter.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
+mod axis_fit;
 mod convert;
 mod effects;
 mod entry;
 mod excitation;
 mod fit;
+mod frequency_fit;
 mod frf;
 mod local_models;
 mod montecarlo;
@@ -59,5 +61,19 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::regression_factors, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_linearize, module)?)?;
+    module.add_function(wrap_pyfunction!(axis_fit::axis_simulate, module)?)?;
+    module.add_class::<frequency_fit::FrequencyFitResult>()?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::fit_frequency_responses,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::frequency_information,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::frequency_response, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::design_poses, module)?)?;
     Ok(())
 }

@@ -97,6 +97,9 @@ _MODULES: tuple[str, ...] = (
     "chapter8_averages",
     "appendix_a",
     "chapter8_claims",
+    "chapter9_tables",
+    "chapter9_figures",
+    "chapter9_claims",
     "appendix_a_claims",
 )
 _ITEMS: dict[str, Make] = {}

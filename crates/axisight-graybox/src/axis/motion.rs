@@ -1,0 +1,235 @@
+//! Through one sample by the classical Runge-Kutta method of order 4, with the sign of the
+//! friction followed exactly.
+//!
+//! Where the sign is not smoothed the equations are smooth only between changes of regime:
+//! slipping ends where the speed crosses zero, sticking where the drive exceeds the friction.
+//! Such an instant is located inside the step and the step is done in two parts. Its
+//! derivative with respect to the parameters follows from the implicit function theorem:
+//! one Newton step on the guard in dual numbers from the root found in plain ones.
+
+use super::chain::{Chain, Regime, State};
+use super::jet::Number;
+
+/// Changes of regime within one step; beyond, the rest is done in the last regime.
+const MOST_CHANGES: usize = 8;
+
+/// A chain in three kinds of numbers: for the steps, for the steps in which the regime changes,
+/// and without derivatives for the search of the instants.
+pub(super) struct Motion<S: Number, const N: usize> {
+    chain: Chain<S, N>,
+    changes: Changes<S::Plain, N>,
+}
+
+/// Steps in which the regime changes.
+struct Changes<S, const N: usize> {
+    chain: Chain<S, N>,
+    plain: Chain<f64, N>,
+}
+
+/// Torque at the start of a step and its slope.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ramp {
+    pub torque: f64,
+    pub slope: f64,
+}
+
+impl Ramp {
+    fn at(self, t: f64) -> f64 {
+        self.slope.mul_add(t, self.torque)
+    }
+    fn later(self, t: f64) -> Self {
+        Self {
+            torque: self.at(t),
+            ..self
+        }
+    }
+}
+
+#[inline(always)]
+fn runge_kutta4<S: Number, const N: usize, const EXTENDED: bool>(
+    chain: &Chain<S, N>,
+    x: &State<S, N>,
+    ramp: Ramp,
+    h: f64,
+    regime: Regime,
+) -> State<S, N> {
+    let (half, middle) = (0.5 * h, ramp.at(0.5 * h));
+    let a = chain.rate::<EXTENDED>(x, ramp.torque, regime);
+    let b = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&a, half), middle, regime);
+    let c = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&b, half), middle, regime);
+    let d = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&c, h), ramp.at(h), regime);
+    x.moved::<EXTENDED>(&a, h / 6.0)
+        .moved::<EXTENDED>(&b, h / 3.0)
+        .moved::<EXTENDED>(&c, h / 3.0)
+        .moved::<EXTENDED>(&d, h / 6.0)
+}
+
+/// Positive while `regime` lasts.
+#[inline(always)]
+fn guard<S: Number, const N: usize, const EXTENDED: bool>(
+    chain: &Chain<S, N>,
+    x: &State<S, N>,
+    torque: f64,
+    regime: Regime,
+) -> S {
+    match regime {
+        Regime::Slip(sign) => x.speed[0] * sign,
+        Regime::Stick => chain.breakaway() - chain.standing_drive::<EXTENDED>(x, torque).abs(),
+        Regime::Smooth => S::one(),
+    }
+}
+
+impl<S: Number, const N: usize> Motion<S, N> {
+    #[inline(always)]
+    pub fn new(chain: Chain<S, N>, careful: Chain<S::Plain, N>, plain: Chain<f64, N>) -> Self {
+        Self {
+            chain,
+            changes: Changes {
+                chain: careful,
+                plain,
+            },
+        }
+    }
+
+    /// The state a time `h` later.
+    #[inline(always)]
+    pub fn step<const EXTENDED: bool>(&self, x: &State<S, N>, ramp: Ramp, h: f64) -> State<S, N> {
+        let speed = x.speed[0].lane(0);
+        let regime = if self.chain.inverse_smoothing.is_some() {
+            Regime::Smooth
+        } else if speed != 0.0 {
+            Regime::Slip(speed.signum())
+        } else {
+            self.changes
+                .from_standstill::<EXTENDED>(&x.values(), ramp.torque)
+        };
+        let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime);
+        let lasts = match regime {
+            Regime::Smooth => true,
+            Regime::Slip(sign) => next.speed[0].lane(0) * sign >= 0.0,
+            Regime::Stick => self
+                .changes
+                .lasts::<EXTENDED>(&next.values(), ramp.at(h), regime),
+        };
+        if lasts {
+            next
+        } else {
+            let x = State::new(|i| x.entry(i).plain());
+            let next = self.changes.change::<EXTENDED>(&x, ramp, h, regime);
+            State::new(|i| S::from_plain(next.entry(i)))
+        }
+    }
+}
+
+impl<S: Number, const N: usize> Changes<S, N> {
+    #[inline(never)]
+    fn from_standstill<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64) -> Regime {
+        let drive = self.plain.standing_drive::<EXTENDED>(x, torque);
+        if drive.abs() <= self.plain.breakaway() {
+            Regime::Stick
+        } else {
+            Regime::Slip(drive.signum())
+        }
+    }
+
+    #[inline(never)]
+    fn lasts<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64, regime: Regime) -> bool {
+        guard::<f64, N, EXTENDED>(&self.plain, x, torque, regime) >= 0.0
+    }
+
+    /// A step in which the regime changes.
+    #[inline(never)]
+    fn change<const EXTENDED: bool>(
+        &self,
+        x: &State<S, N>,
+        ramp: Ramp,
+        h: f64,
+        regime: Regime,
+    ) -> State<S, N> {
+        let (mut x, mut ramp, mut left, mut regime) = (*x, ramp, h, regime);
+        // The instants carry derivatives, the lengths of the parts do not: `late` is by how
+        // much the state stands behind its nominal time, zero but for its derivatives.
+        let mut late = S::zero();
+        for _ in 0..MOST_CHANGES {
+            let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
+            if self.lasts::<EXTENDED>(&next.values(), ramp.at(left), regime) {
+                break;
+            }
+            let (instant, slope) = self.instant::<EXTENDED>(&x.values(), ramp, left, regime);
+            x = self.advance::<EXTENDED>(&x, ramp, instant, regime);
+            ramp = ramp.later(instant);
+            left -= instant;
+            if slope != 0.0 {
+                let value = guard::<S, N, EXTENDED>(&self.chain, &x, ramp.torque, regime);
+                let shift = value * (-1.0 / slope);
+                let rate = self.chain.rate::<EXTENDED>(&x, ramp.torque, regime);
+                x = x.shifted(&rate, shift);
+                late += shift;
+            }
+            if matches!(regime, Regime::Slip(_)) {
+                x.speed[0] = S::zero();
+                regime = self.from_standstill::<EXTENDED>(&x.values(), ramp.torque);
+            } else {
+                let drive = self
+                    .plain
+                    .standing_drive::<EXTENDED>(&x.values(), ramp.torque);
+                regime = Regime::Slip(drive.signum());
+            }
+        }
+        let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
+        let rate = self.chain.rate::<EXTENDED>(&next, ramp.at(left), regime);
+        next.shifted(&rate, -late)
+    }
+
+    #[inline(never)]
+    fn advance<const EXTENDED: bool>(
+        &self,
+        x: &State<S, N>,
+        ramp: Ramp,
+        h: f64,
+        regime: Regime,
+    ) -> State<S, N> {
+        runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime)
+    }
+
+    /// When the guard of `regime` falls through zero within `h`, and its slope there; slope
+    /// zero where it does so at once.
+    #[inline(never)]
+    fn instant<const EXTENDED: bool>(
+        &self,
+        x: &State<f64, N>,
+        ramp: Ramp,
+        h: f64,
+        regime: Regime,
+    ) -> (f64, f64) {
+        let value = |t: f64| {
+            let x = runge_kutta4::<f64, N, EXTENDED>(&self.plain, x, ramp, t, regime);
+            guard::<f64, N, EXTENDED>(&self.plain, &x, ramp.at(t), regime)
+        };
+        let (mut low, mut high) = (1e-6 * h, h);
+        let (mut above, mut below) = (value(low), value(high));
+        if above <= 0.0 {
+            return (0.0, 0.0);
+        }
+        // Regula falsi; an end that stays twice counts half (Illinois).
+        let (mut t, mut side) = (high, 0);
+        for _ in 0..60 {
+            t = (low * below - high * above) / (below - above);
+            let g = value(t);
+            if g.abs() < 1e-15 || high - low < 1e-14 * h {
+                break;
+            }
+            if g > 0.0 {
+                (low, above) = (t, g);
+                below *= if side > 0 { 0.5 } else { 1.0 };
+                side = 1;
+            } else {
+                (high, below) = (t, g);
+                above *= if side < 0 { 0.5 } else { 1.0 };
+                side = -1;
+            }
+        }
+        let e = 1e-4 * h;
+        (t, (value(t + e) - value(t - e)) / (2.0 * e))
+    }
+}

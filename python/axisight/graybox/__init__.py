@@ -1,0 +1,80 @@
+"""Gray-box identification: physical parameters from motor-side data."""
+
+from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
+from axisight.graybox.axis_result import AxisFit, NoiseModel
+from axisight.graybox.chain_fit import ChainFit, fit_chain
+from axisight.graybox.collocated import Collocated, collocated
+from axisight.graybox.flexibilities import (
+    CubicSpring,
+    Flexibility,
+    cubic_spring,
+    initial_flexibility,
+    simulate_deflection,
+)
+from axisight.graybox.landmarks import (
+    HighFrequencyGain,
+    Landmark,
+    find_notch,
+    find_resonance,
+    high_frequency_gain,
+)
+from axisight.graybox.multistart import AxisMultistart, multistart_axis
+from axisight.graybox.prediction_error import FitSettings, fit_axis
+from axisight.graybox.procedure import (
+    AxisIdentification,
+    InitialModel,
+    axis_data,
+    identify_axis,
+    initial_model,
+)
+from axisight.graybox.sensitivity import sensitivity_table
+from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
+from axisight.graybox.step_one import RigidBodyFriction, rigid_body_friction
+from axisight.graybox.validation import (
+    ResidualTests,
+    cross_validation,
+    fit_percent,
+    fit_table,
+    residual_tests,
+)
+
+__all__ = [
+    "AxisData",
+    "AxisFit",
+    "AxisIdentification",
+    "AxisModel",
+    "AxisMultistart",
+    "AxisParameter",
+    "ChainFit",
+    "Collocated",
+    "CubicSpring",
+    "FitSettings",
+    "Flexibility",
+    "HighFrequencyGain",
+    "InitialModel",
+    "Landmark",
+    "NoiseModel",
+    "ResidualTests",
+    "RigidBodyFriction",
+    "SpringMassChain",
+    "axis_data",
+    "collocated",
+    "cross_validation",
+    "cubic_spring",
+    "find_notch",
+    "find_resonance",
+    "fit_axis",
+    "fit_chain",
+    "fit_percent",
+    "fit_table",
+    "high_frequency_gain",
+    "identify_axis",
+    "initial_flexibility",
+    "initial_model",
+    "multistart_axis",
+    "reconstruct_chain",
+    "residual_tests",
+    "rigid_body_friction",
+    "sensitivity_table",
+    "simulate_deflection",
+]

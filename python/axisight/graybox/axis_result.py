@@ -1,0 +1,265 @@
+"""What a fit of an axis found, how sure it is, and what to mind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
+
+if TYPE_CHECKING:
+    from axisight.graybox.prediction_error import Point, Task
+
+Array = NDArray[np.float64]
+
+# Beyond this, a combination of parameters is known a thousand times worse than the best one.
+POOR_CONDITION = 1e6
+
+STATUS_ADVICE = {
+    "max_iterations": "stopped at the iteration limit: allow more iterations or start closer",
+    "stalled": "no step lowers the loss although its slope promises one: the model is not smooth "
+    "here; try more substeps, a friction smoothing, or another start",
+}
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """How the prediction errors were made white.
+
+    ``gains``: innovations gain K of (3.33) per sample, of the deflections, then of the speeds.
+    ``whitening``: a_1..a_p of ``A(q)``, with the noise ``e / A(q)``.
+    """
+
+    kind: str
+    gains: tuple[float, ...] = ()
+    whitening: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """Result of `fit_axis`.
+
+    ``parameters`` holds all values, fixed ones too. The arrays run over ``free``, the names of
+    the fitted ones; ``covariance`` is that for white errors, ``sandwich`` the one from the
+    scatter of blocks of data, which stays valid where errors are correlated or the model is
+    incomplete. ``status`` is ``loss_converged``, ``step_converged``, ``exact`` (residuals are
+    rounding errors), ``max_iterations`` or ``stalled``. ``warnings`` say in words what to mind.
+    ``residuals`` are the prediction errors by record, model minus measurement, whitened by the
+    noise model and not weighted; ``error_std`` is their standard deviation. ``starts`` are the
+    states (`AxisModel.state_names`) at the first sample of every record.
+    """
+
+    model: AxisModel
+    parameters: Mapping[str, float]
+    free: tuple[str, ...]
+    values: Array
+    std: Array
+    covariance: Array
+    sandwich: Array
+    correlation: Array
+    condition: float
+    status: str
+    warnings: tuple[str, ...]
+    at_bound: tuple[str, ...]
+    loss: float
+    initial_loss: float
+    iterations: int
+    evaluations: int
+    error_std: float
+    residuals: tuple[Array, ...]
+    fit_percent: tuple[float, ...]
+    starts: Array
+    noise: NoiseModel
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended by itself."""
+        return self.status in ("loss_converged", "step_converged", "exact")
+
+    def interval(
+        self, name: str, level: float = 0.95, kind: Literal["white", "sandwich"] = "white"
+    ) -> tuple[float, float]:
+        """Return the confidence interval of a free parameter.
+
+        ``"white"`` trusts that the prediction errors are white, ``"sandwich"`` does not.
+        """
+        if name not in self.free:
+            raise InputError(f"name: expected one of {', '.join(self.free)}, got {name!r}")
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a number between 0 and 1, got {level}")
+        if kind not in ("white", "sandwich"):
+            raise InputError(f"kind: expected white or sandwich, got {kind!r}")
+        matrix = self.covariance if kind == "white" else self.sandwich
+        i = self.free.index(name)
+        half = float(stats.norm.ppf(0.5 + level / 2) * np.sqrt(matrix[i, i]))
+        return float(self.values[i]) - half, float(self.values[i]) + half
+
+    def simulate(self, data: AxisData) -> Array:
+        """Simulate the output of a record from its torque, without feedback of errors, (n,)."""
+        return self._run(data, predicts=False)
+
+    def predict(self, data: AxisData) -> Array:
+        """Predict the output one sample ahead with the noise model's gain; else as simulated."""
+        return self._run(data, predicts=bool(self.noise.gains))
+
+    def _run(self, data: AxisData, *, predicts: bool) -> Array:
+        start = np.zeros(2 * self.model.n_masses)
+        start[0] = data.start_angle_rad()
+        theta = [*self.model.vector(self.parameters, self.noise.gains), *start.tolist()]
+        return _core.axis_simulate(self.model.core(), data.core(self.model), theta, predicts=predicts)[0]
+
+    def fit_to(self, data: AxisData, *, predicted: bool = False) -> float:
+        """Return the model fit (3.54) [%] to a record started at rest, for cross-validation."""
+        run = self.predict if predicted else self.simulate
+        return fit_percent(data.measured(self.model), run(data))
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return values and uncertainty as a Dataset over ``parameter``."""
+        unit = {p.name: p.unit for p in self.model.parameters}
+        pair = ("parameter", "other")
+        return xr.Dataset(
+            {
+                "value": ("parameter", self.values),
+                "std": ("parameter", self.std),
+                "std_sandwich": ("parameter", np.sqrt(np.diag(self.sandwich))),
+                "covariance": (pair, self.covariance),
+                "correlation": (pair, self.correlation),
+                "unit": ("parameter", [unit[n] for n in self.free]),
+            },
+            coords={"parameter": list(self.free), "other": list(self.free)},
+            attrs={
+                "status": self.status,
+                "loss": self.loss,
+                "condition": self.condition,
+                "noise_model": self.noise.kind,
+                "error_std": self.error_std,
+                "error_unit": OUTPUT_UNIT[self.model.output],
+            },
+        )
+
+    def summary(self) -> str:
+        """Return a table of values and standard deviations, status and warnings."""
+        unit = {p.name: p.unit for p in self.model.parameters}
+        rows = [
+            f"{n:>8} {v:12.5g} ± {s:8.2g} {unit[n]}"
+            for n, v, s in zip(self.free, self.values, self.std, strict=True)
+        ]
+        fits = ", ".join(f"{f:.2f} %" for f in self.fit_percent)
+        return "\n".join([*rows, f"fit {fits}", f"status {self.status}", *self.warnings])
+
+
+def fit_percent(measured: Array, modelled: Array) -> float:
+    """Return the model fit (3.54) [%]; minus infinity for a measurement that never moves."""
+    spread = float(np.linalg.norm(measured - measured.mean()))
+    error = float(np.linalg.norm(measured - modelled))
+    return 100 * (1 - error / spread) if spread > 0 else -np.inf
+
+
+def conclude(
+    task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]
+) -> AxisFit:
+    """Turn the end of a search into a result."""
+    from axisight.graybox.prediction_error import free_run
+
+    model = task.model
+    names = task.free_names
+    errors, lengths = point.errors, [len(d) for d in task.data]
+    skipped = len(point.whitening) * len(lengths)
+    variance = float(errors @ errors) / max(errors.size - skipped - len(point.matrix), 1)
+    inverse, condition = inverse_normal(point.matrix)
+    n = len(names)
+    covariance = variance * inverse
+    scatter = point.block_gradients.T @ point.block_gradients
+    with np.errstate(invalid="ignore"):
+        sandwich = inverse @ scatter @ inverse
+    std = np.sqrt(np.diag(covariance)[:n])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = covariance[:n, :n] / np.outer(std, std)
+    places = model.places()
+    parameters = {p.name: float(point.theta[places[p.name]]) for p in model.parameters}
+    values = np.array([parameters[name] for name in names])
+    bounded = tuple(k for k in names if parameters[k] in task.bounds[k])
+    roots = np.sqrt([d.weight for d in task.data])
+    parts = np.split(errors, np.cumsum(lengths)[:-1])
+    first = len(model.vector({}))
+    starts = np.array(point.theta[first:]).reshape(len(lengths), 2 * model.n_masses)
+    texts = [*warnings, *_warnings(point.status, bounded, condition, names, inverse)]
+    simulated = not (point.gains or point.whitening)
+    fits = []
+    for i, (d, part, root) in enumerate(zip(task.data, parts, roots, strict=True)):
+        measured = d.measured(model)
+        run = measured + part / root if simulated else free_run(task, point, i)
+        fits.append(fit_percent(measured, run))
+    return AxisFit(
+        model=model,
+        parameters=parameters,
+        free=names,
+        values=values,
+        std=std,
+        covariance=covariance[:n, :n],
+        sandwich=sandwich[:n, :n],
+        correlation=correlation,
+        condition=condition,
+        status=point.status,
+        warnings=tuple(texts),
+        at_bound=bounded,
+        loss=point.loss,
+        initial_loss=point.initial_loss,
+        iterations=point.iterations,
+        evaluations=point.evaluations,
+        error_std=float(np.sqrt(variance)),
+        residuals=tuple(p / r for p, r in zip(parts, roots, strict=True)),
+        fit_percent=tuple(fits),
+        starts=starts,
+        noise=noise,
+    )
+
+
+def inverse_normal(matrix: Array) -> tuple[Array, float]:
+    """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
+
+    Directions that the data do not show get the pseudo-inverse; the condition is then infinite.
+    """
+    size = np.sqrt(np.diag(matrix))
+    size[size == 0] = 1.0
+    unit = matrix / np.outer(size, size)
+    values, vectors = np.linalg.eigh(unit)
+    seen = values > 1e-15 * len(values)
+    condition = float(values[-1] / values[0]) if seen.all() else np.inf
+    weights = np.where(seen, 1 / np.where(seen, values, 1.0), 0.0)
+    inverse = (vectors * weights) @ vectors.T / np.outer(size, size)
+    # A direction without data has no finite variance.
+    blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
+    inverse[np.ix_(blind, blind)] = np.inf
+    return inverse, condition
+
+
+def _warnings(
+    status: str, bounded: tuple[str, ...], condition: float, names: tuple[str, ...], inverse: Array
+) -> list[str]:
+    out = [STATUS_ADVICE[status]] if status in STATUS_ADVICE else []
+    if bounded:
+        out.append(
+            f"on a bound: {', '.join(bounded)}. Intervals there are not valid; look at the model "
+            "or the bound"
+        )
+    blind = [n for n, v in zip(names, np.diag(inverse), strict=False) if not np.isfinite(v)]
+    if blind:
+        out.append(
+            f"the data do not determine {', '.join(blind)} apart from each other: fix some of "
+            "them or add records that excite them"
+        )
+    elif condition > POOR_CONDITION:
+        out.append(
+            f"condition number {condition:.1e}: the data hardly separate some parameters; look "
+            "at the correlation and fix one of a pair near 1"
+        )
+    return out

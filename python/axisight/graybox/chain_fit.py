@@ -1,0 +1,349 @@
+"""Chains of masses fitted to a measured collocated response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.graybox.collocated import Collocated, collocated, sandwich
+from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_MODEL_FLOOR = 0.05
+_ITERATIONS = 25
+_START_DAMPING = 0.03
+_ROOM = 0.05
+_POOR_DB = 3.0
+_UNCERTAIN = 0.5
+_SPAN = 1e3
+_BEYOND = 1.2
+
+
+@dataclass(frozen=True, eq=False)
+class ChainFit:
+    """A chain of masses that fits a response.
+
+    chain
+        Masses, springs, dampers.
+    inertia_standard_error, stiffness_standard_error, damping_standard_error
+        In the units and shapes of the chain's values; from the scatter of every line about the
+        model (:func:`axisight.graybox.collocated.sandwich`), which errors of the model enlarge.
+    viscous_friction_nm_s_rad
+        Of the motor, motor side, with its standard error.
+    delay_s
+        Pure delay; a held torque gives half a sample.
+    error_db
+        What half of the lines are within: modelled over measured response, magnitude and phase
+        together (1 rad counts as 8.7 dB).
+    status
+        ``"converged"`` or ``"not_converged"``.
+    findings
+        What to know before using the values.
+    """
+
+    chain: SpringMassChain
+    inertia_standard_error: Real
+    stiffness_standard_error: Real
+    damping_standard_error: Real
+    viscous_friction_nm_s_rad: float
+    viscous_friction_standard_error: float
+    delay_s: float
+    error_db: float
+    status: str
+    findings: tuple[str, ...] = ()
+
+
+def fit_chain(
+    response: xr.Dataset,
+    n_masses: int,
+    *,
+    gear_ratio: float = 1.0,
+    axis: int = 1,
+    quantity: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+    start: SpringMassChain | None = None,
+    delay: bool = True,
+) -> ChainFit:
+    """Fit a chain of ``n_masses`` to a collocated response.
+
+    A rational function with real coefficients and n - 1 pairs of zeros and poles is fitted by
+    iterated linear least squares with relative weights (Sanathanan and Koerner 1963, IEEE TAC
+    8(1)). Its frequencies give a chain by the inverse eigenvalue problem
+    (:func:`axisight.graybox.reconstruct_chain`), from which masses, springs, dampers, viscous
+    friction and delay are fitted to the logarithm of the response, (3.44), with exact gradients:
+    poles and zeros then alternate whatever the noise. If those of the rational function
+    do not, the start is taken from the peaks and the notches between them, and the findings say
+    so.
+
+    Parameters
+    ----------
+    response, axis, quantity, band_hz : see :func:`axisight.graybox.collocated`.
+    n_masses : 2 or more, the motor included.
+    gear_ratio : r, joint angle per motor angle; masses beyond the motor, springs and dampers
+        are on the joint side.
+    start : start here instead.
+    delay : whether a pure delay is fitted too.
+
+    Raises InputError for fewer than 2 masses, too few lines, or fewer resonances in the band
+    than the chain has.
+
+    """
+    if isinstance(n_masses, bool) or n_masses != int(n_masses) or n_masses < 2:
+        raise InputError(f"n_masses: expected a whole number of at least 2, got {n_masses}")
+    if not (np.isfinite(gear_ratio) and gear_ratio != 0):
+        raise InputError(f"gear_ratio: expected a finite number other than zero, got {gear_ratio}")
+    data = collocated(response, axis=axis, quantity=quantity, band_hz=band_hz)
+    if len(data.frequency_hz) < 3 * n_masses + 2:
+        raise InputError(
+            f"response: expected at least {3 * n_masses + 2} lines for {n_masses} masses, "
+            f"got {len(data.frequency_hz)}"
+        )
+    findings: list[str] = []
+    if start is None:
+        start = _start(data, n_masses - 1, gear_ratio, findings)
+    elif start.n_masses != n_masses:
+        raise InputError(f"start: expected {n_masses} masses, got {start.n_masses}")
+    return _polish(data, replace(start, gear_ratio=gear_ratio), delay, findings)
+
+
+def _start(data: Collocated, pairs: int, ratio: float, findings: list[str]) -> SpringMassChain:
+    """Chain of the poles and zeros of a rational fit, or of peaks and notches."""
+    try:
+        zeros, poles, gain = _rational(data, pairs)
+        if poles[0][-1] <= _BEYOND * data.angular_rad_s[-1]:
+            return _reconstruct(poles, zeros, 1 / gain, ratio)
+        why = "has a resonance beyond the band"
+    except InputError:
+        why = "has poles and zeros that do not alternate"
+    findings.append(f"the rational fit {why}; started from peaks and notches")
+    peaks, notches = _peaks(data, pairs)
+    damping = np.full(pairs, _START_DAMPING)
+    above = np.abs(data.acceleration)[data.angular_rad_s > peaks[-1]]
+    gain = float(np.median(above)) if len(above) else float(np.median(np.abs(data.acceleration)))
+    return _reconstruct((peaks, damping), (notches, damping), 1 / gain, ratio)
+
+
+def _reconstruct(
+    poles: tuple[Real, Real], zeros: tuple[Real, Real], motor: float, ratio: float
+) -> SpringMassChain:
+    return reconstruct_chain(
+        poles[0],
+        zeros[0],
+        motor_inertia_kg_m2=motor,
+        gear_ratio=ratio,
+        pole_damping=poles[1],
+        zero_damping=zeros[1],
+    )
+
+
+def _rational(data: Collocated, pairs: int) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
+    """Zeros and poles (frequencies, damping ratios) and gain of a rational fit."""
+    scale = float(np.sqrt(data.angular_rad_s[0] * data.angular_rad_s[-1]))
+    s = 1j * data.angular_rad_s / scale
+    order = 2 * pairs
+    powers = np.vander(s, order + 1, increasing=True)
+    value = data.acceleration
+    weight = 1 / np.abs(value)
+    for _ in range(_ITERATIONS):
+        # N - G D = 0 with the leading coefficient of D one.
+        left = np.hstack([powers, -value[:, None] * powers[:, :-1]]) * weight[:, None]
+        right = value * powers[:, -1] * weight
+        rows = np.vstack([left.real, left.imag])
+        size = np.linalg.norm(rows, axis=0)
+        solution, _, _, _ = np.linalg.lstsq(
+            rows / size, np.concatenate([right.real, right.imag]), rcond=None
+        )
+        solution = solution / size
+        denominator = powers @ np.concatenate([solution[order + 1 :], [1.0]])
+        weight = 1 / np.abs(value * denominator)
+    numerator = solution[: order + 1]
+    pairs_of = [
+        _pairs(coefficients, scale, name)
+        for coefficients, name in (
+            (numerator, "zeros"),
+            (np.concatenate([solution[order + 1 :], [1.0]]), "poles"),
+        )
+    ]
+    if numerator[-1] <= 0:
+        raise InputError("response: expected a positive high-frequency gain")
+    return pairs_of[0], pairs_of[1], float(numerator[-1])
+
+
+def _pairs(coefficients: Real, scale: float, name: str) -> tuple[Real, Real]:
+    roots = np.roots(coefficients[::-1]) * scale
+    upper = roots[roots.imag > 0]
+    if 2 * len(upper) != len(roots):
+        raise InputError(f"response: expected complex pairs of {name}, got {roots}")
+    upper = upper[np.argsort(np.abs(upper))]
+    return np.abs(upper), np.clip(-upper.real / np.abs(upper), 0.0, 1.0)
+
+
+def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
+    """The most prominent resonances and the lowest lines below each."""
+    level = np.log(np.abs(data.acceleration))
+    found, properties = scipy.signal.find_peaks(level, prominence=0.1)
+    if len(found) < pairs:
+        raise InputError(
+            f"response: expected {pairs} resonances for {pairs + 1} masses, found {len(found)} "
+            "in the band; fit fewer masses, or widen the band"
+        )
+    strongest = np.sort(found[np.argsort(properties["prominences"])[-pairs:]])
+    before = np.concatenate([[0], strongest[:-1]])
+    notches = [a + int(np.argmin(level[a:b])) for a, b in zip(before, strongest, strict=True)]
+    omega = data.angular_rad_s
+    peaks, low = omega[strongest], omega[notches]
+    # Neighbouring lines must not coincide.
+    floor = np.concatenate([[0.0], peaks[:-1]])
+    return peaks, np.clip(low, floor + _ROOM * (peaks - floor), peaks - _ROOM * (peaks - floor))
+
+
+class _Problem:
+    """Residuals of the logarithm of the response, and their exact derivatives.
+
+    Unknowns: logarithms of masses and springs (within a thousandfold of the start), dampers,
+    friction and delay relative to a scale.
+    """
+
+    def __init__(self, data: Collocated, start: SpringMassChain, delay: bool) -> None:
+        self._omega = data.angular_rad_s
+        self._log = np.log(data.acceleration)
+        known = np.isfinite(data.variance)
+        noise = np.where(known, data.variance, 0.0) / np.abs(data.acceleration) ** 2
+        self._weight = 1 / np.sqrt(noise + _MODEL_FLOOR**2)
+        self.n = start.n_masses
+        self._ratio = start.gear_ratio
+        middle = float(np.sqrt(self._omega[0] * self._omega[-1]))
+        self.damper = np.maximum(start.damping_nm_s_rad, 0.01 * start.stiffness_nm_rad / middle)
+        self.friction = 0.1 * middle * start.inertia_kg_m2[0]
+        self.time = 0.1 / middle
+        self._delay = delay
+        springs = np.log(start.stiffness_nm_rad)
+        self.first = np.concatenate(
+            [
+                np.log(start.inertia_kg_m2),
+                springs,
+                np.maximum(start.damping_nm_s_rad / self.damper, 0.1),
+                [0.1],
+                [0.0] if delay else [],
+            ]
+        )
+        free = 2 * self.n - 1
+        self.lower = np.full(len(self.first), -np.inf)
+        self.upper = np.full(len(self.first), np.inf)
+        self.lower[free : free + self.n] = 0.0
+        self.upper[free : free + self.n] = _SPAN
+        self.lower[:free] = self.first[:free] - np.log(_SPAN)
+        self.upper[:free] = self.first[:free] + np.log(_SPAN)
+
+    def parts(self, x: Real) -> tuple[Real, Real, Real, float, float]:
+        """Inertias, stiffnesses, dampers, friction (joint side), delay."""
+        n = self.n
+        return (
+            np.exp(x[:n]),
+            np.exp(x[n : 2 * n - 1]),
+            x[2 * n - 1 : 3 * n - 2] * self.damper,
+            float(x[3 * n - 2] * self.friction),
+            float(x[3 * n - 1] * self.time) if self._delay else 0.0,
+        )
+
+    def _motion(self, x: Real) -> Complex:
+        """Angles of all masses per torque on the first, (n_lines, n)."""
+        inertia, stiffness, damping, friction, _ = self.parts(x)
+        s = 1j * self._omega
+        spring = stiffness + s[:, None] * damping
+        system = np.zeros((len(s), self.n, self.n), np.complex128)
+        at = np.arange(self.n)
+        system[:, at, at] = s[:, None] ** 2 * inertia
+        system[:, 0, 0] += s * friction
+        system[:, at[:-1], at[:-1]] += spring
+        system[:, at[1:], at[1:]] += spring
+        system[:, at[:-1], at[1:]] = system[:, at[1:], at[:-1]] = -spring
+        unit = np.zeros((self.n, 1), np.complex128)
+        unit[0] = 1.0
+        return np.asarray(np.linalg.solve(system, unit[None])[..., 0])
+
+    def error(self, x: Real) -> Complex:
+        """Logarithm of modelled over measured response, phase within half a turn."""
+        s = 1j * self._omega
+        model = s**2 * self._motion(x)[:, 0] / self._ratio**2
+        apart = np.log(model) - s * self.parts(x)[4] - self._log
+        return np.asarray(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
+
+    def residual(self, x: Real) -> Real:
+        """Weighted errors, real and imaginary parts."""
+        left = self.error(x) * self._weight
+        return np.concatenate([left.real, left.imag])
+
+    def jacobian(self, x: Real) -> Real:
+        """Derivatives of the residuals: d(e^T D^-1 e) = -x^T dD x, D symmetric."""
+        inertia, stiffness, _, _, _ = self.parts(x)
+        motion = self._motion(x)
+        s = 1j * self._omega[:, None]
+        stretch = (motion[:, :-1] - motion[:, 1:]) ** 2
+        columns = [
+            -(s**2) * motion**2 * inertia,
+            -stretch * stiffness,
+            -s * stretch * self.damper,
+            -s * motion[:, :1] ** 2 * self.friction,
+        ]
+        slope = np.hstack(columns) / motion[:, :1]
+        if self._delay:
+            slope = np.hstack([slope, -s * self.time])
+        slope = slope * self._weight[:, None]
+        return np.vstack([slope.real, slope.imag])
+
+
+def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: list[str]) -> ChainFit:
+    problem = _Problem(data, start, delay)
+    found: scipy.optimize.OptimizeResult = scipy.optimize.least_squares(
+        problem.residual,
+        problem.first,
+        jac=problem.jacobian,
+        bounds=(problem.lower, problem.upper),
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-12,
+        max_nfev=300,
+    )
+    inertia, stiffness, damping, friction, late = problem.parts(found.x)
+    n, ratio = problem.n, start.gear_ratio
+    deviation = np.sqrt(np.diag(sandwich(problem.jacobian(found.x), found.fun)))
+    error = 20 / np.log(10) * float(np.median(np.abs(problem.error(found.x))))
+    found_chain = SpringMassChain(inertia, stiffness, damping, ratio)
+    converged = found.status > 0
+    if not converged:
+        findings.append("the fit stopped before it converged: try fewer masses or another start")
+    if error > _POOR_DB:
+        findings.append(
+            f"half of the lines are more than {error:.1f} dB off the chain: other masses, or noise"
+        )
+    uncertain = np.flatnonzero(deviation[: 2 * n - 1] > _UNCERTAIN)
+    names = [f"inertia {i + 1}" for i in range(n)] + [f"spring {i + 1}" for i in range(n - 1)]
+    beyond = found_chain.poles_rad_s > _BEYOND * data.angular_rad_s[-1]
+    if beyond.any():
+        findings.append(
+            f"resonance {found_chain.poles_rad_s[beyond][0]:.3g} rad/s lies beyond the band: its mass "
+            "and spring are guesses; fit fewer masses"
+        )
+    if len(uncertain):
+        listed = ", ".join(names[i] for i in uncertain)
+        findings.append(f"{listed}: hardly seen in this band; fit fewer masses")
+    return ChainFit(
+        chain=found_chain,
+        inertia_standard_error=inertia * deviation[:n],
+        stiffness_standard_error=stiffness * deviation[n : 2 * n - 1],
+        damping_standard_error=problem.damper * deviation[2 * n - 1 : 3 * n - 2],
+        viscous_friction_nm_s_rad=float(friction * ratio**2),
+        viscous_friction_standard_error=float(problem.friction * ratio**2 * deviation[3 * n - 2]),
+        delay_s=late,
+        error_db=error,
+        status="converged" if converged else "not_converged",
+        findings=tuple(findings),
+    )

@@ -1,0 +1,237 @@
+"""Notch, resonance and high-frequency gain of a collocated response, between its lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.graybox.collocated import Collocated, sandwich
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_WINDOW = 0.3
+_MODEL_FLOOR = 0.05
+_SURROUNDINGS = 3
+_FEWEST = 8
+_DEPTH_DB = 6.0
+_EDGE_LINES = 2
+_PLATEAU_FROM = 1.6
+_PEAK_DB = 3.0
+_LARGEST_STEP = 0.25
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """A notch or a resonance.
+
+    frequency_rad_s, damping_ratio
+        Natural frequency and damping ratio of the pair of zeros or poles.
+    frequency_standard_error_rad_s, damping_standard_error
+        From the scatter about the local model.
+    n_lines
+        Lines that took part.
+    """
+
+    frequency_rad_s: float
+    damping_ratio: float
+    frequency_standard_error_rad_s: float
+    damping_standard_error: float
+    n_lines: int
+
+
+@dataclass(frozen=True)
+class HighFrequencyGain:
+    """Level of torque to acceleration far above the resonances, 1 / J_m.
+
+    gain, standard_error
+        [rad/s^2/Nm], at infinite frequency.
+    correction
+        How much larger the response still is at the upper end of the band, relative.
+    from_rad_s, to_rad_s
+        Lines used.
+    """
+
+    gain: float
+    standard_error: float
+    correction: float
+    from_rad_s: float
+    to_rad_s: float
+
+
+def find_notch(data: Collocated, *, band_rad_s: tuple[float, float] | None = None) -> Landmark:
+    """Return the first notch, estimated between the lines.
+
+    The lowest line is looked for (of ``band_rad_s``, or all of those below the highest
+    resonance), after a median over three lines. About it, within 30 %, the logarithm of the
+    response is a pair of zeros and surroundings,
+
+        log G = log(w0^2 - w^2 + 2 i zeta w0 w) + c0 + c1 x + c2 x^2,  x = w / w0 - 1,
+
+    with complex c: delay, friction and the flanks of neighbours. w0 and zeta by nonlinear, c by
+    linear least squares (variable projection), lines weighted by their variance and a
+    tolerance of 5 % of the response for what the local model lacks.
+
+    Raises InputError if the lowest line is at the edge of the band, or no 6 dB below what
+    lies on either side, that is where the band holds no notch.
+    """
+    omega, level = data.angular_rad_s, _level_db(data)
+    inside = np.ones(len(omega), bool)
+    if band_rad_s is not None:
+        inside = (omega >= band_rad_s[0]) & (omega <= band_rad_s[1])
+        if not inside.any():
+            raise InputError(
+                f"band_rad_s: expected lines between {band_rad_s[0]:g} and {band_rad_s[1]:g} rad/s"
+            )
+    at = int(np.argmin(np.where(inside, level, np.inf)))
+    depth = min(level[: at + 1].max(), level[at:].max()) - level[at]
+    edge = at < _EDGE_LINES or at >= len(omega) - _EDGE_LINES
+    if edge or depth < _DEPTH_DB:
+        where = "at the edge of the band" if edge else f"only {depth:.1f} dB below its surroundings"
+        raise InputError(
+            f"response: expected a notch between {omega[0]:.3g} and {omega[-1]:.3g} rad/s, but the "
+            f"lowest value, at {omega[at]:.3g} rad/s, is {where}; excite a band that holds the "
+            "notch and the resonance above it, or give the band of the notch"
+        )
+    return _pair(data, omega[at], 1.0)
+
+
+def find_resonance(
+    data: Collocated, *, above_rad_s: float = 0.0, below_rad_s: float = np.inf
+) -> Landmark:
+    """Return the highest resonance between ``above_rad_s`` and ``below_rad_s``.
+
+    Estimated between the lines as in :func:`find_notch`.
+
+    Raises InputError if the highest line is at the edge of the band.
+    """
+    omega, level = data.angular_rad_s, _level_db(data)
+    inside = (omega > above_rad_s) & (omega < below_rad_s)
+    if not inside.any():
+        raise InputError(f"response: expected lines above {above_rad_s:.3g} rad/s, got none")
+    at = int(np.argmax(np.where(inside, level, -np.inf)))
+    if at < _EDGE_LINES or at >= len(omega) - _EDGE_LINES:
+        raise InputError(
+            f"response: expected a resonance between {max(above_rad_s, omega[0]):.3g} and "
+            f"{min(below_rad_s, omega[-1]):.3g} rad/s, but the largest value is at the edge of the "
+            "band; excite higher frequencies"
+        )
+    return _pair(data, omega[at], -1.0)
+
+
+def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequencyGain:
+    """Return the gain far above the resonances from lines above ``from_rad_s``.
+
+    There |G| = g (1 + c / w^2 + e / w^4) to sixth order in 1 / w, c being the sum of the squared
+    resonances less that of the notches. g, c and e by linear least squares, lines weighted by
+    their variance and a tolerance of 5 %; the standard error is from the scatter.
+
+    Raises InputError if fewer than eight lines are left, or the response at the upper
+    end of the band is still a quarter above its level: then there is no plateau to read J_m from.
+    """
+    high = data.between(from_rad_s, np.inf)
+    omega, size = high.angular_rad_s, np.abs(high.acceleration)
+    top = data.angular_rad_s[-1]
+    advice = (
+        "excite up to three times the highest resonance, or give the motor inertia (data sheet) "
+        "instead"
+    )
+    if len(omega) < _FEWEST:
+        raise InputError(
+            f"response: expected at least {_FEWEST} lines above {from_rad_s:.3g} rad/s for the "
+            f"high-frequency gain 1 / J_m, got {len(omega)} up to {top:.3g} rad/s; {advice}"
+        )
+    basis = np.vander((from_rad_s / omega) ** 2, 3, increasing=True)
+    weight = 1 / _relative_deviation(high) / size
+    level, covariance = _least_squares(basis * weight[:, None], size * weight)
+    gain = level[0]
+    correction = float(basis[-1] @ level / gain - 1)
+    if not abs(correction) < _LARGEST_STEP:
+        raise InputError(
+            f"response: expected a plateau at high frequency, but at {omega[-1]:.3g} rad/s it is "
+            f"still {100 * correction:+.0f} % from the level it tends to; {advice}"
+        )
+    return HighFrequencyGain(
+        float(gain), float(np.sqrt(covariance[0, 0])), correction, float(omega[0]), float(omega[-1])
+    )
+
+
+def plateau_start(data: Collocated) -> float:
+    """Return where the plateau may begin [rad/s]: 1.6 times the last peak of 3 dB or more."""
+    peaks, _ = scipy.signal.find_peaks(_level_db(data), prominence=_PEAK_DB)
+    if not len(peaks):
+        raise InputError("response: expected a resonance of 3 dB or more in the band, got none")
+    return float(_PLATEAU_FROM * data.angular_rad_s[peaks[-1]])
+
+
+def _level_db(data: Collocated) -> Real:
+    """Magnitude in decibel; a single wild line is no landmark."""
+    return np.asarray(scipy.signal.medfilt(20 * np.log10(np.abs(data.acceleration)), 3))
+
+
+def _relative_deviation(data: Collocated) -> Real:
+    known = np.isfinite(data.variance)
+    noise = np.where(known, data.variance, 0.0) / np.abs(data.acceleration) ** 2
+    return np.asarray(np.sqrt(noise + _MODEL_FLOOR**2))
+
+
+def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
+    """Solution and covariance with the variance the residuals show."""
+    solution, _, _, _ = np.linalg.lstsq(basis, target, rcond=None)
+    left = target - basis @ solution
+    freedom = max(len(target) - basis.shape[1], 1)
+    covariance = np.linalg.inv(basis.T @ basis) * float(left @ left) / freedom
+    return np.asarray(solution, np.float64), np.asarray(covariance, np.float64)
+
+
+def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
+    """Fit a pair of zeros (sign 1) or poles (-1) with smooth surroundings."""
+    near = data.between((1 - _WINDOW) * start_rad_s, (1 + _WINDOW) * start_rad_s)
+    omega = near.angular_rad_s
+    if len(omega) < _FEWEST:
+        raise InputError(
+            f"response: expected at least {_FEWEST} lines within 30 % of {start_rad_s:.3g} rad/s, "
+            f"got {len(omega)}; excite more lines there"
+        )
+    log = np.log(np.abs(near.acceleration)) + 1j * np.unwrap(np.angle(near.acceleration))
+    weight = 1 / _relative_deviation(near)
+    shape = np.vander(omega / start_rad_s - 1, _SURROUNDINGS, increasing=True) * weight[:, None]
+    smooth, _ = np.linalg.qr(shape)
+
+    def free(values: Complex) -> Real:
+        """What the surroundings cannot take up, real and imaginary parts."""
+        left = values * weight
+        left = left - smooth @ (smooth.T @ left)
+        return np.concatenate([left.real, left.imag])
+
+    def pair(theta: Real) -> Complex:
+        return np.asarray(theta[0] ** 2 - omega**2 + 2j * theta[1] * theta[0] * omega)
+
+    def residual(theta: Real) -> Real:
+        factor = pair(theta)
+        phase = np.unwrap(np.angle(factor))
+        return free(log - sign * (np.log(np.abs(factor)) + 1j * phase))
+
+    def slope(theta: Real) -> Real:
+        factor = pair(theta)
+        by_frequency = (2 * theta[0] + 2j * theta[1] * omega) / factor
+        by_damping = 2j * theta[0] * omega / factor
+        return np.stack([-sign * free(by_frequency), -sign * free(by_damping)], axis=1)
+
+    spacing = float(np.median(np.diff(omega)))
+    found = scipy.optimize.least_squares(
+        residual,
+        np.array([start_rad_s, 0.05]),
+        jac=slope,
+        bounds=([omega[0], 1e-6], [omega[-1], 1.0]),
+        x_scale=np.array([spacing, 0.01]),
+    )
+    # The surroundings take parameters too: three complex ones.
+    taken = np.sqrt(len(omega) / max(len(omega) - _SURROUNDINGS - 1, 1))
+    error = taken * np.sqrt(np.diag(sandwich(slope(found.x), found.fun)))
+    frequency, damping = (float(v) for v in found.x)
+    return Landmark(frequency, damping, float(error[0]), float(error[1]), len(omega))

@@ -1,0 +1,183 @@
+"""Fits of one axis from many starts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.graybox.axis_checks import data_warnings
+from axisight.graybox.axis_model import AxisData, AxisModel, number
+from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
+from axisight.graybox.prediction_error import (
+    GRADUAL,
+    FitSettings,
+    Point,
+    Task,
+    first_point,
+    prepare,
+    search_rounds,
+)
+
+
+@dataclass(frozen=True)
+class AxisMultistart:
+    """Result of `multistart_axis`.
+
+    ``best`` is the fit of the lowest loss. ``runs`` is a Dataset over ``run`` with ``start`` and
+    ``value`` (run, parameter), ``loss``, ``status`` and ``iterations``; a run whose start cannot
+    be simulated has the status ``diverged`` and the loss infinity.
+    """
+
+    best: AxisFit
+    runs: xr.Dataset
+
+    def success_rate(self, truth: Mapping[str, float], within: float) -> float:
+        """Return the share of all starts that end within a relative distance of ``truth``.
+
+        Every start counts, those that diverged too. ``truth`` names the parameters compared.
+        """
+        unknown = sorted(set(truth) - set(self.runs.parameter.values.tolist()))
+        if unknown or not truth:
+            raise InputError(
+                f"truth: expected names out of {', '.join(self.runs.parameter.values)}, "
+                f"got {', '.join(unknown) or 'none'}"
+            )
+        wanted = np.array(list(truth.values()), np.float64)
+        found = self.runs.value.sel(parameter=list(truth)).values
+        return float(np.mean(np.all(np.abs(found - wanted) <= within * np.abs(wanted), axis=1)))
+
+
+def multistart_axis(
+    model: AxisModel,
+    data_sets: Sequence[AxisData] | AxisData,
+    start: Mapping[str, float],
+    *,
+    n_starts: int = 50,
+    seed: int = 0,
+    spread: float = 3.0,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    fixed: Iterable[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    settings: FitSettings | None = None,
+    threads: int = 0,
+) -> AxisMultistart:
+    """Fit an axis from ``n_starts`` random starts by output error; each start is one fit.
+
+    Every free parameter is drawn on its own, evenly in its logarithm, from ``start / spread``
+    to ``start * spread``, or between the limits that ``ranges`` gives by name (both positive
+    or both negative); one that starts at zero without a range stays there. Draws are clipped to
+    the bounds. The draws are a function of (seed, number of the run) alone, and the result does
+    not depend on ``threads`` (0 takes every core).
+
+    By default every fit approaches the simulation error in rounds (``settings.gradual``),
+    first with the speed error fed back: a start whose resonance is far off has local minima
+    otherwise. Errors and other arguments as in `fit_axis`.
+    """
+    chosen = settings or FitSettings(gradual=GRADUAL)
+    for field, value, least in (("n_starts", n_starts, 1), ("seed", seed, 0), ("threads", threads, 0)):
+        if not isinstance(value, (int, np.integer)) or value < least:
+            raise InputError(f"{field}: expected a whole number from {least}, got {value!r}")
+    if number("spread", spread) < 1:
+        raise InputError(f"spread: expected at least 1, got {spread}")
+    task, values = prepare(
+        model,
+        data_sets,
+        start,
+        fixed=fixed,
+        bounds=bounds,
+        free_gear_ratio=False,
+        settings=chosen,
+    )
+    limits = _limits(task, values, spread, ranges or {})
+    token = _core.CancelToken()
+    starts = [_draw(task, values, limits, seed, i) for i in range(n_starts)]
+
+    def one(begin: Mapping[str, float]) -> Point:
+        point = first_point(task, begin)
+        try:
+            return search_rounds(task, point, begin["r"], token)
+        except InputError:
+            return replace(point, status="diverged", loss=np.inf)
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        try:
+            ends = list(pool.map(one, starts))
+        except BaseException:
+            token.cancel()
+            pool.shutdown(cancel_futures=True)
+            raise
+    best = min(ends, key=lambda p: p.loss)
+    if not np.isfinite(best.loss):
+        raise InputError(
+            "start: expected at least one start that can be simulated, got none: the motion "
+            "diverges from all of them"
+        )
+    warnings = data_warnings(model, task.data, task.free_names)
+    return AxisMultistart(
+        conclude(task, best, NoiseModel("output_error"), warnings), _table(task, starts, ends)
+    )
+
+
+def _limits(
+    task: Task,
+    values: Mapping[str, float],
+    spread: float,
+    ranges: Mapping[str, tuple[float, float]],
+) -> dict[str, tuple[float, float]]:
+    unknown = sorted(set(ranges) - set(task.free_names))
+    if unknown:
+        raise InputError(
+            f"ranges: expected free parameters, {', '.join(task.free_names)}, "
+            f"got {', '.join(unknown)}"
+        )
+    out = {n: (values[n] / spread, values[n] * spread) for n in task.free_names if values[n]}
+    for name, (low, high) in ranges.items():
+        if not (np.isfinite([low, high]).all() and low * high > 0 and low <= high):
+            raise InputError(
+                f"ranges: {name}: expected two ascending numbers of one sign, got {low}, {high}"
+            )
+        out[name] = (float(low), float(high))
+    return out
+
+
+def _draw(
+    task: Task,
+    values: Mapping[str, float],
+    limits: Mapping[str, tuple[float, float]],
+    seed: int,
+    run: int,
+) -> dict[str, float]:
+    """Return all parameters of one start."""
+    random = np.random.default_rng([seed, run])
+    out = dict(values)
+    for name in task.free_names:
+        share = random.random()
+        if name in limits:
+            low, high = limits[name]
+            drawn = low * (high / low) ** share
+            out[name] = float(np.clip(drawn, *task.bounds[name]))
+    return out
+
+
+def _table(
+    task: Task, starts: Sequence[Mapping[str, float]], ends: Sequence[Point]
+) -> xr.Dataset:
+    names, places = list(task.free_names), task.model.places()
+    return xr.Dataset(
+        {
+            "start": (("run", "parameter"), [[s[n] for n in names] for s in starts]),
+            "value": (("run", "parameter"), [[p.theta[places[n]] for n in names] for p in ends]),
+            "loss": ("run", [p.loss for p in ends]),
+            "status": ("run", [p.status for p in ends]),
+            "iterations": ("run", [p.iterations for p in ends]),
+            "evaluations": ("run", [p.evaluations for p in ends]),
+        },
+        coords={"run": np.arange(len(ends)), "parameter": names},
+    )

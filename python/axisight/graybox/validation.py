@@ -1,0 +1,291 @@
+"""Is a fitted model good enough: fit, residual tests, cross-validation.
+
+Wernholt (2004), section 3.5; Ljung (1999), System Identification, chapter 16.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+import scipy
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.errors import InputError
+
+Real = NDArray[np.float64]
+D = TypeVar("D")
+M = TypeVar("M")
+
+_RANK = 1e-3
+_WINDOW_SHARE = 10
+
+
+def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
+    """Return the model fit (3.54) in per cent.
+
+    ``100 (1 - |y - yhat| / |y - mean(y)|)``, y the ``measured`` output and yhat the ``simulated``
+    or predicted one, (n,): 100 for a perfect model, 0 for one no better than the mean, negative
+    for worse. Raises InputError for others,
+    values that are not finite, and a measurement that does not vary.
+    """
+    y, model = _pair("measured", measured, "simulated", simulated)
+    spread = float(np.linalg.norm(y - y.mean()))
+    if spread == 0:
+        raise InputError("measured: expected values that vary, got a constant")
+    return 100 * (1 - float(np.linalg.norm(y - model)) / spread)
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualTests:
+    """What the residuals say about a model.
+
+    correlations
+        Dataset over ``lag`` (samples; positive: input before residual) with
+        ``autocorrelation`` and ``cross_correlation`` (both normalised), and their two-sided limits
+        at ``probability`` (attribute) for each lag alone.
+    whiteness_p_value
+        Probability of autocorrelations at least as large if the residuals are white.
+    independence_p_value
+        The same of cross-correlation with past inputs, if the residuals do not depend on the input.
+    feedback_p_value
+        The same of cross-correlation with later inputs.
+    closed_loop
+        Whether the data are from a closed loop.
+    """
+
+    correlations: xr.Dataset
+    whiteness_p_value: float
+    independence_p_value: float
+    feedback_p_value: float
+    closed_loop: bool
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        level = 1 - float(self.correlations.attrs["probability"])
+        parts = []
+        # White residuals cannot reach later ones through the controller, others can.
+        feeds = self.closed_loop and max(self.feedback_p_value, self.whiteness_p_value) < level
+        if self.independence_p_value < level:
+            parts.append(
+                "residuals depend on past inputs: the model lacks dynamics or a nonlinearity"
+                + (", or the controller fed them back; test with the reference" * feeds)
+            )
+        else:
+            parts.append("no dependence on past inputs found")
+        if self.feedback_p_value < level:
+            parts.append(
+                "they show in later inputs, as they must in closed loop: no fault of the model"
+                if self.closed_loop
+                else "they are correlated with later inputs: a closed loop, or an input that repeats"
+            )
+        if self.whiteness_p_value < level:
+            parts.append(
+                "they are not white: an output-error model need not whiten them, but its "
+                "standard errors are then too small; estimate a noise model"
+            )
+        return "; ".join(parts)
+
+
+def residual_tests(
+    residual: ArrayLike,
+    input_: ArrayLike,
+    *,
+    lags: int = 25,
+    lag_step: int = 1,
+    probability: float = 0.99,
+    closed_loop: bool = True,
+) -> ResidualTests:
+    """Test residuals for whiteness and for independence of the input.
+
+    Ljung (1999), section 16.6. Whiteness: n times the sum of squared autocorrelations over
+    lags 1 to ``lags`` is chi-squared with as many degrees of freedom (16.34). Independence: the
+    cross-covariances over the lags are normal with covariance
+
+        sum_k R_e(k) R_u(k + i - j) / n
+
+    for lags i and j if the residuals, white or not, do not depend on the input (16.40); the
+    quadratic form in its inverse is chi-squared. Directions in which the input has less than a
+    thousandth of its power, where it says nothing, are left out. R_e and R_u are estimated with
+    Parzen's window over a tenth of the record.
+
+    Negative lags are inputs that come after the residual. In closed loop the controller puts
+    residuals into later inputs, with an undelayed controller also into that of the same sample:
+    these lags say nothing against the model, which is judged by lags from one on (open
+    loop: from zero on). Residuals that are not white, as those of an output-error model with
+    noise before the output, are then correlated with past inputs too, through their own past;
+    give the reference as ``input_`` to be sure: nothing feeds back into it.
+
+    Parameters
+    ----------
+    residual, input_ : (n,); the input of the model, or the reference of the loop.
+    lags : how many lags on either side.
+    lag_step : samples from lag to lag of the correlations, more than one where the samples are
+        dense; whiteness is judged from sample to sample.
+    probability : of the limits.
+
+    Raises InputError for arrays that do not fit, too few samples, and lags out of range.
+
+    """
+    e, u = _pair("residual", residual, "input_", input_)
+    for name, value in (("lags", lags), ("lag_step", lag_step)):
+        if isinstance(value, bool) or value != int(value) or value < 1:
+            raise InputError(f"{name}: expected a whole number of at least 1, got {value}")
+    if not 0 < probability < 1:
+        raise InputError(f"probability: expected a number between 0 and 1, got {probability}")
+    n, last = len(e), lags * lag_step
+    if n < 4 * (last + 1):
+        raise InputError(f"residual: expected at least {4 * (last + 1)} samples, got {n}")
+    e, u = e - e.mean(), u - u.mean()
+    if not (e.any() and u.any()):
+        raise InputError("residual, input_: expected values that vary, got a constant")
+    auto, cross, power = _covariances(e, u)
+    at = lag_step * np.arange(-lags, lags + 1)
+    r_auto = auto[np.abs(at)] / auto[0]
+    scale = np.sqrt(auto[0] * power[0])
+    window = max(n // _WINDOW_SHARE, last + 1)
+    spread = _spread(auto, power, window, 2 * last + 1) / n
+    limit = scipy.stats.norm.ppf(0.5 + probability / 2)
+    dataset = xr.Dataset(
+        {
+            "autocorrelation": ("lag", r_auto),
+            "cross_correlation": ("lag", cross[at] / scale),
+            "autocorrelation_limit": limit / np.sqrt(n),
+            "cross_correlation_limit": limit * np.sqrt(max(spread[0], 0.0)) / scale,
+        },
+        coords={"lag": ("lag", at, {"units": "samples"})},
+        attrs={"probability": probability, "n_samples": n, "closed_loop": int(closed_loop)},
+    )
+    causal = at >= (1 if closed_loop else 0)
+    return ResidualTests(
+        dataset,
+        float(scipy.stats.chi2.sf(n * np.sum((auto[1 : lags + 1] / auto[0]) ** 2), lags)),
+        _joint(cross[at[causal]], at[causal], spread),
+        _joint(cross[at[~causal]], at[~causal], spread),
+        closed_loop,
+    )
+
+
+def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real]:
+    """R_e, R_eu and R_u by FFT, negative lags from the end."""
+    n = len(e)
+    size = scipy.fft.next_fast_len(2 * n, real=True)
+    fe, fu = np.fft.rfft(e, size), np.fft.rfft(u, size)
+    auto = np.fft.irfft(np.abs(fe) ** 2, size) / n
+    power = np.fft.irfft(np.abs(fu) ** 2, size) / n
+    # sum over t of e(t) u(t - lag)
+    cross = np.fft.irfft(fe * fu.conj(), size) / n
+    return auto, cross, power
+
+
+def _spread(auto: Real, power: Real, window: int, count: int) -> Real:
+    """Sum over k of R_e(k) R_u(k + lag) for lags 0 .. count - 1, with Parzen's window."""
+    k = np.arange(-window, window + 1)
+    # On both: their spectra are then never negative, and power stays in its band.
+    weighted = auto[np.abs(k)] * _parzen(k, window)
+    reach = np.arange(-window - count, window + count + 1)
+    both = power[np.abs(reach)] * _parzen(reach, window)
+    return np.array([weighted @ both[count + lag : count + lag + len(k)] for lag in range(count)])
+
+
+def _parzen(lag: NDArray[np.int64], width: int) -> Real:
+    x = np.minimum(np.abs(lag) / (width + 1), 1.0)
+    return np.where(x < 0.5, 1 - 6 * x**2 * (1 - x), 2 * (1 - x) ** 3)
+
+
+def _joint(cross: Real, at: NDArray[np.int64], spread: Real) -> float:
+    """P-value of cross-covariances at these lags."""
+    covariance = spread[np.abs(at[:, None] - at)]
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > _RANK * values[-1]
+    if not kept.any():
+        return float("nan")
+    parts = vectors[:, kept].T @ cross
+    return float(scipy.stats.chi2.sf(np.sum(parts**2 / values[kept]), int(kept.sum())))
+
+
+def cross_validation(
+    fit: Callable[[list[D]], M],
+    data_sets: Mapping[str, D],
+    simulate: Callable[[M, D], ArrayLike],
+    measured: Callable[[D], ArrayLike],
+    *,
+    combinations: Sequence[Sequence[str]] | None = None,
+) -> tuple[xr.DataArray, dict[str, M]]:
+    """Fit on some data sets, validate on all: Table 9.2 for any model.
+
+    Parameters
+    ----------
+    fit : from a list of data sets to a model.
+    data_sets : by name.
+    simulate, measured : output of a model for a data set, and the measured one, (n,).
+    combinations : names of the data sets of each fit; default each alone, and all.
+
+    Returns fits (3.54) in per cent, dims (data_set, estimated_on), with an attribute
+    ``own`` that says which were fitted, and the models by the same names. Raises InputError for
+    unknown names and empty combinations.
+
+    """
+    if not data_sets:
+        raise InputError("data_sets: expected at least one, got none")
+    if combinations is None:
+        combinations = [[name] for name in data_sets]
+        if len(data_sets) > 1:
+            combinations.append(list(data_sets))
+    models: dict[str, M] = {}
+    for names in combinations:
+        unknown = [name for name in names if name not in data_sets]
+        if unknown or not names:
+            known = ", ".join(data_sets)
+            raise InputError(f"combinations: expected names among {known}, got {list(names)}")
+        models[", ".join(names)] = fit([data_sets[name] for name in names])
+    table = fit_table(models, data_sets, simulate, measured)
+    table.attrs["own"] = "; ".join(models)
+    return table, models
+
+
+def fit_table(
+    models: Mapping[str, M],
+    data_sets: Mapping[str, D],
+    simulate: Callable[[M, D], ArrayLike],
+    measured: Callable[[D], ArrayLike],
+) -> xr.DataArray:
+    """Return the fit (3.54) of every model on every data set, dims (data_set, estimated_on) [%].
+
+    ``models`` and ``data_sets`` by name; ``simulate`` and ``measured`` as for
+    :func:`cross_validation`.
+    """
+    rows = [
+        [fit_percent(measured(data), simulate(model, data)) for model in models.values()]
+        for data in data_sets.values()
+    ]
+    return xr.DataArray(
+        np.array(rows).reshape(len(data_sets), len(models)),
+        dims=("data_set", "estimated_on"),
+        coords={"data_set": list(data_sets), "estimated_on": list(models)},
+        attrs={"units": "%"},
+        name="fit",
+    )
+
+
+def _pair(first: str, a: ArrayLike, second: str, b: ArrayLike) -> tuple[Real, Real]:
+    found = []
+    for name, value in ((first, a), (second, b)):
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf" or array.ndim != 1 or not array.size:
+            raise InputError(
+                f"{name}: expected real numbers of shape (n,), got {array.dtype} of {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            at = int(np.argmax(~np.isfinite(array)))
+            raise InputError(f"{name}: expected finite numbers, got {array[at]} at sample {at + 1}")
+        found.append(array.astype(np.float64))
+    if len(found[0]) != len(found[1]):
+        raise InputError(
+            f"{second}: expected {len(found[0])} samples as {first}, got {len(found[1])}"
+        )
+    return found[0], found[1]
