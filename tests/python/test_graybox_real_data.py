@@ -34,9 +34,9 @@ def test_step_one_finds_the_published_parameters_of_emps(shared_data: Path) -> N
     published = {"M": 95.1089, "F_v": 203.5034, "F_c": 20.3935}
     values = (found.inertia_kg_m2, found.viscous_friction_nm_s_rad, found.coulomb_friction_nm)
     for name, value in zip(published, values, strict=True):
-        # Their filter is another one, and friction about standstill is no sign function.
-        assert value == pytest.approx(published[name], rel=0.02), name
-    assert found.offset_nm == pytest.approx(-3.1648, rel=0.05)
+        # Their filter is another one; ours from 20 to 100 Hz moves the values by 0.3 %.
+        assert value == pytest.approx(published[name], rel=0.005), name
+    assert found.offset_nm == pytest.approx(-3.1648, rel=0.01)
     assert found.fit_percent > 90
 
 

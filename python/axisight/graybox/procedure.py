@@ -140,8 +140,8 @@ def initial_model(
     gear_ratio : r, joint angle per motor angle.
     axis : of logs, from 1.
     n_masses : of the model.
-    period_s, lines, drop_periods : of the broadband records; None: found, see
-        :func:`axisight.records.prepare_records`.
+    period_s, lines, drop_periods : of the broadband records; None: found from the reference of
+        logs, else from the torque, see :func:`axisight.records.prepare_records`.
     cutoff_hz, least_speed_rad_s : of step 1.
     notch_band_hz, plateau_from_hz : of step 2.
     spring_method : of :func:`cubic_spring`; ``"samples"`` is (9.14) to the letter.
@@ -160,7 +160,13 @@ def initial_model(
         cutoff_hz=cutoff_hz,
         least_speed_rad_s=least_speed_rad_s,
     )
-    responses = tuple(_response(r, period_s, lines, drop_periods) for r in records)
+    responses = []
+    findings = [*found.findings]
+    for record, data in zip(broadband, records, strict=True):
+        reference = _reference(record, axis)
+        response, notes = _response(data, reference, period_s, lines, drop_periods)
+        responses.append(response)
+        findings += [f"{data.name}: {text}" for text in notes]
     flexibilities = tuple(
         initial_flexibility(
             response,
@@ -172,9 +178,8 @@ def initial_model(
         )
         for response in responses
     )
-    findings = [*found.findings]
-    for record, one in zip(records, flexibilities, strict=True):
-        findings += [f"{record.name or 'broadband'}: {text}" for text in one.findings]
+    for data, one in zip(records, flexibilities, strict=True):
+        findings += [f"{data.name}: {text}" for text in one.findings]
     motor = float(np.mean([f.motor_inertia_kg_m2 for f in flexibilities]))
     arm = (found.inertia_kg_m2 - motor) / gear_ratio**2
     stiffness = np.array([arm * f.notch.frequency_rad_s**2 for f in flexibilities])
@@ -206,7 +211,7 @@ def initial_model(
         )
         parameters |= _chain(responses[quiet], n_masses, gear_ratio, findings)
     return InitialModel(
-        found, responses, flexibilities, spring, parameters, tuple(dict.fromkeys(findings))
+        found, tuple(responses), flexibilities, spring, parameters, tuple(dict.fromkeys(findings))
     )
 
 
@@ -337,13 +342,23 @@ def _position(data: AxisData) -> Real:
 
 
 def _response(
-    data: AxisData, period_s: float | None, lines: Lines | None, drop_periods: int | None
-) -> xr.Dataset:
+    data: AxisData,
+    reference: Real | None,
+    period_s: float | None,
+    lines: Lines | None,
+    drop_periods: int | None,
+) -> tuple[xr.Dataset, list[str]]:
+    """Return torque to motor acceleration, and what puts it in doubt."""
     run = Experiment(
-        data.sample_time_s, np.asarray(data.torque_nm), _position(data), name=data.name
+        data.sample_time_s, np.asarray(data.torque_nm), _position(data), reference, data.name
     )
     prepared = prepare_records([run], period_s=period_s, lines=lines, drop_periods=drop_periods)
-    return etfe(prepared.records, quantity="acceleration")
+    notes = [finding.message for finding in prepared.serious]
+    if lines is None and reference is None:
+        notes.append(
+            "excited lines were found from the torque, which friction distorts: give lines"
+        )
+    return etfe(prepared.records, quantity="acceleration"), notes
 
 
 def _spring(
