@@ -357,7 +357,7 @@ def test_lines_are_those_of_the_reference(logs: list[Log]) -> None:
         frequency = response["frequency_hz"].values
         # The square wave excites odd lines below the band too, and may cancel a line in it.
         found_lines = np.round(5 * frequency)
-        assert np.isin(np.arange(5, 201), found_lines).mean() > 0.97
+        assert np.isin(np.arange(5, 201), found_lines).mean() > 0.95
         assert found_lines.max() == 200
     assert not any("give lines" in text for text in found.findings)
     blind = [replace(log, velocity_ref_rad_s=None) for log in logs]
