@@ -2,8 +2,9 @@
 
 from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
 from axisight.graybox.axis_result import AxisFit, NoiseModel
+from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
-from axisight.graybox.prediction_error import FitSettings, fit_axis
+from axisight.graybox.prediction_error import fit_axis
 
 __all__ = [
     "AxisData",
