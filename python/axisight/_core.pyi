@@ -23,6 +23,9 @@ __all__ = [
     "MonteCarloStudy",
     "Robot",
     "__version__",
+    "axis_fit",
+    "axis_linearize",
+    "axis_simulate",
     "directions",
     "effect_table",
     "failure_kinds",
@@ -720,13 +723,20 @@ def optimize_crest_factor(
     is the one start in the place of random ones.
     """
 
+@type_check_only
 class _AxisModelSpec(Protocol):
-    masses: int
-    output: str
-    hold: str
-    smoothing: float
-    ripple_orders: list[float]
-    substeps: int
+    @property
+    def masses(self) -> int: ...
+    @property
+    def output(self) -> str: ...
+    @property
+    def hold(self) -> str: ...
+    @property
+    def smoothing(self) -> float: ...
+    @property
+    def ripple_orders(self) -> list[float]: ...
+    @property
+    def substeps(self) -> int: ...
 
 def axis_fit(
     model: _AxisModelSpec,

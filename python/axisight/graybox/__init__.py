@@ -2,6 +2,7 @@
 
 from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
 from axisight.graybox.axis_result import AxisFit, NoiseModel
+from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.chain_fit import ChainFit, fit_chain
 from axisight.graybox.collocated import Collocated, collocated
 from axisight.graybox.flexibilities import (

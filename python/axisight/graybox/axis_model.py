@@ -88,6 +88,7 @@ class AxisModel:
     substeps: int = 1
 
     def __post_init__(self) -> None:
+        """Check the structure and fill in what depends on the number of masses."""
         _whole("n_masses", self.n_masses, 2, MOST_MASSES)
         _whole("substeps", self.substeps, 1, 1000)
         _choice("output", self.output, tuple(OUTPUT_UNIT))
@@ -166,7 +167,10 @@ class AxisModel:
             (AxisParameter("F_v", "Nm s/rad", "viscous friction", 0.0, neutral=0), True),
             (AxisParameter("F_c", "Nm", "Coulomb friction", 0.0, neutral=0), True),
             (AxisParameter("r", "1", "gear ratio", 0.0, neutral=self.gear_ratio), True),
-            (AxisParameter("b", "rad", "half width of the backlash", 0.0, neutral=0), self.backlash),
+            (
+                AxisParameter("b", "rad", "half width of the backlash", 0.0, neutral=0),
+                self.backlash,
+            ),
             (
                 AxisParameter("F_s", "Nm", "excess friction at standstill", 0.0, neutral=0),
                 self.stribeck,
@@ -218,7 +222,9 @@ class AxisModel:
         for p in self.parameters:
             value = values.get(p.name, p.neutral)
             if value is None:
-                raise InputError(f"parameters: expected a value of {p.name} ({p.meaning}), got none")
+                raise InputError(
+                    f"parameters: expected a value of {p.name} ({p.meaning}), got none"
+                )
             value = number(p.name, value)
             if value < p.lower or (p.neutral is None and value <= 0):
                 least = "a positive number" if p.neutral is None else f"at least {p.lower:g}"
@@ -303,6 +309,7 @@ class AxisData:
     weight: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
+        """Check the samples and turn them into arrays."""
         label = self.name or "data set"
         torque = samples(f"{label}: torque_nm", self.torque_nm)
         object.__setattr__(self, "torque_nm", torque)
@@ -364,7 +371,9 @@ def samples(field: str, value: ArrayLike) -> Array:
     array = np.ascontiguousarray(array, np.float64)
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
-        raise InputError(f"{field}: expected finite numbers, got {array[bad[0]]} at sample {bad[0]}")
+        raise InputError(
+            f"{field}: expected finite numbers, got {array[bad[0]]} at sample {bad[0]}"
+        )
     return array
 
 
