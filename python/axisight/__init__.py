@@ -1,6 +1,7 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
-from axisight import excitation, frf, montecarlo, records
+from axisight import calibration, excitation, frf, montecarlo, records, rigid_body
+from axisight import excitation, frequency_fit, frf, montecarlo, records
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -51,6 +52,7 @@ __all__ = [
     "StoreError",
     "StudyError",
     "Weighting",
+    "calibration",
     "check_log",
     "diagnose",
     "effect_info",
@@ -58,6 +60,7 @@ __all__ = [
     "effect_table",
     "excitation",
     "fit",
+    "frequency_fit",
     "frf",
     "load_robot",
     "montecarlo",
@@ -71,6 +74,7 @@ __all__ = [
     "read_case",
     "read_log",
     "records",
+    "rigid_body",
     "robot_parameter",
     "robot_parameters",
     "simulate",

@@ -28,11 +28,13 @@ __all__ = [
     "axis_simulate",
     "directions",
     "effect_table",
+    "energy_regressor",
     "failure_kinds",
     "fit_inverse_dynamics",
     "fit_simulation",
     "frf_local_model",
     "frf_local_periodic",
+    "inertial_parameters",
     "invert_matrices",
     "measurement_noise",
     "multisine_peak",
@@ -40,10 +42,12 @@ __all__ = [
     "optimize_crest_factor",
     "random_phases",
     "record_spectra",
+    "regression_factors",
     "right_divide_matrices",
     "simulate",
     "simulate_batch",
     "square_period",
+    "torque_regressor",
 ]
 
 __version__: str
@@ -393,6 +397,171 @@ class FitResult:
     def block_loss(self) -> _Array:
         """Loss by block, shape (n_blocks,)."""
 
+@type_check_only
+class FrequencyParameterSpec(Protocol):
+    """A parameter of a frequency-domain fit; ``prior`` is mean and standard deviation."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def initial(self) -> float: ...
+    @property
+    def lower(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+    @property
+    def logarithmic(self) -> bool: ...
+    @property
+    def prior(self) -> tuple[float, float] | None: ...
+    @property
+    def frozen(self) -> bool: ...
+
+@type_check_only
+class FrequencyOptionSpec(Protocol):
+    """Settings of a frequency-domain fit.
+
+    ``sampled``: G(e^{i w T}), else G(i w); ``logarithmic``: residuals are log(model / measured);
+    ``weighted``: by variance or covariance. ``loss`` is "squared", "huber" or "soft_l1".
+    """
+
+    @property
+    def sampled(self) -> bool: ...
+    @property
+    def logarithmic(self) -> bool: ...
+    @property
+    def weighted(self) -> bool: ...
+    @property
+    def loss(self) -> str: ...
+    @property
+    def loss_scale(self) -> float: ...
+    @property
+    def block_lines(self) -> int: ...
+    @property
+    def max_iterations(self) -> int: ...
+    @property
+    def gain_tolerance(self) -> float: ...
+    @property
+    def step_tolerance(self) -> float: ...
+
+@type_check_only
+class PoseDesign(TypedDict):
+    """Chosen operating points: relaxed weights, sensitivities, certificate, whole choice."""
+
+    weights: _Array
+    sensitivity: _Array
+    gap: float
+    bound: float
+    chosen: list[int]
+    log_det: float
+    iterations: int
+
+# Joint angles [rad], frequencies [Hz], then flat over line, output, input: response, variance,
+# covariance (line, element, element), reference of logarithmic weights; order of derivative.
+_PoseResponse: TypeAlias = tuple[
+    _Numbers,
+    _Array,
+    NDArray[np.complex128],
+    _Array | None,
+    NDArray[np.complex128] | None,
+    NDArray[np.complex128] | None,
+    int,
+]
+
+@final
+class FrequencyFitResult:
+    """Result of a frequency-domain fit. Arrays are copies.
+
+    Matrices are over the ``free`` parameters as searched: logarithms where asked for.
+    """
+
+    @property
+    def status(self) -> Literal["loss_converged", "step_converged", "max_iterations", "stalled"]:
+        """How the search ended."""
+    @property
+    def values(self) -> _Array:
+        """All parameters, frozen ones included, in their units, shape (n_parameters,)."""
+    @property
+    def slopes(self) -> _Array:
+        """Slope of the value over the searched number, shape (n_free,)."""
+    @property
+    def free(self) -> list[int]:
+        """Indices (from 0) of the free parameters."""
+    @property
+    def loss(self) -> float:
+        """Loss at the end, prior excluded."""
+    @property
+    def initial_loss(self) -> float:
+        """Loss at the start, prior excluded."""
+    @property
+    def iterations(self) -> int:
+        """Accepted steps."""
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the model with its derivatives."""
+    @property
+    def n_residuals(self) -> int:
+        """Residuals that count; real and imaginary part are two."""
+    @property
+    def at_bound(self) -> list[int]:
+        """Indices (from 0) of the free parameters that ended on a bound."""
+    @property
+    def information(self) -> _Array:
+        """J^T W J with priors, shape (n_free, n_free)."""
+    @property
+    def expected_scatter(self) -> _Array | None:
+        """Covariance of J^T W r by the response's uncertainty; None if that is unknown."""
+    @property
+    def block_scatter(self) -> _Array:
+        """The same from the scatter of the residuals over blocks of lines."""
+    @property
+    def residual(self) -> _Array:
+        """Whitened residuals, shape (n, 2): real and imaginary parts."""
+
+def fit_frequency_responses(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[FrequencyParameterSpec],
+    poses: Sequence[_PoseResponse],
+    options: FrequencyOptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> FrequencyFitResult:
+    """Fit the linearized robot to responses at several operating points."""
+
+def frequency_information(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[FrequencyParameterSpec],
+    poses: Sequence[_PoseResponse],
+    options: FrequencyOptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> _Array:
+    """Information each pose gives at the initial values, shape (n_poses, n_free, n_free)."""
+
+def frequency_response(
+    robot: Robot,
+    effects: _Effects,
+    joint_angle: _Numbers,
+    frequency_hz: _Numbers,
+    sampled: bool,
+) -> _Array:
+    """Response from torque to motor angle [rad/Nm], shape (n_freq, n_axes, 2 n_axes).
+
+    Real and imaginary parts are interleaved along the last axis.
+    """
+
+def design_poses(
+    information: _Array,
+    prior: _Array,
+    count: int,
+    *,
+    repeats: bool,
+    gap_tolerance: float,
+    max_iterations: int,
+) -> PoseDesign:
+    """Choose ``count`` operating points by information (n, p, p), besides a prior (p, p)."""
+
 def effect_table() -> list[EffectInfo]:
     """Every effect with its description and parameters."""
 
@@ -721,6 +890,55 @@ def optimize_crest_factor(
     ``clipping``: iterations, first level, last level, relaxation, oversampling.
     ``refinement``: first exponent, last exponent, iterations, oversampling. ``phase`` [rad]
     is the one start in the place of random ones.
+    """
+
+# Signal, coefficient of each joint, coefficient in each row, dead band, smoothing.
+_Extra: TypeAlias = tuple[str, Sequence[float], Sequence[float], float, float]
+
+def torque_regressor(
+    robot: Robot,
+    q: _Array,
+    v: _Array,
+    a: _Array,
+    *,
+    rows: _Array,
+    extras: Sequence[_Extra],
+    threads: int = 0,
+) -> _Array:
+    """Regressor, shape (n, n_rows, n_parameters), of ``rows`` (n_rows, n_joints) times torques.
+
+    Columns: ten for each link with mass, then one for each extra: a signal (position,
+    velocity, acceleration, direction, constant) of a combination of joints, felt in fixed
+    proportions by the rows.
+    """
+
+def energy_regressor(robot: Robot, q: _Array, v: _Array, *, threads: int = 0) -> _Array:
+    """Energy of the links per unit of each link parameter, shape (n, 10 n_links)."""
+
+def regression_factors(
+    robot: Robot,
+    q: _Array,
+    v: _Array,
+    a: _Array,
+    torque: _Array,
+    *,
+    rows: _Array,
+    extras: Sequence[_Extra],
+    columns: Sequence[int],
+    known: Sequence[float],
+    weight: _Array | None,
+    blocks: int,
+    threads: int = 0,
+) -> tuple[_Array, list[int]]:
+    """Upper triangular factors of ``[Phi[:, columns] | torque - Phi known]`` and block lengths.
+
+    Shape (blocks, n_rows, k + 1, k + 1): one for each block of samples and each row.
+    """
+
+def inertial_parameters(robot: Robot) -> tuple[list[int], _Array]:
+    """Joints (from 0) whose links have mass, and ten parameters of each link.
+
+    Mass, first moments x y z, inertia about the link frame xx yy zz xy xz yz.
     """
 
 @type_check_only

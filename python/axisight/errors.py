@@ -39,3 +39,11 @@ class StoreError(AxisightError):
 
 class BackendError(AxisightError):
     """Workers or their scheduler are out of reach; what was finished before is kept."""
+
+
+class IdentifiabilityError(InputError):
+    """The data do not determine the parameters asked for; the message names them, with advice."""
+
+
+class IdentificationWarning(UserWarning):
+    """An estimate is doubtful; the message says why and what to do."""

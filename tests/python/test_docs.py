@@ -13,7 +13,20 @@ import pytest
 import axisight
 from axisight import _core
 
-MODULES = (axisight, axisight.excitation, axisight.frf, axisight.montecarlo, axisight.records)
+MODULES = (
+    axisight,
+    axisight.calibration,
+    axisight.excitation,
+    axisight.frf,
+    axisight.montecarlo,
+    axisight.records,
+    axisight.rigid_body,
+    axisight.excitation,
+    axisight.frequency_fit,
+    axisight.frf,
+    axisight.montecarlo,
+    axisight.records,
+)
 PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}
 # The word says it all.
 SELF_EVIDENT = {"name", "path"}

@@ -9,9 +9,11 @@ mod effects;
 mod entry;
 mod excitation;
 mod fit;
+mod frequency_fit;
 mod frf;
 mod local_models;
 mod montecarlo;
+mod regressor;
 mod robot;
 mod simulation;
 
@@ -55,8 +57,23 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::torque_regressor, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;
+    module.add_function(wrap_pyfunction!(regressor::regression_factors, module)?)?;
     module.add_function(wrap_pyfunction!(axis_fit::axis_fit, module)?)?;
     module.add_function(wrap_pyfunction!(axis_fit::axis_linearize, module)?)?;
     module.add_function(wrap_pyfunction!(axis_fit::axis_simulate, module)?)?;
+    module.add_class::<frequency_fit::FrequencyFitResult>()?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::fit_frequency_responses,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        frequency_fit::frequency_information,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::frequency_response, module)?)?;
+    module.add_function(wrap_pyfunction!(frequency_fit::design_poses, module)?)?;
     Ok(())
 }

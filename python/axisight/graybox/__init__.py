@@ -20,7 +20,7 @@ from axisight.graybox.landmarks import (
     high_frequency_gain,
 )
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
-from axisight.graybox.prediction_error import FitSettings, fit_axis
+from axisight.graybox.prediction_error import fit_axis
 from axisight.graybox.procedure import (
     AxisIdentification,
     InitialModel,

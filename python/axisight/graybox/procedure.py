@@ -17,6 +17,7 @@ from axisight.errors import InputError
 from axisight.frf import etfe
 from axisight.graybox.axis_model import AxisData, AxisModel
 from axisight.graybox.axis_result import AxisFit
+from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.chain_fit import fit_chain
 from axisight.graybox.flexibilities import (
     CubicSpring,
@@ -25,7 +26,7 @@ from axisight.graybox.flexibilities import (
     initial_flexibility,
     simulate_deflection,
 )
-from axisight.graybox.prediction_error import FitSettings, NoiseKind, fit_axis
+from axisight.graybox.prediction_error import NoiseKind, fit_axis
 from axisight.graybox.procedure_report import report
 from axisight.graybox.step_one import RigidBodyFriction, rigid_body_friction
 from axisight.graybox.validation import ResidualTests, fit_percent, residual_tests

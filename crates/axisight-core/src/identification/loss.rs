@@ -13,7 +13,7 @@ pub enum Loss {
 
 impl Loss {
     /// Loss and weight of a residual; the weight is `rho'(r) / (2 r)`.
-    pub(super) fn evaluate(self, r: f64) -> (f64, f64) {
+    pub fn evaluate(self, r: f64) -> (f64, f64) {
         match self {
             Self::Squared => (r * r, 1.0),
             Self::Huber(c) => {

@@ -1,1 +1,24 @@
 //! The linearized robot fitted to frequency responses (thesis section 3.4.2).
+
+mod design;
+mod direct;
+mod hold;
+mod minimize;
+mod modal;
+mod problem;
+mod response;
+mod second_order;
+mod weighting;
+
+pub use design::{Design, DesignError, DesignOptions, design};
+pub use hold::Hold;
+pub use minimize::{FrequencyFit, SearchOptions, SearchStatus, minimize};
+pub use problem::{
+    FrequencyFitError, FrequencyOptions, FrequencyParameter, FrequencyProblem, Normal, Scatter,
+};
+pub use response::{Columns, evaluate};
+pub use second_order::{Linearizer, SecondOrder, SecondOrderDerivative, SecondOrderError};
+pub use weighting::{Criterion, PoseResponse, Uncertainty};
+
+/// Information on the parameters, symmetric.
+pub type InformationMatrix = nalgebra::DMatrix<f64>;

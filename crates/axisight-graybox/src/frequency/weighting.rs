@@ -1,0 +1,139 @@
+//! Criteria (3.42) to (3.44): what is compared, and how a deviation is weighed.
+
+use super::problem::FrequencyFitError;
+use nalgebra::{Complex, DMatrix};
+
+type C = Complex<f64>;
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Criterion {
+    /// `G(theta) - G`, (3.42) and (3.43).
+    Linear,
+    /// `log(G(theta) / G)`: logarithm of the magnitude and phase, (3.44).
+    Logarithmic,
+}
+
+/// What is known of the error of a measured response.
+#[derive(Debug, Clone)]
+pub enum Uncertainty {
+    /// Nothing.
+    Unknown,
+    /// `E|dG|^2` of every element, in the order of the response; infinite leaves it out.
+    Variance(Vec<f64>),
+    /// Covariance of the elements of a line, `(line, elements, elements)`, Hermitian.
+    Covariance(Vec<C>),
+}
+
+/// A measured response at one operating point.
+#[derive(Debug, Clone)]
+pub struct PoseResponse {
+    /// Angles of the driven joints [rad; m if prismatic].
+    pub joint_angle: Vec<f64>,
+    /// Lines [Hz].
+    pub frequency_hz: Vec<f64>,
+    /// `(line, output, input)`.
+    pub response: Vec<C>,
+    /// Its error.
+    pub uncertainty: Uncertainty,
+    /// What the error of a logarithm is taken relative to; `None` for the response itself.
+    /// Weights by the measured magnitude favour lines where the error adds to it, a model's do not.
+    pub reference: Option<Vec<C>>,
+    /// Derivative of the motor angle that is the output: 0, 1 or 2.
+    pub order: u8,
+}
+
+/// What turns deviations of a line into residuals of unit variance.
+pub(super) enum Whitening {
+    /// A factor for every element.
+    Elements(Vec<f64>),
+    /// A lower triangular matrix for every line.
+    Lines(Vec<DMatrix<C>>),
+}
+
+/// Whitening of a response, and the variance of the real and the imaginary part that its
+/// uncertainty makes each residual have (`None` if unknown).
+pub(super) fn whitening(
+    pose: &PoseResponse,
+    criterion: Criterion,
+    weighted: bool,
+    number: usize,
+) -> Result<(Whitening, Option<Vec<f64>>), FrequencyFitError> {
+    let reference = pose.reference.as_ref().unwrap_or(&pose.response);
+    let size = |k: usize| match criterion {
+        Criterion::Linear => C::new(1.0, 0.0),
+        Criterion::Logarithmic => reference[k],
+    };
+    let relative = |k: usize| size(k).norm();
+    let variance = diagonal(pose);
+    let known = |k: usize| variance.as_ref().map_or(1.0, |v| v[k]);
+    if !weighted {
+        let used = |k| f64::from(u8::from(known(k) < f64::INFINITY));
+        let factor = (0..pose.response.len()).map(used).collect();
+        let left = variance.as_ref().map(|v| {
+            let half = |(k, v): (usize, &f64)| 0.5 * v / relative(k).powi(2);
+            v.iter()
+                .enumerate()
+                .map(half)
+                .map(|x| if x.is_finite() { x } else { 0.0 })
+                .collect()
+        });
+        return Ok((Whitening::Elements(factor), left));
+    }
+    match &pose.uncertainty {
+        Uncertainty::Unknown => Err(FrequencyFitError::NoVariance { pose: number + 1 }),
+        Uncertainty::Variance(v) => {
+            let factor = |(k, v): (usize, &f64)| relative(k) * (2.0 / v).sqrt();
+            let factors = v.iter().enumerate().map(factor).collect();
+            Ok((Whitening::Elements(factors), Some(vec![1.0; v.len()])))
+        }
+        Uncertainty::Covariance(all) => {
+            let n = pose.response.len() / pose.frequency_hz.len().max(1);
+            let line = |line: usize| {
+                let block = &all[line * n * n..(line + 1) * n * n];
+                let own = |i: usize| size(line * n + i);
+                let matrix = DMatrix::from_fn(n, n, |i, j| {
+                    block[i * n + j] * 0.5 / (own(i) * own(j).conj())
+                });
+                inverse_factor(matrix).ok_or(FrequencyFitError::Covariance {
+                    pose: number + 1,
+                    line: line + 1,
+                })
+            };
+            let lines = (0..pose.frequency_hz.len())
+                .map(line)
+                .collect::<Result<_, _>>()?;
+            Ok((
+                Whitening::Lines(lines),
+                Some(vec![1.0; pose.response.len()]),
+            ))
+        }
+    }
+}
+
+/// `L^-1` of `L L^H`; `None` if the matrix is not positive definite.
+fn inverse_factor(matrix: DMatrix<C>) -> Option<DMatrix<C>> {
+    let n = matrix.nrows();
+    let lower = matrix.cholesky()?.l();
+    // The complex square root of a negative pivot is imaginary.
+    if (0..n).any(|i| !(lower[(i, i)].re > 0.0 && lower[(i, i)].im.abs() < lower[(i, i)].re)) {
+        return None;
+    }
+    let inverse = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    inverse
+        .iter()
+        .all(|x| x.re.is_finite() && x.im.is_finite())
+        .then_some(inverse)
+}
+
+fn diagonal(pose: &PoseResponse) -> Option<Vec<f64>> {
+    match &pose.uncertainty {
+        Uncertainty::Unknown => None,
+        Uncertainty::Variance(v) => Some(v.clone()),
+        Uncertainty::Covariance(all) => {
+            let n = pose.response.len() / pose.frequency_hz.len().max(1);
+            let entry = |k: usize| all[(k / n) * n * n + (k % n) * (n + 1)].re;
+            Some((0..pose.response.len()).map(entry).collect())
+        }
+    }
+}

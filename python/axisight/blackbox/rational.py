@@ -1,0 +1,518 @@
+"""Rational models of frequency responses with several inputs and outputs, common poles.
+
+    G(x) = sum_k R_k / (x - p_k) + I_1 / x + I_2 / x^2 + D
+
+Vector fitting finds the poles, a search on them alone, the residues solved for at every step
+(variable projection), takes them on to the weighted least-squares optimum: the maximum of the
+likelihood where the variance of the response is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, stats
+
+from axisight.blackbox import _vector_fitting
+from axisight.blackbox._data import Complex, Real, lines, whole
+from axisight.blackbox._sections import Domain, Sections, Solved, Weighted
+from axisight.errors import AxisightError, InputError
+from axisight.frf.response import DIMS, frequency_response
+
+Weighting = Literal["variance", "relative", "absolute"]
+
+
+@dataclass(frozen=True)
+class RationalModel:
+    """A rational model with its uncertainty.
+
+    ``poles`` (n,) without integrators, in rad/s (s) or, with ``sample_time_s``, in the z plane;
+    ``integrators`` of 1/s, or 1/(z - 1), in every element; ``direct`` (n_out, n_in), zero if not
+    fitted. ``status``: ``converged``, or ``not_converged`` (the best found is given); ``warnings``
+    say what to do. ``loss`` is the sum of squares of weighted residuals, real and imaginary
+    parts, of expectation ``degrees_of_freedom`` where the weights come from a known variance.
+    """
+
+    poles: Complex
+    sample_time_s: float | None
+    integrators: int
+    direct: Real
+    status: str
+    warnings: tuple[str, ...]
+    loss: float
+    degrees_of_freedom: int
+    n_parameters: int
+    weighting: Weighting
+    n_out: int
+    n_in: int
+    iterations: int
+    domain: Domain = field(repr=False)
+    sections: Sections = field(repr=False)
+    numerators: Real = field(repr=False)
+    """(n_elements, order + extras), elements row by row."""
+    problem: Weighted = field(repr=False)
+    pole_covariance: Real = field(repr=False)
+    """Of the coefficients of the sections."""
+    units: tuple[str, str] = field(repr=False)
+    """Of input and output."""
+
+    @property
+    def order(self) -> int:
+        """Number of poles without integrators."""
+        return self.sections.order
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles but the integrators are stable."""
+        return self.domain.stable(self.sections.poles())
+
+    def modes(self) -> xr.Dataset:
+        """Return the poles as modes, slowest first, with standard errors.
+
+        Variables over ``mode``: ``pole``, ``eigenvalue_rad_s``, ``frequency_hz``, ``damping_ratio``,
+        ``frequency_std_hz``, ``damping_std``; one of each complex pair.
+        """
+        x = self.sections.poles()
+        rate, by_x = self.domain.rate(x)
+        slope = self._pole_slopes(x) * by_x[:, None]
+        kept = (x.imag >= 0) | (np.abs(x.imag) <= 1e-12 * np.abs(x))
+        order = np.argsort(np.abs(rate[kept]), kind="stable")
+        rate, slope, x = rate[kept][order], slope[kept][order], x[kept][order]
+        size = np.abs(rate)
+        by_size = (rate.conj()[:, None] * slope).real / size[:, None]
+        by_damping = -slope.real / size[:, None] + (rate.real / size**2)[:, None] * by_size
+        spread = [
+            np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", d, self.pole_covariance, d), 0.0))
+            for d in (by_size / (2 * np.pi), by_damping)
+        ]
+        return xr.Dataset(
+            {
+                "pole": ("mode", self.domain.natural(x)),
+                "eigenvalue_rad_s": ("mode", rate, {"units": "rad/s"}),
+                "frequency_hz": ("mode", size / (2 * np.pi), {"units": "Hz"}),
+                "damping_ratio": ("mode", -rate.real / size),
+                "frequency_std_hz": ("mode", spread[0], {"units": "Hz"}),
+                "damping_std": ("mode", spread[1]),
+            }
+        )
+
+    def _pole_slopes(self, x: Complex) -> Complex:
+        out = np.zeros((self.order, self.order), np.complex128)
+        for k, (b, _) in enumerate(self.sections.quadratic):
+            for p in (2 * k, 2 * k + 1):
+                steep = 2 * x[p] + b
+                if steep != 0:  # a double pole has no derivative
+                    out[p, 2 * k : 2 * k + 2] = [-x[p] / steep, -1 / steep]
+        if len(self.sections.linear):
+            out[-1, -1] = -1.0
+        return out
+
+    def response(self, frequency_hz: ArrayLike) -> xr.Dataset:
+        """Return the model at the lines with its variance, as `axisight.frf.frequency_response`.
+
+        ``frequency_hz`` [Hz] ascends; at zero an integrator is infinite, so NaN. The variance
+        is that of poles and residues together, to first order.
+        """
+        f = lines(frequency_hz, self.sample_time_s)
+        x = self.domain.points(f)
+        columns = np.hstack([self.sections.basis(x), _extras(x, self.integrators, self._direct)])
+        g = columns @ self.numerators.T
+        variance = np.empty(g.shape)
+        solved = self.problem.residues(self.sections)
+        slopes = _slopes(self.problem, self.sections, solved)
+        for e, theta in enumerate(self.numerators):
+            # Residues follow the poles: d theta = -rows^+ slopes d poles.
+            inverse = np.linalg.pinv(solved.r[e])
+            follow = inverse @ solved.q[e].T @ slopes[e]
+            total = self.sections.slopes(x, theta[: self.order]) - columns @ follow
+            variance[:, e] = self.noise_scale**2 * np.sum(np.abs(columns @ inverse) ** 2, axis=1)
+            variance[:, e] += np.einsum(
+                "fi,ij,fj->f", total, self.pole_covariance, total.conj()
+            ).real
+        shape = (len(f), self.n_out, self.n_in)
+        return frequency_response(
+            f,
+            g.reshape(shape),
+            estimator="rational",
+            variance=variance.reshape(shape),
+            input_unit=self.units[0],
+            output_unit=self.units[1],
+            attrs={"order": self.order, "integrators": self.integrators, "status": self.status},
+        )
+
+    @property
+    def _direct(self) -> bool:
+        return bool(self.problem.extra.shape[1] > self.integrators)
+
+    @property
+    def noise_scale(self) -> float:
+        """Standard deviation of weighted residuals: one with a known variance, else estimated."""
+        if self.weighting == "variance":
+            return 1.0
+        return float(np.sqrt(self.loss / max(self.degrees_of_freedom, 1)))
+
+    def residual_tests(self, lags: int = 10) -> xr.Dataset:
+        """Return whether the residuals are what the variance says, and white over the lines.
+
+        Attributes: ``reduced_loss`` (loss over degrees of freedom, one if all is well) and
+        ``loss_p``, the probability of so large a loss by chance (NaN without a known variance).
+        Over (output, input): ``whiteness_p``, of so much correlation between lines up to ``lags``
+        apart; ``largest``, the largest residual in standard deviations. Raises InputError for
+        fewer than four times ``lags`` lines.
+        """
+        most = whole("lags", lags, 1)
+        n = len(self.problem.x)
+        if n < 4 * most:
+            raise InputError(f"lags: expected at most {n // 4} for {n} lines, got {most}")
+        left = self.problem.residues(self.sections).left
+        r = left[:, :n] + 1j * left[:, n:]
+        power = np.sum(np.abs(r) ** 2, axis=1)
+        related = [
+            np.abs(np.sum(r[:, lag:] * r[:, :-lag].conj(), axis=1)) for lag in range(1, most + 1)
+        ]
+        statistic = 2 * n * np.sum((np.stack(related) / power) ** 2, axis=0)
+        shape = (self.n_out, self.n_in)
+        known = self.weighting == "variance"
+        return xr.Dataset(
+            {
+                "whiteness_p": (DIMS[1:], stats.chi2.sf(statistic, 2 * most).reshape(shape)),
+                "largest": (DIMS[1:], (np.abs(r).max(axis=1) / self.noise_scale).reshape(shape)),
+            },
+            coords={"output": np.arange(1, shape[0] + 1), "input": np.arange(1, shape[1] + 1)},
+            attrs={
+                "reduced_loss": self.loss / max(self.degrees_of_freedom, 1),
+                "loss_p": float(stats.chi2.sf(self.loss, self.degrees_of_freedom))
+                if known
+                else np.nan,
+            },
+        )
+
+
+def fit_rational(
+    response: xr.Dataset,
+    order: int,
+    *,
+    sample_time_s: float | None = None,
+    integrators: int = 0,
+    direct: bool = False,
+    weighting: Weighting = "variance",
+    smooth_lines: int = 1,
+    stable: bool = True,
+    start_rad_s: ArrayLike | None = None,
+    max_iterations: int = 60,
+) -> RationalModel:
+    """Return a rational model with common poles of a frequency response.
+
+    response
+        Dataset of `axisight.frf.frequency_response`; lines that are NaN are left out.
+    order
+        Number of poles besides the integrators.
+    sample_time_s
+        Fit in z at e^{iwT}, the response of a sampled loop with held input; without it in s.
+    integrators
+        Poles at s = 0 or z = 1 of every element: 0, 1, or 2 (torque to angle, friction out of
+        sight).
+    direct
+        Whether there is a constant term; without it the model is strictly proper.
+    weighting
+        ``"variance"``: by the standard deviation of the response, which makes the loss a
+        chi-square; ``"relative"``: by one over its magnitude; ``"absolute"``: none. With the
+        last two the noise is estimated from the residuals.
+    smooth_lines
+        Average the variance over so many neighbouring lines (odd): wanted where it comes from few periods,
+        because a weight from a variance that is too small by chance rules the fit.
+    stable
+        Keep the poles stable: mirrored while vector fitting, never left in the search. The
+        integrators stay.
+    start_rad_s
+        Poles to start from, closed under conjugation [rad/s]; by default pairs of 1 %
+        damping spread over the band, linearly and logarithmically, the better kept.
+    max_iterations
+        Of vector fitting, and evaluations of the search.
+
+    Non-convergence is a status. Raises InputError for misuse, for a variance that is missing, and
+    for fewer lines than unknowns.
+    """
+    n = whole("order", order, 0)
+    limit = whole("max_iterations", max_iterations, 1)
+    if integrators not in (0, 1, 2) or isinstance(integrators, bool):
+        raise InputError(f"integrators: expected 0, 1 or 2, got {integrators!r}")
+    if n + integrators + direct == 0:
+        raise InputError("order: expected at least one pole, integrator or direct term, got none")
+    f, g, weight = _weights(response, weighting, whole("smooth_lines", smooth_lines, 1))
+    if sample_time_s is not None and not (np.isfinite(sample_time_s) and sample_time_s > 0):
+        raise InputError(f"sample_time_s: expected a positive time, got {sample_time_s}")
+    lines(f, sample_time_s)
+    if integrators and f[0] == 0:
+        raise InputError("response: expected lines above 0 Hz with integrators")
+    unknowns = n + integrators + direct
+    if 2 * len(f) <= unknowns + n:
+        raise InputError(
+            f"response: expected more than {(unknowns + n) // 2} lines for order {n}, got {len(f)}"
+        )
+    domain = Domain(2 * np.pi * float(np.sqrt(max(f[0], f[-1] * 1e-3) * f[-1])), sample_time_s)
+    x = domain.points(f)
+    extra = _extras(x, integrators, direct)
+    problem = Weighted(x, g.reshape(len(f), -1), weight.reshape(len(f), -1), extra)
+    if n == 0:
+        sections, steps, settled = Sections(np.zeros((0, 2)), np.zeros(0)), 0, True
+    else:
+        starts = _starts(f, n, domain, start_rad_s, stable)
+        found = [
+            _vector_fitting.fitted(problem, s, domain, stable=stable, iterations=limit)
+            for s in starts
+        ]
+        first, _, steps, _ = min(found, key=lambda item: item[1])
+        sections, evaluations, settled = _searched(problem, first, domain, stable, limit)
+        steps += evaluations
+    return _packed(response, problem, sections, domain, integrators, weighting, steps, settled)
+
+
+def _extras(x: Complex, integrators: int, direct: bool) -> Complex:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        columns = [x ** -(k + 1) for k in range(integrators)]
+    if direct:
+        columns.append(np.ones_like(x))
+    return np.stack(columns, axis=1) if columns else np.zeros((len(x), 0), np.complex128)
+
+
+def _weights(response: xr.Dataset, weighting: str, smooth: int) -> tuple[Real, Complex, Real]:
+    """Return lines, values (n_freq, n_out, n_in) and weights, lines that are NaN left out."""
+    found = response.get("response") if isinstance(response, xr.Dataset) else None
+    if found is None or set(found.dims) != set(DIMS):
+        raise InputError(f"response: expected a Dataset with a variable response over {DIMS}")
+    g = np.asarray(found.transpose(*DIMS).values, np.complex128)
+    f = np.asarray(response["frequency_hz"].values, np.float64)
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(g).all(axis=(1, 2)))
+    if weighting == "variance":
+        known = response.get("variance")
+        if known is None:
+            raise InputError("response: expected a variance; or choose weighting='relative'")
+        variance = np.asarray(known.transpose(*DIMS).values, np.float64)
+        good &= np.asarray(np.isfinite(variance).all(axis=(1, 2)) & (variance > 0).all(axis=(1, 2)))
+        if not good.any():
+            raise InputError(
+                "response: expected a positive variance at some line, got none; or choose "
+                "weighting='relative'"
+            )
+        # Real and imaginary parts each carry half the variance.
+        weight = np.sqrt(2 / _smoothed(variance[good], smooth))
+    elif weighting == "relative":
+        good &= np.asarray((g != 0).all(axis=(1, 2)))
+        weight = 1 / np.abs(g[good])
+    elif weighting == "absolute":
+        weight = np.ones(g[good].shape)
+    else:
+        raise InputError(
+            f"weighting: expected 'variance', 'relative' or 'absolute', got {weighting!r}"
+        )
+    if not good.any():
+        raise InputError("response: expected a line with numbers, got NaN or zero at all of them")
+    return f[good], g[good], weight
+
+
+def _smoothed(variance: Real, n: int) -> Real:
+    if n % 2 == 0:
+        raise InputError(f"smooth_lines: expected an odd number, got {n}")
+    if n == 1:
+        return variance
+    padded = np.pad(variance, ((n // 2, n // 2), (0, 0), (0, 0)), mode="edge")
+    sums = np.cumsum(np.concatenate([np.zeros((1, *variance.shape[1:])), padded]), axis=0)
+    return np.asarray((sums[n:] - sums[:-n]) / n)
+
+
+def _starts(
+    f: Real, n: int, domain: Domain, given: ArrayLike | None, stable: bool
+) -> list[Complex]:
+    if given is not None:
+        s = np.atleast_1d(np.asarray(given, np.complex128))
+        balanced = np.allclose(np.sort_complex(s), np.sort_complex(s.conj()))
+        if s.shape != (n,) or not np.isfinite(s).all() or not balanced:
+            raise InputError(
+                f"start_rad_s: expected {n} finite poles closed under conjugation, got {given!r}"
+            )
+        x = domain.from_continuous(s)
+        return [domain.stabilized(x) if stable else x]
+    low, high = max(f[0], f[-1] * 1e-3), f[-1]
+    out = []
+    for spread in (np.linspace, np.geomspace):
+        centre = 2 * np.pi * spread(low, high, n // 2 + 2)[1:-1]
+        upper = centre * (-0.01 + 1j)
+        poles = np.concatenate(
+            [upper, upper.conj(), [-centre.mean() if n > 1 else -2 * np.pi * low]]
+        )
+        out.append(domain.from_continuous(poles[: 2 * (n // 2)] if n % 2 == 0 else poles))
+    return out
+
+
+def _searched(
+    problem: Weighted, start: Sections, domain: Domain, stable: bool, limit: int
+) -> tuple[Sections, int, bool]:
+    at: dict[bytes, Solved] = {}
+
+    def solved(vector: Real) -> Solved:
+        # Residual and Jacobian are asked for at the same place, one after the other.
+        key = vector.tobytes()
+        if key not in at:
+            at.clear()
+            at[key] = problem.residues(Sections.of_vector(vector))
+        return at[key]
+
+    def residual(vector: Real) -> Real:
+        sections = Sections.of_vector(vector)
+        if stable and not domain.stable(sections.poles()):
+            return np.full(2 * problem.values.size, np.nan)
+        return solved(vector).left.ravel()
+
+    def jacobian(vector: Real) -> Real:
+        return projected_jacobian(problem, Sections.of_vector(vector), solved(vector))
+
+    result = optimize.least_squares(
+        residual,
+        start.vector,
+        jacobian,
+        method="trf",
+        x_scale="jac",
+        xtol=1e-10,
+        ftol=1e-10,
+        gtol=1e-12,
+        max_nfev=limit,
+    )
+    return Sections.of_vector(np.asarray(result.x)), int(result.nfev), result.status > 0
+
+
+def projected_jacobian(problem: Weighted, sections: Sections, solved: Solved) -> Real:
+    """Return the derivative of the residuals by the sections, residues solved for (Kaufman).
+
+    Its normal matrix at the optimum is the Fisher information of the poles, residues free.
+    """
+    slopes = _slopes(problem, sections, solved)
+    left = slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes)
+    return np.asarray(left.reshape(-1, sections.order))
+
+
+def _slopes(problem: Weighted, sections: Sections, solved: Solved) -> Real:
+    of = [sections.slopes(problem.x, theta[: sections.order]) for theta in solved.numerators]
+    return problem.rows(np.stack(of))
+
+
+def _packed(
+    response: xr.Dataset,
+    problem: Weighted,
+    sections: Sections,
+    domain: Domain,
+    integrators: int,
+    weighting: Weighting,
+    steps: int,
+    settled: bool,
+) -> RationalModel:
+    solved = problem.residues(sections)
+    numerators = solved.numerators
+    shape = (response.sizes["output"], response.sizes["input"])
+    loss = solved.loss
+    n_parameters = sections.order + numerators.size
+    freedom = solved.left.size - n_parameters
+    scale = 1.0 if weighting == "variance" else loss / max(freedom, 1)
+    covariance, warnings = _covariance(problem, sections, scale)
+    direct = np.zeros(shape)
+    if problem.extra.shape[1] > integrators:
+        direct = numerators[:, -1].reshape(shape)
+    if not settled:
+        warnings.append(
+            "the search reached its limit: allow more iterations, start closer, or lower the order"
+        )
+    return RationalModel(
+        poles=domain.natural(sections.poles()),
+        sample_time_s=domain.sample_time_s,
+        integrators=integrators,
+        direct=direct,
+        status="converged" if settled else "not_converged",
+        warnings=tuple(warnings),
+        loss=loss,
+        degrees_of_freedom=freedom,
+        n_parameters=n_parameters,
+        weighting=weighting,
+        n_out=shape[0],
+        n_in=shape[1],
+        iterations=steps,
+        domain=domain,
+        sections=sections,
+        numerators=numerators,
+        problem=problem,
+        pole_covariance=covariance,
+        units=(
+            str(response.attrs.get("input_unit", "")),
+            str(response.attrs.get("output_unit", "")),
+        ),
+    )
+
+
+def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Real, list[str]]:
+    if sections.order == 0:
+        return np.zeros((0, 0)), []
+    jacobian = projected_jacobian(problem, sections, problem.residues(sections))
+    size = np.linalg.norm(jacobian, axis=0)
+    _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
+    if size.min() == 0 or s[-1] <= 1e-10 * s[0]:
+        text = "the lines do not determine all poles: lower the order; standard errors are NaN"
+        return np.full((sections.order,) * 2, np.nan), [text]
+    root = vt.T / s / size[:, None]
+    return scale * root @ root.T, []
+
+
+def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: object) -> xr.Dataset:
+    """Return the losses of several orders of `fit_rational`, and which one to choose.
+
+    response
+        As there; so are the ``options``.
+    orders
+        Numbers of poles.
+
+    Variables over ``order``: ``loss``, ``reduced_loss``, ``n_parameters``, ``aic`` and ``bic`` (of
+    the likelihood; with a variance that is not known, of the residual power), ``status``
+    (``failed`` where the lines are too few), ``stable``.
+    ``attrs["best_bic"]`` and ``attrs["best_aic"]`` are orders, -1 where all failed.
+    """
+    wanted = sorted({whole("orders", n, 0) for n in orders})
+    if not wanted:
+        raise InputError("orders: expected at least one, got none")
+    names = ("loss", "reduced_loss", "n_parameters", "aic", "bic")
+    rows: dict[str, list[float]] = {name: [] for name in names}
+    status, stable = [], []
+    failure: AxisightError | None = None
+    for n in wanted:
+        try:
+            model = fit_rational(response, n, **options)  # type: ignore[arg-type]
+        except InputError as error:
+            failure = error
+            status.append("failed")
+            stable.append(False)
+            for column in rows.values():
+                column.append(np.nan)
+            continue
+        count = model.degrees_of_freedom + model.n_parameters
+        level = model.loss
+        if model.weighting != "variance":
+            level = count * float(np.log(max(model.loss, 1e-300) / count))
+        d = model.n_parameters
+        values = (model.loss, model.loss / max(model.degrees_of_freedom, 1), d, level + 2 * d)
+        for name, value in zip(names, (*values, level + d * np.log(count)), strict=True):
+            rows[name].append(value)
+        status.append(model.status)
+        stable.append(model.stable)
+    if failure is not None and all(s == "failed" for s in status):
+        raise failure
+    return xr.Dataset(
+        {
+            **{name: ("order", np.asarray(column)) for name, column in rows.items()},
+            "status": ("order", np.asarray(status)),
+            "stable": ("order", np.asarray(stable)),
+        },
+        coords={"order": wanted},
+        attrs={f"best_{name}": wanted[int(np.nanargmin(rows[name]))] for name in ("aic", "bic")},
+    )

@@ -1,0 +1,189 @@
+"""Tests of what a model leaves: white, and not explained by the input, Wernholt (2004), 3.5."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy import fft, stats
+
+from axisight.blackbox._data import Real, whole
+from axisight.errors import InputError
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Results over outputs and inputs.
+
+    ``autocorrelation`` (n_out, lags + 1), one at lag 0, and ``cross_correlation``
+    (n_out, n_in, 2 lags + 1), lags from -lags to lags, are normalized. ``whiteness_p`` (n_out,)
+    and ``independence_p`` (n_out, n_in) are the probabilities of so much correlation or more by
+    chance; below 1 - ``probability`` the test fails. The test of independence counts lags from
+    0 on; correlation at negative lags shows feedback. ``autocorrelation_bound`` and
+    ``cross_correlation_bound`` (n_out, n_in) hold a single lag with ``probability``.
+    """
+
+    autocorrelation: Real
+    cross_correlation: Real
+    autocorrelation_bound: float
+    cross_correlation_bound: Real
+    whiteness_p: Real
+    independence_p: Real
+    probability: float
+    n_samples: int
+
+    @property
+    def white(self) -> bool:
+        """Whether no output fails the whiteness test."""
+        return bool(np.all(self.whiteness_p >= 1 - self.probability))
+
+    @property
+    def independent(self) -> bool:
+        """Whether no residual follows an input."""
+        return bool(np.all(self.independence_p >= 1 - self.probability))
+
+    def advice(self) -> tuple[str, ...]:
+        """Return in words what fails and what it means."""
+        out = []
+        limit = 1 - self.probability
+        for i in np.flatnonzero(self.whiteness_p < limit):
+            out.append(
+                f"residual {i + 1} is not white: standard errors that assume it are wrong; raise "
+                "the orders of the noise model, or judge the plant by simulation"
+            )
+        for i, j in np.argwhere(self.independence_p < limit):
+            out.append(
+                f"residual {i + 1} follows input {j + 1}: dynamics are missing, the delay is "
+                "wrong, or the system is nonlinear"
+            )
+        return tuple(out)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return both correlations over ``lag`` as a Dataset."""
+        most = self.autocorrelation.shape[1] - 1
+        mirrored = np.concatenate([self.autocorrelation[:, :0:-1], self.autocorrelation], axis=1)
+        n_out, n_in = self.independence_p.shape
+        return xr.Dataset(
+            {
+                "autocorrelation": (("output", "lag"), mirrored),
+                "cross_correlation": (("output", "input", "lag"), self.cross_correlation),
+                "whiteness_p": ("output", self.whiteness_p),
+                "independence_p": (("output", "input"), self.independence_p),
+            },
+            coords={
+                "lag": np.arange(-most, most + 1),
+                "output": np.arange(1, n_out + 1),
+                "input": np.arange(1, n_in + 1),
+            },
+            attrs={"probability": self.probability, "n_samples": self.n_samples},
+        )
+
+
+def residual_tests(
+    residual: ArrayLike,
+    input_: ArrayLike,
+    *,
+    lags: int = 25,
+    probability: float = 0.99,
+) -> ResidualTests:
+    """Return tests of residuals ``measurement - model`` of one experiment.
+
+    residual
+        (n,) or (n, n_out); leading rows of NaN, before the first prediction, are left out.
+    input_
+        (n,) or (n, n_in), the input at the same samples.
+    lags
+        Largest lag.
+    probability
+        Of passing when the model is right.
+
+    Whiteness: Ljung and Box's sum of squared autocorrelations, chi-squared with ``lags``
+    degrees of freedom (estimated parameters take a few off, which makes the test mild).
+    Independence: the vector of cross-correlations at lags 0 to ``lags`` against its covariance
+    sum_k R_e(k) R_u(k + i - j) / n, for a residual of any colour (Ljung, 1999, chapter 16).
+
+    Raises InputError for misuse, and a residual or input that is constant.
+    """
+    if not 0 < probability < 1:
+        raise InputError(f"probability: expected a number between 0 and 1, got {probability}")
+    most = whole("lags", lags, 1)
+    e, u = _rows("residual", residual), _rows("input_", input_)
+    if len(e) != len(u):
+        raise InputError(f"input_: expected {len(e)} samples as the residual, got {len(u)}")
+    known = np.isfinite(e).all(axis=1)
+    start = int(np.argmax(known))
+    e, u = e[start:], u[start:]
+    if not (known.any() and np.isfinite(e).all() and np.isfinite(u).all()):
+        raise InputError("residual, input_: expected finite numbers after the first prediction")
+    n = len(e)
+    if n < 4 * most:
+        raise InputError(f"residual: expected at least {4 * most} samples for {most} lags, got {n}")
+    for name, x in (("residual", e), ("input_", u)):
+        if np.any(np.ptp(x, axis=0) == 0):
+            raise InputError(f"{name}: expected channels that move, got a constant one")
+    e, u = e - e.mean(axis=0), u - u.mean(axis=0)
+    r_e = np.stack([_covariance(x, x, most) for x in e.T])
+    r_u = np.stack([_covariance(x, x, 2 * most) for x in u.T])
+    white = r_e / r_e[:, :1]
+    weight = n * (n + 2) / (n - np.arange(1, most + 1))
+    whiteness = stats.chi2.sf((white[:, 1:] ** 2 * weight).sum(axis=1), most)
+    cross = np.empty((e.shape[1], u.shape[1], 2 * most + 1))
+    bound, independence = np.empty(cross.shape[:2]), np.empty(cross.shape[:2])
+    one_sided = stats.norm.ppf((1 + probability) / 2)
+    for i, x in enumerate(e.T):
+        for j, w in enumerate(u.T):
+            after, before = _covariance(x, w, most), _covariance(w, x, most)
+            both = np.concatenate([before[:0:-1], after])
+            spread = _spread(r_e[i], r_u[j], most) / n
+            size = np.sqrt(r_e[i, 0] * r_u[j, 0])
+            cross[i, j] = both / size
+            bound[i, j] = one_sided * np.sqrt(spread[0, 0]) / size
+            independence[i, j] = _independence(after, spread)
+    return ResidualTests(
+        white,
+        cross,
+        float(one_sided / np.sqrt(n)),
+        bound,
+        np.asarray(whiteness),
+        independence,
+        probability,
+        n,
+    )
+
+
+def _rows(name: str, value: ArrayLike) -> Real:
+    x = np.asarray(value, np.float64)
+    x = x[:, None] if x.ndim == 1 else x
+    if x.ndim != 2 or 0 in x.shape:
+        raise InputError(f"{name}: expected shape (n,) or (n, channels), got {np.shape(value)}")
+    return x
+
+
+def _covariance(x: Real, y: Real, lags: int) -> Real:
+    """Return ``(1/n) sum_t x(t) y(t - lag)`` for lags from 0."""
+    n = len(x)
+    size = fft.next_fast_len(n + lags)
+    product = fft.rfft(x, size) * np.conj(fft.rfft(y, size))
+    return np.asarray(fft.irfft(product, size)[: lags + 1] / n)
+
+
+def _spread(r_e: Real, r_u: Real, lags: int) -> Real:
+    """Return n times the covariance of the cross-covariances at lags 0 to ``lags``."""
+    # sum_k R_e(k) R_u(k + i - j): a Toeplitz matrix of the convolution of both.
+    e = np.concatenate([r_e[:0:-1], r_e])
+    u = np.concatenate([r_u[:0:-1], r_u])
+    both = np.convolve(e, u[::-1], mode="full")
+    middle = len(both) // 2
+    index = np.abs(np.subtract.outer(np.arange(lags + 1), np.arange(lags + 1)))
+    return np.asarray(both[middle + index])
+
+
+def _independence(cross: Real, covariance: Real) -> float:
+    # Periodic or smooth inputs make neighbouring lags nearly one: directions without spread
+    # of their own carry no test.
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > 1e-6 * values[-1]
+    statistic = float(np.sum((vectors[:, kept].T @ cross) ** 2 / values[kept]))
+    return float(stats.chi2.sf(statistic, int(kept.sum())))

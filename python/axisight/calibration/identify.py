@@ -1,0 +1,432 @@
+"""Gauss-Newton identification of geometric and elastostatic errors, Wernholt (2004), (4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.calibration.geometry import (
+    GROUPS,
+    Array,
+    Errors,
+    Geometry,
+    errors_about,
+    nominal_geometry,
+)
+from axisight.calibration.measurements import Checked, Loads, Measurement, check
+from axisight.errors import InputError
+from axisight.robot import Robot
+
+Status = Literal["converged", "max_iterations", "stalled"]
+
+_TYPICAL = 1e-3
+"""Errors of a machine as it is delivered: a millimetre, a milliradian."""
+_DETERMINED = 1.0
+"""Least whitened, scaled singular value: the standard error of a direction is a typical error."""
+_LOOKS = 3
+"""How often the directions that are seen are decided again at the solution."""
+_NAMED = 0.01
+"""Share of a typical error from which on a parameter is named in a combination."""
+_ADVICE: dict[str, str] = {
+    "converged": "",
+    "max_iterations": "still moving: allow more iterations, or start from a better nominal geometry",
+    "stalled": (
+        "no step lowers the loss any more before the steps are small: look for outliers, wrong "
+        "units or axes that count the other way round"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Combination:
+    """What the measurements determine: a parameter with those that cannot be told from it.
+
+    ``name`` reads like ``tool.x + 1 axis6.origin_x``; it ends in ``+ ...`` if there are
+    parameters that count for less than a hundredth. ``weights`` has all of them, by name.
+    ``value`` and ``standard_error`` are in the ``unit`` of the first parameter.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    unit: str
+    weights: dict[str, float] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A calibrated geometry and how well it is known.
+
+    geometry
+        The corrected geometry; of all that fit equally well the one nearest to the nominal.
+    nominal
+        What it started from.
+    table
+        Over ``parameter``: ``deviation``, ``standard_error`` (infinite where only a combination
+        is determined) and ``identifiable``; units in the coordinate ``unit``.
+    combinations
+        The identifiable combinations, as many as ``rank``.
+    status, advice, iterations
+        How the search ended: ``"converged"``, ``"max_iterations"`` or ``"stalled"``.
+    rank, singular_values
+        Of the whitened Jacobian at the solution, columns scaled to typical errors (1 mm,
+        1 mrad, a compliance that gives 1 mrad under the largest load). ``rank`` are those above
+        one: directions known better than a typical error.
+    observability
+        Geometric mean of the singular values that count over the square root of the number of
+        residuals (Borm and Menq 1991); larger is better.
+    residual_scale
+        Scatter of the residuals in units of the standard deviations given; 1 if those are right.
+        Standard errors are multiplied by it.
+    errors
+        Root mean square and largest error, over (``when``: nominal or calibrated, ``of``:
+        fit, cross_validation or validation) and per kind of measurement; NaN where there is none.
+        Cross-validation predicts every measurement from a fit without it.
+    """
+
+    geometry: Geometry
+    nominal: Geometry
+    table: xr.Dataset
+    combinations: tuple[Combination, ...]
+    status: Status
+    advice: str
+    iterations: int
+    rank: int
+    singular_values: Array
+    observability: float
+    residual_scale: float
+    errors: xr.Dataset
+
+
+def calibrate(
+    robot: Robot,
+    measurements: Sequence[Measurement] | Measurement,
+    *,
+    nominal: Geometry | None = None,
+    identify: Sequence[str] = GROUPS,
+    loads: Loads | None = None,
+    validation: Sequence[Measurement] = (),
+    folds: int = 5,
+    seed: int = 0,
+    max_iterations: int = 30,
+) -> Calibration:
+    """Return the geometry that explains measurements of a target on the tool.
+
+    Parameters
+    ----------
+    robot : the description; its links and payload load the joints.
+    measurements : absolute (:class:`Positions`, :class:`Poses`) and relative
+        (:class:`Distances`, :class:`SamePoint`) ones, in any mixture.
+    nominal : where to start, with base and tool frames; :func:`nominal_geometry` by default.
+    identify : what may be wrong, out of ``"compliance"``, ``"offset"``, ``"tilt"``,
+        ``"origin"``, ``"tool"`` and ``"base"``.
+    loads : what the joints hold; gravity on the links of the description by default.
+    validation : measurements kept out of the fit, for the errors only.
+    folds : parts of the cross-validation, drawn with ``seed``; 0 for none.
+    max_iterations : of Gauss-Newton.
+
+    Directions that the measurements cannot see stay at their nominal values: those known no
+    better, with the standard deviations given, than a typical error. The base frame
+    should be known to some degrees: nothing finds it from nothing. Raises InputError naming the
+    field; an iteration that does not converge is a status.
+
+    """
+    given = measurements if isinstance(measurements, Sequence) else (measurements,)
+    if not given:
+        raise InputError("measurements: expected at least one, got none")
+    unknown = [g for g in identify if g not in GROUPS]
+    if unknown or not identify:
+        raise InputError(
+            f"identify: expected some of {', '.join(GROUPS)}, got {', '.join(unknown) or 'none'}"
+        )
+    for name, value, least in (("max_iterations", max_iterations, 1), ("folds", folds, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InputError(f"{name}: expected a whole number from {least}, got {value!r}")
+    if folds == 1:
+        raise InputError("folds: expected 0 or at least 2, got 1")
+    held = loads or Loads()
+    start = nominal or nominal_geometry(robot)
+    if start.joint_names != tuple(robot.joint_names):
+        raise InputError(
+            f"nominal: expected joints {', '.join(robot.joint_names)}, "
+            f"got {', '.join(start.joint_names)}"
+        )
+    data = [check(m, robot, held, f"measurements[{i}]") for i, m in enumerate(given)]
+    outside = [check(m, robot, held, f"validation[{i}]") for i, m in enumerate(validation)]
+    errors = errors_about(start, identify, rotation=any(d.kind == "pose" for d in data))
+    problem = _Problem(errors, data, _scales(errors, data), max_iterations)
+    found = problem.solve()
+    dof = sum(d.freedom for d in data) - problem.rank
+    if dof <= 0:
+        raise InputError(
+            f"measurements: expected more than the {problem.rank} combinations that they "
+            f"determine, got {dof + problem.rank} numbers: measure more configurations or "
+            "identify fewer groups"
+        )
+    scale = float(np.sqrt(found.loss / dof))
+    table, combinations = _report(problem, found, scale)
+    return Calibration(
+        geometry=errors.geometry(found.theta),
+        nominal=start,
+        table=table,
+        combinations=combinations,
+        status=found.status,
+        advice=_ADVICE[found.status],
+        iterations=found.iterations,
+        rank=problem.rank,
+        singular_values=problem.singular_values,
+        observability=problem.observability,
+        residual_scale=scale,
+        errors=_error_table(problem, found.theta, outside, folds, seed),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    theta: Array
+    loss: float
+    jacobian: Array
+    status: Status
+    iterations: int
+
+
+class _Problem:
+    """Whitened residuals of all measurements over the directions that they can see."""
+
+    def __init__(
+        self,
+        errors: Errors,
+        data: Sequence[Checked],
+        scale: Array,
+        max_iterations: int,
+    ) -> None:
+        self.errors, self.data, self.scale = errors, data, scale
+        self.max_iterations = max_iterations
+        self.look(np.zeros(len(scale)))
+
+    def look(self, theta: Array) -> None:
+        """Decide at ``theta`` which directions the measurements can see."""
+        _, jacobian = self.residual(theta)
+        _, s, right = np.linalg.svd(jacobian * self.scale, full_matrices=False)
+        if s[0] <= _DETERMINED:
+            raise InputError(
+                "measurements: expected some that see an error of 1 mm or 1 mrad, got none: check "
+                "std_m and what to identify"
+            )
+        self.rank = int(np.sum(s > _DETERMINED))
+        self.singular_values = s
+        self.seen = right[: self.rank].T
+        self.observability = float(np.exp(np.mean(np.log(s[: self.rank]))) / np.sqrt(len(jacobian)))
+
+    def residual(self, theta: Array) -> tuple[Array, Array]:
+        parts = [d.residual(self.errors, theta) for d in self.data]
+        return np.concatenate([r for r, _ in parts]), np.concatenate([j for _, j in parts])
+
+    def solve(self) -> _Found:
+        """Solve over the directions seen at the nominal geometry, then over those seen there.
+
+        At a wrong geometry relative measurements seem to see what they do not, by as little as
+        it is wrong.
+        """
+        found = self._descend(np.zeros(len(self.scale)), self.max_iterations)
+        for _ in range(_LOOKS):
+            left = self.max_iterations - found.iterations
+            if found.status != "converged" or left < 1:
+                break
+            before = self.rank
+            self.look(found.theta)
+            kept = self.scale * (self.seen @ (self.seen.T @ (found.theta / self.scale)))
+            again = self._descend(kept, left)
+            found = replace(again, iterations=found.iterations + again.iterations)
+            if self.rank == before:
+                break
+        return found
+
+    def _descend(self, theta: Array, iterations: int) -> _Found:
+        residual, jacobian = self.residual(theta)
+        loss = float(residual @ residual)
+        status: Status = "max_iterations"
+        count = 0
+        while count < iterations:
+            count += 1
+            reduced = (jacobian * self.scale) @ self.seen
+            step = np.linalg.lstsq(reduced, -residual, rcond=None)[0]
+            # Rounding of residuals of 1e3 standard deviations is below this.
+            small = np.abs(step).max() < 1e-9 * (1.0 + np.abs(theta / self.scale).max())
+            for _ in range(30):
+                trial = theta + self.scale * (self.seen @ step)
+                r, j = self.residual(trial)
+                if float(r @ r) <= loss * (1.0 + 1e-12) or small:
+                    break
+                step = 0.5 * step
+            else:
+                status = "stalled"
+                break
+            theta, residual, jacobian, loss = trial, r, j, float(r @ r)
+            if small:
+                status = "converged"
+                break
+        return _Found(theta, loss, jacobian, status, count)
+
+    def without(self, fold: NDArray[np.int64], k: int) -> tuple[_Problem, list[Checked]]:
+        """The problem without fold ``k``, and what was left out."""
+        inside: list[Checked] = []
+        outside: list[Checked] = []
+        at = 0
+        for d in self.data:
+            mine = fold[at : at + d.rows]
+            at += d.rows
+            for keep, part in ((mine != k, inside), (mine == k, outside)):
+                rows = np.flatnonzero(keep)
+                taken = d.take(rows) if len(rows) else None
+                if taken is not None and taken.rows:
+                    part.append(taken)
+        return _Problem(self.errors, inside, self.scale, self.max_iterations), outside
+
+
+def _scales(errors: Errors, data: Sequence[Checked]) -> Array:
+    """Typical sizes: a milliradian, a millimetre; a compliance that gives one under load."""
+    out = np.full(len(errors.kinds), _TYPICAL)
+    torque = np.max([np.abs(d.torque).max(axis=0) for d in data], axis=0)
+    for k, (group, joint, _) in enumerate(errors.kinds):
+        if group == "compliance":
+            # A joint that never holds anything has no column, whatever its scale.
+            out[k] = _TYPICAL / torque[joint] if torque[joint] > 0 else 1.0
+    return out
+
+
+def _report(
+    problem: _Problem, found: _Found, scatter: float
+) -> tuple[xr.Dataset, tuple[Combination, ...]]:
+    errors, scale = problem.errors, problem.scale
+    # Over the directions seen, in scaled units; anything else has a zero column.
+    r = np.linalg.qr((found.jacobian * scale) @ problem.seen, mode="r")
+    spread = np.linalg.solve(r, np.eye(len(r))) * scatter
+    seen = (problem.seen**2).sum(axis=1)
+    alone = seen > 1.0 - 1e-9
+    deviation = np.sqrt(((problem.seen @ spread) ** 2).sum(axis=1)) * scale
+    table = xr.Dataset(
+        {
+            "deviation": ("parameter", found.theta),
+            "standard_error": ("parameter", np.where(alone, deviation, np.inf)),
+            "identifiable": ("parameter", alone),
+        },
+        coords={"parameter": list(errors.names), "unit": ("parameter", list(errors.units))},
+    )
+    combinations = []
+    for lead, weights in _combinations(problem.seen):
+        members = np.flatnonzero(weights)
+        # Weights of the parameters themselves, the leader's being one.
+        real = weights * scale[lead] / scale
+        terms = [errors.names[lead]]
+        for k in members[(members != lead) & (np.abs(weights[members]) >= _NAMED)]:
+            sign = "-" if real[k] < 0 else "+"
+            terms.append(f"{sign} {abs(real[k]):.4g} {errors.names[k]}")
+        if len(terms) < len(members):
+            terms.append("+ ...")
+        error = np.linalg.norm((weights @ problem.seen) @ spread) * scale[lead]
+        combinations.append(
+            Combination(
+                " ".join(terms),
+                float(real @ found.theta),
+                float(error),
+                errors.units[lead],
+                {errors.names[k]: float(real[k]) for k in members},
+            )
+        )
+    return table, tuple(combinations)
+
+
+def _combinations(seen: Array) -> list[tuple[int, Array]]:
+    """Leading parameters of the row space ``seen`` (p, rank) and the weights (p,) with them.
+
+    Row k of ``seen`` is what is visible of parameter k. Rows are taken while they are independent
+    of those taken, first the first whose new part is at least half the largest: the weights
+    stay small, and combinations are named after the groups in their order. Every other row is a
+    sum of leading rows, and its parameter joins the combinations of those.
+    """
+    left = seen.copy()
+    leaders: list[int] = []
+    for _ in range(seen.shape[1]):
+        size = np.linalg.norm(left, axis=1)
+        lead = int(np.argmax(size >= 0.5 * size.max()))
+        leaders.append(lead)
+        along = left[lead] / size[lead]
+        left -= np.outer(left @ along, along)
+        left[lead] = 0.0
+    others = [k for k in range(len(seen)) if k not in leaders]
+    # seen[others] = shares @ seen[leaders]
+    shares = np.linalg.solve(seen[leaders].T, seen[others].T).T
+    out = []
+    for i, lead in enumerate(leaders):
+        weights = np.zeros(len(seen))
+        weights[lead] = 1.0
+        # Below this is rounding.
+        weights[others] = np.where(np.abs(shares[:, i]) > 1e-9, shares[:, i], 0.0)
+        out.append((lead, weights))
+    return sorted(out, key=lambda item: item[0])
+
+
+_KINDS = ("position_m", "rotation_rad", "distance_m", "same_point_m")
+_OF = ("fit", "cross_validation", "validation")
+
+
+def _error_table(
+    problem: _Problem, theta: Array, outside: Sequence[Checked], folds: int, seed: int
+) -> xr.Dataset:
+    rms, worst = np.full((2, 2, 3, len(_KINDS)), np.nan)
+    zero = np.zeros_like(theta)
+
+    def note(when: int, of: int, sizes: dict[str, Array]) -> None:
+        for kind, values in sizes.items():
+            at = (when, of, _KINDS.index(kind))
+            rms[at], worst[at] = np.sqrt(np.mean(values**2)), values.max()
+
+    for when, at in enumerate((zero, theta)):
+        note(when, 0, _sizes(problem.errors, problem.data, at))
+        if outside:
+            note(when, 2, _sizes(problem.errors, outside, at))
+    if folds:
+        count = sum(d.rows for d in problem.data)
+        fold = np.random.default_rng(seed).permutation(np.arange(count) % folds)
+        found: dict[str, list[Array]] = {}
+        before: dict[str, list[Array]] = {}
+        for k in range(folds):
+            part, left_out = problem.without(fold, k)
+            if not left_out:
+                continue
+            fitted = part.solve().theta
+            for into, at in ((found, fitted), (before, zero)):
+                for kind, values in _sizes(problem.errors, left_out, at).items():
+                    into.setdefault(kind, []).append(values)
+        for when, sizes in enumerate((before, found)):
+            note(when, 1, {kind: np.concatenate(v) for kind, v in sizes.items()})
+    dims = ("when", "of", "kind")
+    return xr.Dataset(
+        {"rms": (dims, rms), "largest": (dims, worst)},
+        coords={"when": ["nominal", "calibrated"], "of": list(_OF), "kind": list(_KINDS)},
+        attrs={"units": "m, rotation_rad in rad", "folds": folds, "seed": seed},
+    )
+
+
+def _sizes(errors: Errors, data: Sequence[Checked], theta: Array) -> dict[str, Array]:
+    """Errors of every measurement in SI units, by kind: lengths of vectors."""
+    out: dict[str, list[Array]] = {}
+    for d in data:
+        r, _ = d.residual(errors, theta)
+        if d.kind == "pose":
+            both = r.reshape(-1, 2, 3) * np.array(d.std)[:, None]
+            out.setdefault("position_m", []).append(np.linalg.norm(both[:, 0], axis=1))
+            out.setdefault("rotation_rad", []).append(np.linalg.norm(both[:, 1], axis=1))
+        elif d.kind == "distance":
+            out.setdefault("distance_m", []).append(np.abs(r) * d.std[0])
+        else:
+            kind = "position_m" if d.kind == "position" else "same_point_m"
+            sizes = np.linalg.norm(r.reshape(-1, 3), axis=1) * d.std[0]
+            out.setdefault(kind, []).append(sizes)
+    return {kind: np.concatenate(values) for kind, values in out.items()}

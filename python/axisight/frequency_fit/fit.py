@@ -1,0 +1,262 @@
+"""Fitting the linearized robot to measured frequency responses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.errors import InputError
+from axisight.fitting import Parameter
+from axisight.frequency_fit.identifiability import assess
+from axisight.frequency_fit.measured import MeasuredResponse, measured, model_response
+from axisight.frequency_fit.options import FrequencyFitOptions, core_options
+from axisight.frequency_fit.parameters import Spec, specs
+from axisight.frequency_fit.result import (
+    MISFIT_EXPLAINED,
+    NORMAL_95,
+    FrequencyFit,
+    covariances,
+    warn,
+)
+from axisight.robot import Robot
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+__all__ = ["FrequencyFitOptions", "fit_responses"]
+
+
+def fit_responses(
+    robot: Robot,
+    responses: Sequence[MeasuredResponse | tuple[ArrayLike, xr.Dataset | xr.DataArray]],
+    parameters: Sequence[str | Parameter] | Mapping[str, float],
+    *,
+    effects: Sequence[Effect] = (),
+    options: FrequencyFitOptions | None = None,
+) -> FrequencyFit:
+    """Fit parameters of the linearized robot to responses at several operating points.
+
+    Source: Wernholt (2004), (3.42) to (3.44). At every operating point the robot is
+    linearized where its elastic joints settle under gravity; the gradient is exact, the
+    dependence of that point on the parameters included.
+
+    robot
+        Its other parameters stay as they are.
+    responses
+        :class:`MeasuredResponse`, or pairs of the angles of the driven joints [rad] and what
+        an estimator of `axisight.frf` returns (a Dataset, or a DataArray with units). Torque
+        to position, velocity or acceleration of the motors, told by the units.
+    parameters to fit
+        Names (starting at the robot's values), a dict of names and starts, or
+        :class:`axisight.Parameter` with bounds and priors. Names are those of
+        :func:`axisight.robot_parameters`. All but centres of mass are searched over their
+        logarithms, within a factor of 100 unless bounds are given.
+    effects
+        Of those that leave the robot linear: payload, joint_stiffness, joint_damping,
+        motor_inertia; the robot's own come before them.
+    options
+        See :class:`FrequencyFitOptions`.
+
+    A weighted criterion needs the variance of every response. Residuals are model minus
+    measurement, whitened. Non-convergence and what data cannot tell are a status and
+    warnings; misuse raises InputError.
+    """
+    chosen = options or FrequencyFitOptions()
+    wanted = specs(robot, parameters)
+    if isinstance(responses, xr.Dataset | xr.DataArray | MeasuredResponse | str):
+        raise InputError("responses: expected a list, got one; put it into a list")
+    data = [measured(item, robot, chosen.sampling) for item in responses]
+    if not data:
+        raise InputError("responses: expected at least one operating point, got none")
+    if chosen.weighted:
+        for i, one in enumerate(data, 1):
+            if one.variance is None and one.covariance is None:
+                raise InputError(
+                    f"response {i}: expected a variance or covariance for the criterion "
+                    f"{chosen.criterion}, got none; average several periods or realizations, or "
+                    "use least_squares or log_least_squares"
+                )
+    model = [*robot.effects, *effects]
+    chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
+
+    def search(
+        start: Sequence[Spec], reference: Sequence[Complex | None]
+    ) -> _core.FrequencyFitResult:
+        return _core.fit_frequency_responses(
+            robot.core,
+            core_effects(model),
+            list(start),
+            [one.core(g) for one, g in zip(data, reference, strict=True)],
+            core_options(chosen),
+        )
+
+    results = _from_starts(wanted, chosen, lambda start: search(start, [None] * len(data)))
+    result = results[0]
+    passes = [result]
+    if chosen.weighted and chosen.logarithmic:
+        for _ in range(chosen.reweightings):
+            fitted = _with_values(robot, wanted, result.values)
+            reference = [
+                model_response(
+                    fitted,
+                    one.frequency_hz,
+                    one.joint_angle_rad,
+                    quantity=one.quantity,
+                    sampling=chosen.sampling,
+                    effects=effects,
+                ).values
+                for one in data
+            ]
+            start = [
+                replace(s, initial=float(np.clip(v, s.lower, s.upper)))
+                for s, v in zip(wanted, result.values, strict=True)
+            ]
+            result = search(start, reference)
+            passes.append(result)
+    return _wrap(robot, wanted, data, chosen, passes, _table(results))
+
+
+BLOCKS_PER_PARAMETER = 5
+"""Fewer blocks of residuals leave the sandwich covariance without degrees of freedom."""
+
+
+def _block_lines(
+    options: FrequencyFitOptions, wanted: Sequence[Spec], data: Sequence[MeasuredResponse]
+) -> int:
+    """Return the block length wanted, or what leaves enough blocks."""
+    lines = sum(len(one.frequency_hz) for one in data)
+    blocks = BLOCKS_PER_PARAMETER * sum(not spec.frozen for spec in wanted)
+    return max(1, min(options.block_lines, lines // blocks))
+
+
+def _from_starts(
+    wanted: Sequence[Spec],
+    options: FrequencyFitOptions,
+    search: Callable[[Sequence[Spec]], _core.FrequencyFitResult],
+) -> list[_core.FrequencyFitResult]:
+    """Search from all starting points; best first. A start where the model fails is passed."""
+    found = [search(wanted)]
+    for number in range(1, options.starts):
+        draw = np.random.default_rng([options.seed, number]).uniform(-1, 1, len(wanted))
+        start = []
+        for spec, x in zip(wanted, draw, strict=True):
+            if spec.frozen:
+                start.append(spec)
+                continue
+            if spec.logarithmic:
+                moved = spec.initial * (1 + options.start_spread) ** x
+            else:
+                moved = spec.initial + options.start_spread * x * max(abs(spec.initial), 0.1)
+            start.append(replace(spec, initial=float(np.clip(moved, spec.lower, spec.upper))))
+        try:
+            found.append(search(start))
+        except InputError:
+            # The first start has shown that the data is sound: the arm does not settle here.
+            continue
+    return sorted(found, key=lambda r: r.loss)
+
+
+def _table(results: Sequence[_core.FrequencyFitResult]) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "loss": [r.loss for r in results],
+            "status": [r.status for r in results],
+            "iterations": [r.iterations for r in results],
+        }
+    )
+
+
+def _with_values(robot: Robot, wanted: Sequence[Spec], values: Real) -> Robot:
+    pairs = [(s.name, float(v)) for s, v in zip(wanted, values, strict=True)]
+    return Robot(robot.core.with_parameters(pairs), robot.effects)
+
+
+def _wrap(
+    robot: Robot,
+    wanted: Sequence[Spec],
+    data: Sequence[MeasuredResponse],
+    options: FrequencyFitOptions,
+    passes: Sequence[_core.FrequencyFitResult],
+    starts: pd.DataFrame,
+) -> FrequencyFit:
+    result = passes[-1]
+    free = [wanted[i] for i in result.free]
+    prior = np.array([_prior_information(spec) for spec in free])
+    blocks = sum(-(-len(one.frequency_hz) // options.block_lines) for one in data)
+    found = covariances(result, prior, blocks)
+    known = all(one.variance is not None or one.covariance is not None for one in data)
+    excess = found.misfit / _explained(data) if options.weighted and known else None
+    sandwich = options.uncertainty == "sandwich" or (
+        options.uncertainty == "auto"
+        and ((excess is not None and excess > MISFIT_EXPLAINED) or options.loss != "squared")
+    )
+    own = found.sandwich if sandwich else found.response
+    scale = 1.0 if options.weighted else found.misfit
+    names = tuple(spec.name for spec in free)
+    identifiable = assess(wanted, result.information, scale)
+    at_bound = tuple(wanted[i].name for i in result.at_bound)
+    slopes, values = result.slopes, result.values[result.free]
+    with np.errstate(invalid="ignore"):
+        spread = np.sqrt(np.diag(own))
+        correlation = own / np.outer(spread, spread)
+    return FrequencyFit(
+        names=names,
+        values=values,
+        std=slopes * spread,
+        interval=_interval(free, values, spread),
+        covariance=own * np.outer(slopes, slopes),
+        correlation=correlation,
+        std_response=slopes * np.sqrt(np.diag(found.response)),
+        std_sandwich=slopes * np.sqrt(np.diag(found.sandwich)),
+        std_from="sandwich" if sandwich else "response",
+        status=result.status,
+        misfit=found.misfit,
+        loss=result.loss,
+        initial_loss=passes[0].initial_loss,
+        n_residuals=result.n_residuals,
+        iterations=sum(one.iterations for one in passes),
+        evaluations=sum(one.evaluations for one in passes),
+        at_bound=at_bound,
+        identifiability=identifiable,
+        warnings=warn(
+            result,
+            identifiable,
+            at_bound,
+            excess=excess,
+            dropped=sum(one.dropped_lines for one in data),
+            sandwich=sandwich,
+        ),
+        starts=starts,
+        robot=_with_values(robot, wanted, result.values),
+        core=result,
+    )
+
+
+def _prior_information(spec: Spec) -> float:
+    if spec.prior is None:
+        return 0.0
+    mean, std = spec.prior
+    return float((mean / std) ** 2 if spec.logarithmic else 1 / std**2)
+
+
+def _explained(data: Sequence[MeasuredResponse]) -> float:
+    """Mean square of residuals whitened by an estimated variance, F distributed: nu / (nu - 1)."""
+    freedom = [one.degrees_of_freedom for one in data]
+    ratios = [1.0 if nu is None or nu <= 1 else nu / (nu - 1) for nu in freedom]
+    return float(np.mean(ratios))
+
+
+def _interval(free: Sequence[Spec], values: Real, spread: Real) -> Real:
+    logarithmic = np.array([spec.logarithmic for spec in free])
+    reach = NORMAL_95 * spread
+    with np.errstate(over="ignore"):
+        lower = np.where(logarithmic, values * np.exp(-reach), values - reach)
+        upper = np.where(logarithmic, values * np.exp(reach), values + reach)
+    return np.stack([lower, upper], axis=1)

@@ -1,0 +1,194 @@
+"""Result of a frequency-domain fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.frequency_fit.identifiability import Identifiability, advice
+from axisight.robot import Robot
+
+Real = NDArray[np.float64]
+
+NORMAL_95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class FrequencyFit:
+    """Parameters fitted to frequency responses.
+
+    names, values
+        Free parameters in their units.
+    std, interval
+        Standard deviations in the same units, and 95 % intervals (n_parameters, 2); an
+        interval of a positive parameter is symmetric in its logarithm.
+    std_response, std_sandwich
+        Standard deviations by the uncertainty of the response (NaN if there was none and no
+        residual is left) and by the scatter of the residuals over blocks of lines, which
+        stays valid when the model is incomplete; ``std_from`` says which one ``std`` is.
+    covariance, correlation
+        (n_parameters, n_parameters), of the kind ``std_from`` says.
+    status
+        ``loss_converged``, ``step_converged``, ``max_iterations`` or ``stalled``.
+    misfit
+        Mean square of a whitened residual, degrees of freedom counted: 1 if model and
+        uncertainty are right.
+    loss, initial_loss, n_residuals
+        At the end and at the start; real and imaginary part of a residual count as two.
+    iterations, evaluations
+        Of all passes from the best start.
+    at_bound
+        Names of parameters on a bound.
+    identifiability, warnings
+        Of the data that was used, with combinations that it does not determine; and what to
+        mind, in words.
+    starts
+        Loss, status and iterations of the search from every starting point, best first.
+    robot
+        The robot with the fitted values.
+    """
+
+    names: tuple[str, ...]
+    values: Real
+    std: Real
+    interval: Real
+    covariance: Real
+    correlation: Real
+    std_response: Real
+    std_sandwich: Real
+    std_from: Literal["response", "sandwich"]
+    status: str
+    misfit: float
+    loss: float
+    initial_loss: float
+    n_residuals: int
+    iterations: int
+    evaluations: int
+    at_bound: tuple[str, ...]
+    identifiability: Identifiability
+    warnings: tuple[str, ...]
+    starts: pd.DataFrame = field(repr=False)
+    robot: Robot = field(repr=False)
+    core: _core.FrequencyFitResult = field(repr=False)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return values and uncertainty as a Dataset over ``parameter``."""
+        return xr.Dataset(
+            {
+                "value": ("parameter", self.values),
+                "std": ("parameter", self.std),
+                "interval": (("parameter", "bound"), self.interval),
+                "correlation": (("parameter", "other"), self.correlation),
+            },
+            coords={
+                "parameter": list(self.names),
+                "other": list(self.names),
+                "bound": ["lower", "upper"],
+            },
+            attrs={
+                "status": self.status,
+                "loss": self.loss,
+                "misfit": self.misfit,
+                "std_from": self.std_from,
+                "condition": self.identifiability.condition,
+            },
+        )
+
+    def table(self) -> pd.DataFrame:
+        """Return one row per parameter: value, std, relative std, interval."""
+        return pd.DataFrame(
+            {
+                "parameter": self.names,
+                "value": self.values,
+                "std": self.std,
+                "relative_std": self.std / np.abs(self.values),
+                "lower": self.interval[:, 0],
+                "upper": self.interval[:, 1],
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Covariances:
+    """Of the searched numbers, by the response's uncertainty and by blocks of residuals."""
+
+    response: Real
+    sandwich: Real
+    misfit: float
+
+
+def covariances(result: _core.FrequencyFitResult, prior: Real, blocks: int) -> Covariances:
+    """Return covariances from the normal equations; infinite where these are singular.
+
+    ``prior`` is the information of the priors, (n_parameters,); ``blocks`` is the number of
+    blocks of the sandwich, which loses a degree of freedom for every parameter.
+    """
+    information = result.information
+    n = len(information)
+    misfit = result.loss / max(result.n_residuals - n, 1)
+    size = np.sqrt(np.diag(information))
+    nothing = np.full((n, n), np.inf)
+    if not (size > 0).all():
+        return Covariances(nothing, nothing, misfit)
+    try:
+        factor = np.linalg.cholesky(information / np.outer(size, size))
+    except np.linalg.LinAlgError:
+        return Covariances(nothing, nothing, misfit)
+    root = np.linalg.solve(factor, np.diag(1 / size))
+    inverse = root.T @ root
+    expected = result.expected_scatter
+    if expected is None:
+        expected = misfit * (information - np.diag(prior))
+    sandwich = nothing
+    if blocks > n:
+        middle = result.block_scatter * (blocks / (blocks - n))
+        sandwich = inverse @ (middle + np.diag(prior)) @ inverse
+    return Covariances(inverse @ (expected + np.diag(prior)) @ inverse, sandwich, misfit)
+
+
+MISFIT_EXPLAINED = 1.1
+"""Residuals larger than the variance explains by this factor: the model is incomplete."""
+POOR_CONDITION = 1e8
+
+
+def warn(
+    result: _core.FrequencyFitResult,
+    found: Identifiability,
+    at_bound: tuple[str, ...],
+    *,
+    excess: float | None,
+    dropped: int,
+    sandwich: bool,
+) -> tuple[str, ...]:
+    """Return what to mind; ``excess`` is the misfit over what the variance explains."""
+    out = []
+    if result.status == "max_iterations":
+        out.append("stopped at the iteration limit: start closer or allow more iterations")
+    if result.status == "stalled":
+        out.append(
+            "no step lowers the loss although the gradient is not zero: start closer, or take "
+            "several starts"
+        )
+    if at_bound:
+        out.append(f"on a bound: {', '.join(at_bound)}: widen it, or freeze the parameter")
+    if excess is not None and excess > MISFIT_EXPLAINED:
+        source = "taken from their scatter" if sandwich else "too small: use the sandwich"
+        out.append(
+            f"the mean square residual is {excess:.3g} times what the variance of the response "
+            f"explains: the model is incomplete or the variance too small; standard deviations "
+            f"are {source}"
+        )
+    out.extend(advice(found.unidentified))
+    if not found.unidentified and found.condition > POOR_CONDITION:
+        out.append(
+            f"condition number {found.condition:.1e}: the responses hardly separate some parameters"
+        )
+    if dropped:
+        out.append(f"{dropped} flagged lines without numbers were left out")
+    return tuple(out)

@@ -1,0 +1,286 @@
+"""What an information says of its parameters, in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.sparse import csgraph
+
+from axisight.errors import InputError
+from axisight.identifiability.information import Array, Information
+
+Form = Literal["auto", "power", "linear"]
+
+NUMERICAL_RANK = 1e-11
+"""Singular values of the weighted Jacobian, columns at unit length, below this share of the largest
+are rounding of the derivatives."""
+POOR = 0.5
+"""A combination not known to half its scale is poorly identifiable."""
+TILT = 0.05
+"""Shares below this, relative to the scales, are left out of what is poorly known."""
+SIMPLE_POWERS = (0.5, 1.0, 2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Parameters that are entangled, and what of them is seen.
+
+    ``kind``: ``unidentifiable`` (the data say nothing), or ``poor`` (not to the limit asked for).
+    ``parameters`` that are not known each; ``seen`` the combinations that are, in words, with
+    relative standard deviations ``seen_std``. ``relative_std`` of the worst direction, infinite
+    if unidentifiable. ``directions`` (n_lost, n) are changes that hardly show, in units of the scales.
+    """
+
+    kind: Literal["unidentifiable", "poor"]
+    parameters: tuple[str, ...]
+    seen: tuple[str, ...]
+    seen_std: tuple[float, ...]
+    relative_std: float
+    directions: Array = field(repr=False)
+
+    def __str__(self) -> str:
+        """In words."""
+        known = " and ".join(
+            f"{text} (to {percent(std)})"
+            for text, std in zip(self.seen, self.seen_std, strict=True)
+        )
+        several = ", ".join(self.parameters)
+        if self.kind == "unidentifiable":
+            if not self.seen:
+                return f"{several}: not seen at all"
+            return (
+                f"only {known} {'is' if len(self.seen) == 1 else 'are'} seen, not each of {several}"
+            )
+        worst = percent(self.relative_std)
+        if not self.seen:
+            return f"{several}: known to {worst} only"
+        return f"only {known} {'is' if len(self.seen) == 1 else 'are'} known well; {several} trade off, to {worst}"
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What an experiment tells.
+
+    ``rank`` of the information, of ``len(names)``; ``condition`` of its root, parameters scaled;
+    infinite without full rank. ``relative_std`` (n,) are Cramer and Rao's least standard
+    deviations by scale, infinite for what is not seen; ``correlation`` (n, n), NaN there.
+    ``combinations`` are what is not known, ``clusters`` groups of parameters correlated beyond the limit.
+    """
+
+    names: tuple[str, ...]
+    scales: Array
+    rank: int
+    condition: float
+    relative_std: Array
+    correlation: Array = field(repr=False)
+    combinations: tuple[Combination, ...]
+    clusters: tuple[tuple[str, ...], ...]
+    experiment: str
+    limit: float
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether every parameter is known to the limit."""
+        return not self.combinations
+
+    @property
+    def std(self) -> Array:
+        """Least standard deviations in the units of the parameters."""
+        return np.asarray(self.relative_std * self.scales)
+
+    def words(self) -> tuple[str, ...]:
+        """Return a sentence for each combination that is not known, worst first."""
+        return tuple(str(c) for c in self.combinations)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return standard deviations and correlations over ``parameter``."""
+        return xr.Dataset(
+            {
+                "scale": ("parameter", self.scales),
+                "relative_std": ("parameter", self.relative_std),
+                "std": ("parameter", self.std),
+                "correlation": (("parameter", "other"), self.correlation),
+            },
+            coords={"parameter": list(self.names), "other": list(self.names)},
+            attrs={"rank": self.rank, "condition": self.condition, "experiment": self.experiment},
+        )
+
+
+def identifiability(
+    experiment: Information,
+    *,
+    limit: float = POOR,
+    form: Form = "auto",
+    correlation_limit: float = 0.95,
+) -> Identifiability:
+    """Return what an experiment tells, and in words what it does not.
+
+    experiment
+        Its information, several experiments added up.
+    limit
+        Relative standard deviation from which on a combination is poorly identifiable.
+    form
+        How combinations are written: ``"power"``, products and ratios; ``"linear"``, sums, for
+        models linear in the parameters; ``"auto"``, powers where they are simple. To first
+        order both say the same.
+    correlation_limit
+        Parameters correlated beyond this are in one cluster.
+
+    Raises InputError for misuse.
+    """
+    if not (np.isfinite(limit) and limit > 0):
+        raise InputError(f"limit: expected a positive number, got {limit}")
+    if form not in ("auto", "power", "linear"):
+        raise InputError(f"form: expected 'auto', 'power' or 'linear', got {form!r}")
+    if not 0 < correlation_limit <= 1:
+        raise InputError(f"correlation_limit: expected above 0 up to 1, got {correlation_limit}")
+    names, n = experiment.names, len(experiment.names)
+    s, v, rank = decomposed(experiment)
+    lost = np.arange(n) >= rank
+    with np.errstate(divide="ignore"):
+        spread = np.where(lost, np.inf, 1 / np.where(s > 0, s, np.nan))
+    finite = np.where(lost, 0.0, np.nan_to_num(spread, posinf=0.0))
+    covariance = (v * finite**2) @ v.T
+    relative = np.sqrt(np.diag(covariance))
+    unseen = np.linalg.norm(v[:, lost], axis=1) > 1e-6
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = covariance / np.outer(relative, relative)
+    relative[unseen] = np.inf
+    correlation[unseen] = np.nan
+    correlation[:, unseen] = np.nan
+    found = _combinations(experiment, v, spread, limit, form)
+    return Identifiability(
+        names=names,
+        scales=experiment.scales,
+        rank=rank,
+        condition=float(s[0] / s[-1]) if rank == n else np.inf,
+        relative_std=relative,
+        correlation=correlation,
+        combinations=tuple(sorted(found, key=lambda c: -c.relative_std)),
+        clusters=_clusters(names, correlation, correlation_limit),
+        experiment=experiment.name,
+        limit=limit,
+    )
+
+
+def decomposed(experiment: Information) -> tuple[Array, Array, int]:
+    """Return singular values and right vectors of the scaled root, and its rank."""
+    n = len(experiment.names)
+    root = experiment.root
+    size = np.linalg.norm(root, axis=0)
+    unit = root / np.where(size > 0, size, 1.0)
+    values = np.linalg.svd(unit, compute_uv=False) if len(root) else np.zeros(0)
+    rank = int(np.sum(values > NUMERICAL_RANK * values[0])) if values.size and values[0] > 0 else 0
+    scaled = root * experiment.scales
+    padded = np.vstack([scaled, np.zeros((max(n - len(scaled), 0), n))])
+    # The exact null space comes from the unit columns: scales must not decide what is rounding.
+    _, _, unit_vt = np.linalg.svd(np.vstack([unit, np.zeros((max(n - len(unit), 0), n))]))
+    null = unit_vt[rank:].T / np.where(size > 0, size * experiment.scales, 1.0)[:, None]
+    q, _ = np.linalg.qr(null, mode="complete") if rank < n else (np.eye(n), None)
+    known = q[:, n - rank :]
+    _, s, vt = np.linalg.svd(padded @ known, full_matrices=False)
+    return (
+        np.concatenate([s[:rank], np.zeros(n - rank)]),
+        np.hstack([known @ vt[:rank].T, q[:, : n - rank]]),
+        rank,
+    )
+
+
+def _combinations(
+    experiment: Information, v: Array, spread: Array, limit: float, form: Form
+) -> list[Combination]:
+    """Return the entangled groups of what is not known, parameters expressed by chosen ones."""
+    chosen, lost = spread > limit, np.isinf(spread)
+    if not chosen.any():
+        return []
+    names, space = experiment.names, v[:, chosen]
+    n, k = space.shape
+    # Among equals the later parameter is expressed by the earlier ones.
+    later = 1 + 0.1 * np.arange(n) / n
+    _, _, pivots = linalg.qr(space.T * later, mode="economic", pivoting=True)
+    free = np.sort(pivots[:k])
+    shares = space @ np.linalg.inv(space[free])
+    # An exact null space is sharp; what is merely poor tilts a little.
+    shares[np.abs(shares) < (1e-6 if lost[chosen].all() else TILT)] = 0.0
+    linked = np.zeros((n, n))
+    linked[:, free] = np.abs(shares)
+    _, group = csgraph.connected_components(linked, directed=False)
+    out = []
+    for label in np.unique(group[free]):
+        members = np.flatnonzero(group == label)
+        own = np.flatnonzero(group[free] == label)
+        seen, stds = [], []
+        for i in (int(i) for i in members if i not in free):
+            powers = shares[i, own]
+            used = np.flatnonzero(powers)
+            seen.append(
+                _expression(names, experiment.scales, i, free[own][used], powers[used], form)
+            )
+            contrast = np.zeros(n)
+            contrast[i] = 1.0
+            contrast[free[own]] = -powers
+            stds.append(float(np.linalg.norm(v[:, ~chosen].T @ contrast * spread[~chosen])))
+        unseen = np.linalg.norm(v[np.ix_(members, lost)], axis=0) > 0.5
+        # The longest axis of what is lost of these parameters.
+        poor = chosen & ~lost
+        worst = float(np.linalg.norm(v[np.ix_(members, poor)] * spread[poor], ord=2))
+        out.append(
+            Combination(
+                "unidentifiable" if unseen.any() else "poor",
+                tuple(names[int(i)] for i in members),
+                tuple(seen),
+                tuple(stds),
+                np.inf if unseen.any() else worst,
+                shares[:, own].T,
+            )
+        )
+    return out
+
+
+def _expression(
+    names: Sequence[str], scales: Array, i: int, others: NDArray[np.intp], powers: Array, form: Form
+) -> str:
+    """Write what stays when the others move: theta_i less their shares, or over their powers."""
+    simple = all(min(abs(abs(p) - x) for x in SIMPLE_POWERS) < 0.02 for p in powers)
+    if form == "power" or (form == "auto" and simple):
+        top: list[str] = [names[i]]
+        bottom: list[str] = []
+        for j, power in zip(others, powers, strict=True):
+            size = _power(abs(power))
+            (bottom if power > 0 else top).append(f"{names[j]}{size}")
+        text = " · ".join(top)
+        if not bottom:
+            return text
+        return f"{text} / {bottom[0] if len(bottom) == 1 else '(' + ' · '.join(bottom) + ')'}"
+    text = names[i]
+    for j, power in zip(others, powers, strict=True):
+        share = -power * scales[i] / scales[j]
+        factor = "" if abs(abs(share) - 1) < 5e-4 else f"{abs(share):.4g} "
+        text += f" {'+' if share > 0 else '-'} {factor}{names[j]}"
+    return text
+
+
+def _power(power: float) -> str:
+    return "" if abs(power - 1) < 0.02 else f"^{power:.2g}"
+
+
+def percent(share: float) -> str:
+    """Return a share in words."""
+    if not np.isfinite(share):
+        return "nothing"
+    return f"{100 * share:.2g} %" if share < 10 else "worse than 1000 %"
+
+
+def _clusters(
+    names: Sequence[str], correlation: Array, limit: float
+) -> tuple[tuple[str, ...], ...]:
+    linked = np.nan_to_num(np.abs(correlation)) >= limit
+    _, group = csgraph.connected_components(linked, directed=False)
+    sets = [np.flatnonzero(group == label) for label in np.unique(group)]
+    return tuple(tuple(names[int(i)] for i in members) for members in sets if len(members) > 1)

@@ -1,0 +1,57 @@
+"""Rigid-body identification: torques linear in masses, inertias and friction (thesis 4.3)."""
+
+from axisight.rigid_body.base import BaseParameters, base_parameters
+from axisight.rigid_body.consistent import (
+    ConsistentParameters,
+    consistent_parameters,
+    identify_consistent,
+    prior_spread,
+    pseudo_inertia,
+)
+from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
+from axisight.rigid_body.energy import (
+    EnergyEstimate,
+    EnergyRegression,
+    energy_regression,
+    energy_regressor,
+    identify_by_energy,
+)
+from axisight.rigid_body.estimate import identify_rigid_body
+from axisight.rigid_body.findings import FindingKind, IdentificationFinding
+from axisight.rigid_body.fourier import FourierTrajectory
+from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
+from axisight.rigid_body.motion import MotionEstimate, estimate_motion
+from axisight.rigid_body.regressor import TorqueModel, torque_regressor
+from axisight.rigid_body.result import RigidBodyEstimate
+from axisight.rigid_body.trajectories import MotionLimits, TrajectoryDesign, optimize_trajectory
+
+__all__ = [
+    "USUAL_TERMS",
+    "BaseParameters",
+    "ConsistentParameters",
+    "DriveTerms",
+    "EnergyEstimate",
+    "EnergyRegression",
+    "FindingKind",
+    "FourierTrajectory",
+    "IdentificationFinding",
+    "MotionEstimate",
+    "MotionLimits",
+    "MotorCoupling",
+    "RigidBodyEstimate",
+    "TorqueModel",
+    "TrajectoryDesign",
+    "base_parameters",
+    "consistent_parameters",
+    "energy_regression",
+    "energy_regressor",
+    "estimate_motion",
+    "gear_coupling",
+    "identify_by_energy",
+    "identify_consistent",
+    "identify_rigid_body",
+    "optimize_trajectory",
+    "prior_spread",
+    "pseudo_inertia",
+    "torque_regressor",
+]

@@ -1,0 +1,256 @@
+"""Base parameters: the fewest combinations of parameters that the torques depend on.
+
+Numerically, after Gautier (1990): the regressor at random motions has the structural rank;
+columns that depend on earlier ones are grouped with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.errors import AxisightError, InputError
+from axisight.rigid_body.coupling import MotorCoupling
+from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.grouping import group
+from axisight.rigid_body.regressor import TorqueModel, as_model
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Singular values of the scaled random regressor: structural zeros are rounding, 1e-15 or so
+# of the largest, and what is not zero stays above 1e-4 in any arm that is not degenerate.
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """Base parameters of a torque model, and the way to them and back.
+
+    model
+        The torque model.
+    columns
+        Index, in the model's parameters, of the one that stands for each base parameter.
+    matrix
+        B, shape (n_base, n_parameters): base parameters are ``B @ parameters``. Columns of
+        known parameters are zero.
+    no_effect
+        Names of parameters that no motion shows.
+    known
+        Names of parameters left out because they are known.
+    singular_values
+        Of the regressor at random motions with columns scaled to unit length, largest first.
+    rank, rank_qr
+        Structural rank by singular values, and by QR with column pivoting.
+    gap
+        Last singular value that counts over the first that does not; infinite if all count.
+    """
+
+    model: TorqueModel
+    columns: NDArray[np.intp]
+    matrix: Array
+    no_effect: tuple[str, ...]
+    known: tuple[str, ...]
+    singular_values: Array
+    rank: int
+    rank_qr: int
+    gap: float
+
+    @property
+    def names(self) -> list[str]:
+        """Name of the parameter that stands for each base parameter."""
+        return [self.model.names[i] for i in self.columns]
+
+    @property
+    def units(self) -> list[str]:
+        """Unit of each base parameter."""
+        return [self.model.units[i] for i in self.columns]
+
+    @property
+    def combinations(self) -> list[str]:
+        """Each base parameter in symbols, with coefficients to four digits."""
+        return [
+            combination(self.model.names, row, int(first))
+            for row, first in zip(self.matrix, self.columns, strict=True)
+        ]
+
+    def __len__(self) -> int:
+        """Number of base parameters."""
+        return len(self.columns)
+
+    def __str__(self) -> str:
+        """One combination per line, then what has no effect."""
+        lines = [f"{i + 1:3d}  {text}" for i, text in enumerate(self.combinations)]
+        lines.append(f"no effect: {', '.join(self.no_effect) or 'none'}")
+        return "\n".join(lines)
+
+    def from_standard(self, parameters: ArrayLike) -> Array:
+        """Return base parameters of standard ones, shape (n_base,)."""
+        return self.matrix @ vector("parameters", parameters, self.model.n_parameters)
+
+    def to_standard(self, base: ArrayLike, prior: ArrayLike | None = None) -> Array:
+        """Return standard parameters with these base parameters, shape (n_parameters,).
+
+        Of the infinitely many, the one nearest to ``prior`` (default: the robot's
+        nominal values), distances measured in units of the prior's entries or, where they
+        are zero, of the average of its kind. Known parameters keep their prior value. The
+        result gives the same torques but need not be a set of links that can exist.
+        """
+        base = vector("base", base, len(self))
+        start = self.model.nominal if prior is None else prior
+        start = vector("prior", start, self.model.n_parameters)
+        units = np.array(self.model.units)
+        scale = np.abs(start)
+        for unit in np.unique(units):
+            of = units == unit
+            scale[of] = np.maximum(scale[of], scale[of].mean() or 1.0)
+        scaled = self.matrix * scale
+        step, *_ = np.linalg.lstsq(scaled, base - self.matrix @ start, rcond=None)
+        return np.asarray(start + scale * step, dtype=np.float64)
+
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
+        """Return the regressor of the base parameters, shape (n, n_rows, n_base)."""
+        return self.model.matrix(q, v, a, threads=threads)[..., self.columns]
+
+
+def base_parameters(
+    robot: Robot | TorqueModel,
+    *,
+    terms: DriveTerms | None = None,
+    side: Side | None = None,
+    coupling: MotorCoupling | None = None,
+    known: Iterable[str] = (),
+    seed: int = 0,
+) -> BaseParameters:
+    """Find the base parameters of a robot.
+
+    The regressor is evaluated at random positions (all of the circle; +-1 m), velocities and
+    accelerations, a function of ``seed``. Parameters are taken base to tip; one whose
+    column depends on those before it is grouped with them.
+
+    Parameters
+    ----------
+    robot : the robot, with the options of :func:`torque_regressor`; or a
+        :class:`TorqueModel` that holds them.
+    terms, side, coupling : see :func:`torque_regressor`.
+    known : names of parameters that need no estimate and are left out.
+    seed : of the random motions.
+
+    Raises InputError for unknown names, and AxisightError if singular values and pivoted QR
+    disagree about the rank, that is if the robot is within rounding of a degenerate one.
+
+    """
+    model = as_model(robot, terms, side, coupling)
+    known = tuple(known)
+    free = free_columns(model, known)
+    factor = random_factor(model, free, seed)
+    silent = without_effect(model, factor, free)
+    found = group(factor, TOLERANCE, skip=silent)
+    pivots = np.abs(np.diag(scipy.linalg.qr(found.scaled, mode="r", pivoting=True)[0]))
+    rank_qr = int((pivots > TOLERANCE * pivots.max(initial=0.0)).sum())
+    if not found.rank == rank_qr == len(found.independent):
+        raise AxisightError(
+            f"structural rank not clear: {found.rank} by singular values, {rank_qr} by QR with "
+            f"pivoting, {len(found.independent)} in order; is the robot nearly degenerate?"
+        )
+    matrix = np.zeros((found.rank, model.n_parameters))
+    matrix[:, free] = found.matrix
+    return BaseParameters(
+        model=model,
+        columns=free[found.independent],
+        matrix=matrix,
+        no_effect=tuple(model.names[free[i]] for i in np.flatnonzero(silent)),
+        known=known,
+        singular_values=found.singular_values,
+        rank=found.rank,
+        rank_qr=rank_qr,
+        gap=found.gap,
+    )
+
+
+def combination(names: list[str], coefficients: Array, first: int) -> str:
+    """Return a linear combination in symbols, ``first`` in front."""
+    order = [first, *(int(i) for i in np.flatnonzero(coefficients) if i != first)]
+    text = ""
+    for i in order:
+        c = coefficients[i]
+        sign = "-" if c < 0 else "+"
+        size = "" if f"{abs(c):.4g}" == "1" else f"{abs(c):.4g} "
+        if i == first:
+            text = ("-" if c < 0 else "") + size + names[i]
+        else:
+            text += f" {sign} {size}{names[i]}"
+    return text
+
+
+def free_columns(model: TorqueModel, known: Iterable[str]) -> NDArray[np.intp]:
+    """Return the indices of all parameters but the known ones."""
+    left_out = set(known)
+    unknown = left_out - set(model.names)
+    if unknown:
+        raise InputError(
+            f"known: expected names of parameters, got {', '.join(sorted(unknown))}; "
+            f"there are {', '.join(model.names)}"
+        )
+    free = np.flatnonzero([name not in left_out for name in model.names])
+    if len(free) == 0:
+        raise InputError("known: expected at least one parameter left to estimate, got all fixed")
+    return free
+
+
+def random_factor(model: TorqueModel, columns: NDArray[np.intp], seed: int) -> Array:
+    """Return the triangular factor of the regressor at random motions, k columns."""
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InputError(f"seed: expected an integer not below zero, got {seed!r}")
+    rng = np.random.default_rng(int(seed))
+    n = max(500, 10 * len(columns))
+    shape = (n, model.robot.n_joints)
+    # Prismatic joints get the same numbers in metres, within a metre or so of their zero.
+    q = rng.uniform(-np.pi, np.pi, shape)
+    v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
+    factors, _ = _core.regression_factors(
+        model.robot.core,
+        q,
+        v,
+        a,
+        np.zeros((n, model.n_rows)),
+        rows=model.row_map,
+        extras=model.extras,
+        columns=columns.tolist(),
+        known=[0.0] * model.n_parameters,
+        weight=None,
+        blocks=1,
+    )
+    k = len(columns)
+    stacked = factors[0, :, :k, :k].reshape(-1, k)
+    return np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
+
+
+def without_effect(
+    model: TorqueModel, factor: Array, columns: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Return which columns are rounding only: of links against links, of drives against drives."""
+    size = np.linalg.norm(factor, axis=0)
+    is_link = np.array([model.columns[i].extra is None for i in columns])
+    silent = np.zeros(len(columns), dtype=bool)
+    for kind in (is_link, ~is_link):
+        if kind.any():
+            silent[kind] = size[kind] <= 1e-10 * size[kind].max()
+    return silent
+
+
+def vector(field: str, value: ArrayLike, n: int) -> Array:
+    """Check a vector of n finite numbers."""
+    try:
+        x = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{field}: expected {n} numbers, got {error}") from error
+    if x.shape != (n,) or not np.isfinite(x).all():
+        got = f"shape {x.shape}" if x.shape != (n,) else "NaN or infinity"
+        raise InputError(f"{field}: expected {n} finite numbers, got {got}")
+    return x

@@ -1,0 +1,105 @@
+"""Checks of an estimate against what can be: conditioning, signs of friction and inertia."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.rigid_body.findings import FindingKind, IdentificationFinding
+from axisight.rigid_body.least_squares import Factors
+from axisight.rigid_body.result import RigidBodyEstimate
+
+Array = NDArray[np.float64]
+
+# Published advice for excitation is a condition number below 100; ten times that costs a
+# digit more than most torques have.
+MOST_CONDITION = 1e3
+# Standard errors by which something must be negative to be called so.
+CLEARLY = 3.0
+# Samples at which inertias are looked at.
+LOOKS = 50
+
+
+def condition(result: RigidBodyEstimate) -> list[IdentificationFinding]:
+    """Return a finding if the scaled regressor is badly conditioned."""
+    number = result.condition_number_scaled
+    if number < MOST_CONDITION:
+        return []
+    worst = np.argsort(-np.nan_to_num(result.relative_standard_error, posinf=0.0))[:3]
+    names = tuple(result.names[i] for i in worst)
+    text = (
+        f"condition number {number:.2g} of the scaled regressor: expected below "
+        f"{MOST_CONDITION:g}; least certain are {', '.join(names)}. Optimize the trajectory, fix "
+        "what is known, or eliminate"
+    )
+    return [IdentificationFinding(FindingKind.CONDITION, text, names=names)]
+
+
+def friction_sign(result: RigidBodyEstimate) -> list[IdentificationFinding]:
+    """Return a finding for every friction that is negative beyond doubt."""
+    out = []
+    names = zip(result.names, result.values, result.standard_error, strict=True)
+    for name, value, error in names:
+        quantity = name.split(".")[-1]
+        is_friction = quantity.endswith(("viscous_friction", "coulomb_friction"))
+        if is_friction and value < -CLEARLY * error and value < 0:
+            text = (
+                f"{name}: expected a friction not below zero, got {value:.3g} +- {error:.2g}; look "
+                "for a delay between motion and torque, or a wrong sign of one of them"
+            )
+            out.append(IdentificationFinding(FindingKind.NEGATIVE_FRICTION, text, names=(name,)))
+    return out
+
+
+def gear_sign(
+    result: RigidBodyEstimate, factors: Factors, motion: tuple[Array, Array, Array]
+) -> list[IdentificationFinding]:
+    """Return a finding for every axis whose torque opposes its acceleration.
+
+    Each axis is fitted by itself and its own inertia computed at poses of the data: an
+    axis whose gear ratio, angle or torque has the wrong sign wants a negative one, whatever
+    the others say.
+    """
+    model = result.model
+    joints = model.robot.core.axis_joints
+    q = motion[0][:: max(1, len(motion[0]) // LOOKS)]
+    # Unit acceleration of each motor (or joint) alone, and none at all.
+    units = np.zeros((len(joints) + 1, model.robot.n_joints))
+    alone = np.linalg.inv(model.coupling.position).T
+    units[:-1, joints] = alone if model.side == "motor" else np.eye(len(joints))
+    at = np.tile(q, (len(units), 1))
+    still = np.zeros_like(at)
+    looks = model.matrix(at, still, np.repeat(units, len(q), axis=0))
+    looks = looks.reshape(len(units), len(q), model.n_rows, model.n_parameters).mean(axis=1)
+    held = np.array([result.known.get(name, 0.0) for name in model.names])
+    out = []
+    for axis, joint in enumerate(joints):
+        row = axis if model.side == "motor" else joint
+        inertia = (looks[axis] - looks[-1])[row]
+        known_part = float(inertia @ held)
+        value, error = _axis_alone(factors, row, inertia[result.base.columns])
+        if value + known_part < -CLEARLY * error:
+            name = model.robot.joint_names[joint]
+            text = (
+                f"{name}: by itself its torque wants a negative inertia, {value + known_part:.3g} "
+                f"+- {error:.2g} kg m^2: torque and acceleration have opposite signs. Check the "
+                "sign of its gear ratio, of its angle and of its torque"
+            )
+            out.append(IdentificationFinding(FindingKind.GEAR_SIGN, text, names=(name,)))
+    return out
+
+
+def _axis_alone(factors: Factors, row: int, direction: Array) -> tuple[float, float]:
+    """Value and standard error of a combination, from one row only, of least norm."""
+    k = factors.k
+    r = factors.rows[row]
+    size = np.linalg.norm(r[:, :k], axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    u, s, vt = np.linalg.svd(r[:, :k] / scale, full_matrices=False)
+    good = s > 1e-6 * s.max(initial=0.0)
+    weight = (vt[good] @ (direction / scale)) / s[good]
+    value = float(weight @ (u[:, good].T @ r[:, k]))
+    rest = r[:, k] - u[:, good] @ (u[:, good].T @ r[:, k])
+    free = max(float(factors.counts[row]) - int(good.sum()), 1.0)
+    error = float(np.linalg.norm(weight) * np.sqrt(rest @ rest / free))
+    return value, error

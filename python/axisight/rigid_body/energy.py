@@ -1,0 +1,273 @@
+"""The energy (integral) model (4.3): what the motors put in is stored or rubbed away.
+
+No accelerations are needed. Over a window from t_a to t_b,
+
+    E(t_b) - E(t_a) + losses = integral of torque times speed
+
+is one equation, linear in the same parameters as the torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.integrate
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.errors import IdentifiabilityError, InputError
+from axisight.rigid_body.base import BaseParameters
+from axisight.rigid_body.estimate import DATA_TOLERANCE, default_blocks, known_base, numbers
+from axisight.rigid_body.grouping import group
+from axisight.rigid_body.least_squares import (
+    Factors,
+    block_covariance,
+    solve_weighted,
+    triangle,
+)
+from axisight.rigid_body.regressor import TorqueModel, rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyRegression:
+    """Equations of the energy model, one per window.
+
+    matrix
+        Shape (n_windows, n_parameters), parameters of the torque model [J per unit].
+    work_j
+        Work of the torques over each window, shape (n_windows,) [J].
+    start, stop
+        First and last sample of each window.
+    """
+
+    matrix: Array
+    work_j: Array
+    start: NDArray[np.intp]
+    stop: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyEstimate:
+    """Base parameters from the energy model.
+
+    base
+        What the parameters are.
+    values, covariance
+        Base parameters (n_base,) and their covariance (n_base, n_base) from the scatter of
+        blocks of windows.
+    degrees_of_freedom
+        Of that scatter, per parameter.
+    residual_rms_j, relative_error
+        Root mean square of the residual [J], and over that of the work.
+    condition_number_scaled
+        Of the regressor with its columns at unit length.
+    """
+
+    base: BaseParameters
+    values: Array
+    covariance: Array
+    degrees_of_freedom: Array
+    residual_rms_j: float
+    relative_error: float
+    condition_number_scaled: float
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard errors, shape (n_base,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def identify_by_energy(
+    regression: EnergyRegression,
+    model: TorqueModel,
+    *,
+    base: BaseParameters | None = None,
+    known: Mapping[str, float] | None = None,
+    blocks: int | None = None,
+) -> EnergyEstimate:
+    """Estimate the base parameters by least squares on the energy model.
+
+    Parameters
+    ----------
+    regression : from :func:`energy_regression`, with the same model.
+    model : the torque model.
+    base : base parameters found before, with the same known ones.
+    known : parameters and the values to hold them at, by name.
+    blocks : number of blocks of consecutive windows for the standard errors; default 30 with
+        at least two windows each.
+
+    Raises InputError for unknown names, IdentifiabilityError where the windows do not
+    determine the parameters.
+
+    """
+    known = numbers("known", known)
+    base = known_base(model, base, known)
+    held = np.array([known.get(name, 0.0) for name in model.names])
+    rest = regression.work_j - regression.matrix @ held
+    matrix = regression.matrix[:, base.columns]
+    n, k = matrix.shape
+    found = group(matrix, DATA_TOLERANCE)
+    if len(found.independent) < k:
+        raise IdentifiabilityError(
+            f"regression: expected windows of rank {k}, got {len(found.independent)} from {n} "
+            "windows; take shorter or overlapping windows or a richer motion"
+        )
+    count = default_blocks(blocks, n, least=2)
+    ends = np.arange(count + 1) * n // count
+    rows_of = np.column_stack([matrix, rest])
+    factor = np.stack([triangle(rows_of[i:j])[None] for i, j in pairwise(ends)])
+    factors = Factors(factor, np.array([float(n)]))
+    solution = solve_weighted(factors, np.ones(1))
+    covariance, freedom = block_covariance(factors, solution)
+    residual = float(np.sqrt(solution.loss[0] / n))
+    size = float(np.sqrt((regression.work_j**2).mean()))
+    r = solution.normal
+    return EnergyEstimate(
+        base=base,
+        values=solution.values,
+        covariance=covariance,
+        degrees_of_freedom=freedom,
+        residual_rms_j=residual,
+        relative_error=residual / size if size > 0 else float("nan"),
+        condition_number_scaled=float(np.linalg.cond(r / np.linalg.norm(r, axis=0))),
+    )
+
+
+def energy_regressor(model: TorqueModel, q: ArrayLike, v: ArrayLike) -> Array:
+    """Return stored energy per unit of each parameter, shape (n, n_parameters) [J].
+
+    ``q`` and ``v`` are joint angles [rad] and velocities [rad/s], (n, n_joints).
+
+    Kinetic and potential energy of the links, kinetic energy of rotors, elastic energy of
+    springs; zero in the columns of friction and offsets, which store nothing. With the
+    parameters of the robot it gives the energy of :meth:`axisight.Robot` up to a constant.
+    """
+    q = rows("q", q, model.robot.n_joints)
+    v = rows("v", v, model.robot.n_joints)
+    if len(v) != len(q):
+        raise InputError(f"v: expected {len(q)} rows as q, got {len(v)}")
+    out = np.zeros((len(q), model.n_parameters))
+    links = _core.energy_regressor(model.robot.core, q, v)
+    out[:, : links.shape[1]] = links
+    for i, column in enumerate(model.columns):
+        if column.extra is None:
+            continue
+        signal, motion = column.extra[0], np.array(column.extra[1])
+        if signal == "acceleration":
+            out[:, i] = 0.5 * (v @ motion) ** 2
+        elif signal == "position":
+            out[:, i] = 0.5 * (q @ motion) ** 2
+    return out
+
+
+def energy_regression(
+    model: TorqueModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    torque_nm: ArrayLike,
+    *,
+    sample_time_s: float,
+    window_s: float,
+    overlap: float = 0.0,
+) -> EnergyRegression:
+    """Set up the equations of the energy model over windows of a motion.
+
+    Parameters
+    ----------
+    model : a :class:`TorqueModel`; its side is that of the torques.
+    q, v : (n, n_joints) uniformly sampled joint angles and velocities [rad, rad/s].
+    torque_nm : (n, n_joints) or (n, n_axes) torques [Nm].
+    sample_time_s : sample time [s].
+    window_s : length of a window [s]. Longer ones average noise, shorter ones give more equations.
+    overlap : share of a window that the next one repeats, 0 to below 1.
+
+    Work and friction losses are integrated by Simpson's rule. Raises InputError naming the
+    field, also for torque couplings that are not the transpose of the position coupling: what
+    such a gearbox loses depends on the direction of power.
+
+    """
+    _check_coupling(model)
+    stored = energy_regressor(model, q, v)
+    v = rows("v", v, model.robot.n_joints)
+    torque = rows("torque_nm", torque_nm, model.n_rows)
+    if len(torque) != len(v):
+        raise InputError(f"torque_nm: expected {len(v)} rows as q, got {len(torque)}")
+    start, stop = _windows(len(v), sample_time_s, window_s, overlap)
+    lost = _integral(_loss_rates(model, v), sample_time_s)
+    work = _integral((torque * (v @ _speeds(model).T)).sum(axis=1, keepdims=True), sample_time_s)
+    total = stored + lost
+    return EnergyRegression(
+        matrix=total[stop] - total[start],
+        work_j=(work[stop] - work[start])[:, 0],
+        start=start,
+        stop=stop,
+    )
+
+
+def _speeds(model: TorqueModel) -> Array:
+    """Speeds that the rows' torques work on, as combinations of joints."""
+    n = model.robot.n_joints
+    if model.side == "joint":
+        return np.eye(n)
+    return model.coupling.position @ np.eye(n)[model.robot.core.axis_joints]
+
+
+def _loss_rates(model: TorqueModel, v: Array) -> Array:
+    """Power lost per unit of each parameter."""
+    out = np.zeros((len(v), model.n_parameters))
+    for i, column in enumerate(model.columns):
+        if column.extra is None:
+            continue
+        signal, motion, _, dead_band, smoothing = column.extra
+        speed = v @ np.array(motion)
+        if signal == "velocity":
+            out[:, i] = speed**2
+        elif signal == "constant":
+            out[:, i] = speed
+        elif signal == "direction":
+            sign = np.tanh(speed / smoothing) if smoothing > 0 else np.sign(speed)
+            out[:, i] = np.where(np.abs(speed) > dead_band, sign * speed, 0.0)
+    return out
+
+
+def _integral(rates: Array, sample_time_s: float) -> Array:
+    """Integral from the start, at every sample."""
+    if len(rates) < 3:
+        out = scipy.integrate.cumulative_trapezoid(rates, dx=sample_time_s, axis=0, initial=0)
+    else:
+        zero = np.zeros((1, rates.shape[1]))
+        out = scipy.integrate.cumulative_simpson(rates, dx=sample_time_s, axis=0, initial=zero)
+    return np.asarray(out, dtype=np.float64)
+
+
+def _windows(
+    n: int, sample_time_s: float, window_s: float, overlap: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    for field, value in (("sample_time_s", sample_time_s), ("window_s", window_s)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{field}: expected a positive number, got {value!r}")
+    if not 0 <= overlap < 1:
+        raise InputError(f"overlap: expected a number from 0 to below 1, got {overlap!r}")
+    length = round(window_s / sample_time_s)
+    if not 1 <= length < n:
+        raise InputError(
+            f"window_s: expected {sample_time_s} to {(n - 1) * sample_time_s:g} s for {n} samples, "
+            f"got {window_s!r}"
+        )
+    step = max(1, round(length * (1 - overlap)))
+    start = np.arange(0, n - length, step, dtype=np.intp)
+    return start, start + length
+
+
+def _check_coupling(model: TorqueModel) -> None:
+    c = model.coupling
+    if not np.allclose(c.torque, c.position.T, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "coupling: expected a torque coupling that is the transpose of the position coupling, "
+            "got another one: its gearbox neither stores nor loses as the model says"
+        )

@@ -1,0 +1,49 @@
+"""What a regression says about its data, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class FindingKind(StrEnum):
+    """What a finding is about."""
+
+    RANK = "rank"
+    """The data do not separate all base parameters; some were grouped further."""
+    CONDITION = "condition"
+    """The regression is badly conditioned: small errors of the data become large ones."""
+    REVERSAL = "reversal"
+    """An axis hardly ever reverses: its Coulomb friction rests on little or nothing."""
+    GEAR_SIGN = "gear_sign"
+    """An axis by itself wants a negative inertia: gear ratio or torque have the wrong sign."""
+    NEGATIVE_FRICTION = "negative_friction"
+    """Friction that drives."""
+    WEIGHTS = "weights"
+    """Row weights did not settle."""
+    ELIMINATED = "eliminated"
+    """Parameters were set to zero because the data do not show them."""
+
+
+@dataclass(frozen=True)
+class IdentificationFinding:
+    """One observation about a regression.
+
+    kind
+        See :class:`FindingKind`.
+    message
+        What was seen, with figures, and what to do about it.
+    serious
+        True if the estimate is not to be trusted without a look at it.
+    names
+        Parameters or rows concerned.
+    """
+
+    kind: FindingKind
+    message: str
+    serious: bool = True
+    names: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """One line for a person."""
+        return self.message

@@ -1,0 +1,247 @@
+"""Linear regression from triangular factors, one per block of samples and row.
+
+Everything here works on the factors of ``[Phi | tau]`` (:func:`axisight._core.regression_factors`)
+and costs the same for a thousand samples or a billion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """Triangular factors.
+
+    blocks
+        Shape (n_blocks, n_rows, k + 1, k + 1); the last column is the torque.
+    counts
+        Samples behind each row, shape (n_rows,).
+    """
+
+    blocks: Array
+    counts: Array
+
+    @property
+    def k(self) -> int:
+        """Number of parameters."""
+        return int(self.blocks.shape[-1]) - 1
+
+    @cached_property
+    def rows(self) -> Array:
+        """One factor per row, shape (n_rows, k + 1, k + 1)."""
+        stacked = self.blocks.swapaxes(0, 1).reshape(self.blocks.shape[1], -1, self.k + 1)
+        return triangle(stacked)
+
+    def columns(self, keep: NDArray[np.intp] | list[int]) -> Factors:
+        """Return the factors of some of the parameters."""
+        keep = np.asarray(keep, dtype=np.intp)
+        return Factors(self.blocks[..., np.append(keep, self.k)], self.counts)
+
+    def combined(self, basis: Array) -> Factors:
+        """Return the factors for new parameters p, old ones being ``basis @ p``."""
+        k = self.k
+        blocks = np.concatenate([self.blocks[..., :k] @ basis, self.blocks[..., k:]], axis=-1)
+        return Factors(blocks, self.counts)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A regression.
+
+    values
+        Parameters, shape (k,).
+    weight
+        Weight of each row, shape (n_rows,).
+    normal
+        Upper triangular factor of the matrix whose inverse gives the white covariance.
+    sigma
+        Standard deviation of the residual of each row [Nm].
+    loss
+        Sum of squared residuals of each row [Nm^2].
+    iterations, converged
+        Of the row weights.
+    noise
+        Standard deviation of the error of each column over that of the torque (total least
+        squares), else zero.
+    """
+
+    values: Array
+    weight: Array
+    normal: Array
+    sigma: Array
+    loss: Array
+    iterations: int
+    converged: bool
+    noise: Array
+
+
+def triangle(stack: Array) -> Array:
+    """Triangular factor with as many rows as columns, zero rows filled in."""
+    n = stack.shape[-1]
+    out: Array = np.asarray(np.linalg.qr(stack, mode="r"), dtype=np.float64)
+    missing = n - out.shape[-2]
+    if missing <= 0:
+        return out
+    padding = np.zeros((*out.shape[:-2], missing, n))
+    return np.concatenate([out, padding], axis=-2)
+
+
+def solve_weighted(factors: Factors, weight: Array) -> Solution:
+    """Least squares with a weight per row (4.5)."""
+    k, rows = factors.k, factors.rows
+    r = triangle((weight[:, None, None] * rows).reshape(-1, k + 1))
+    values = _back(r[:k, :k], r[:k, k])
+    residual = rows[..., :k] @ values - rows[..., k]
+    loss = (residual**2).sum(axis=-1)
+    # What the fit takes off the degrees of freedom of each row.
+    hat = weight[:, None, None] * _right_divide(rows[..., :k], r[:k, :k])
+    free = np.maximum(factors.counts - (hat**2).sum(axis=(1, 2)), 1.0)
+    return Solution(
+        values=values,
+        weight=weight,
+        normal=r[:k, :k],
+        sigma=np.sqrt(loss / free),
+        loss=loss,
+        iterations=1,
+        converged=True,
+        noise=np.zeros(k),
+    )
+
+
+def solve_reweighted(factors: Factors, floor: Array, iterations: int = 50) -> Solution:
+    """Least squares with each row weighted by its own residual, iterated until that stands.
+
+    ``floor`` [Nm] keeps a row that fits to rounding from taking all the weight.
+    """
+    solution = solve_weighted(factors, np.ones(len(factors.counts)))
+    for iteration in range(2, iterations + 1):
+        before = np.maximum(solution.sigma, floor)
+        solution = solve_weighted(factors, 1.0 / before)
+        after = np.maximum(solution.sigma, floor)
+        if np.abs(after / before - 1.0).max() < 1e-8:
+            return _counted(solution, iteration, True)
+    return _counted(solution, iterations, False)
+
+
+def _counted(solution: Solution, iterations: int, converged: bool) -> Solution:
+    changes = {"iterations": iterations, "converged": converged}
+    return Solution(**{**solution.__dict__, **changes})
+
+
+def solve_total(factors: Factors, start: Solution, noise: Array) -> Solution | None:
+    """Total least squares: errors in the regressor too (Golub and Van Loan 1980).
+
+    ``noise`` holds the standard deviation of each column's error over the torque's, zero
+    for columns without error (mixed problem, Van Huffel and Vandewalle 1991). Rows are
+    weighted as in ``start``. None if no solution exists.
+    """
+    k, rows, weight = factors.k, factors.rows, start.weight
+    noisy = noise > 0
+    order = np.concatenate([np.flatnonzero(~noisy), np.flatnonzero(noisy)])
+    scale = np.where(noisy, noise, 1.0)[order]
+    stack = (weight[:, None, None] * rows).reshape(-1, k + 1)
+    r = triangle(np.column_stack([stack[:, order] / scale, stack[:, k]]))
+    exact = int((~noisy).sum())
+    direction = np.linalg.svd(r[exact:, exact:])[2][-1]
+    if abs(direction[-1]) < 1e-8:
+        return None
+    scaled = np.empty(k)
+    scaled[exact:] = -direction[:-1] / direction[-1]
+    right = r[:exact, k] - r[:exact, exact:k] @ scaled[exact:]
+    scaled[:exact] = _back(r[:exact, :exact], right)
+    values = np.empty(k)
+    values[order] = scaled / scale
+    residual = rows[..., :k] @ values - rows[..., k]
+    loss = (residual**2).sum(axis=-1)
+    spread = 1.0 + noise**2 @ values**2
+    floor = (weight**2 @ loss) / spread
+    a = stack[:, :k]
+    normal = np.linalg.cholesky(a.T @ a - floor * np.diag(noise**2), upper=True)
+    return Solution(
+        values=values,
+        weight=weight,
+        normal=np.asarray(normal),
+        sigma=np.sqrt(loss / factors.counts),
+        loss=loss,
+        iterations=start.iterations,
+        converged=start.converged,
+        noise=noise,
+    )
+
+
+def white_covariance(factors: Factors, solution: Solution) -> Array:
+    """Covariance for residuals that are white, of each row its own variance."""
+    k = factors.k
+    scaled = (solution.weight**2 * solution.sigma)[:, None, None] * factors.rows[..., :k]
+    root = _right_divide(scaled.reshape(-1, k), solution.normal)
+    inverse = _back(solution.normal, np.eye(k))
+    half = root @ inverse.T
+    return np.asarray(half.T @ half, dtype=np.float64)
+
+
+def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array]:
+    """Covariance from the scatter of the blocks, and degrees of freedom per parameter.
+
+    The sandwich for residuals that are correlated in time within blocks and between rows,
+    each block's residuals enlarged by what the fit has taken from them, so that it is
+    unbiased where residuals are white; degrees of freedom by Satterthwaite's rule (Bell and
+    McCaffrey 2002, the correction called CR2).
+    """
+    k, weight = factors.k, solution.weight
+    n_blocks = len(factors.blocks)
+    stacked = (weight[:, None, None] * factors.blocks).reshape(n_blocks, -1, k + 1)
+    r = triangle(stacked)
+    residual = r[..., :k] @ solution.values - r[..., k]
+    lever = _right_divide(r[..., :k], solution.normal)
+    share = lever @ lever.swapaxes(-1, -2)
+    values, vectors = np.linalg.eigh(np.eye(k + 1) - share)
+    # A direction that one block alone decides shows no scatter.
+    grow = np.where(values > 1e-8, 1.0 / np.sqrt(np.maximum(values, 1e-8)), 0.0)
+    enlarge = (vectors * grow[:, None, :]) @ vectors.swapaxes(-1, -2)
+    score = np.einsum("bij,bi->bj", lever, (enlarge @ residual[..., None])[..., 0])
+    if solution.noise.any():
+        score -= _error_in_columns(solution, residual)
+    inverse = _back(solution.normal, np.eye(k))
+    change = score @ inverse.T
+    pull = enlarge @ lever
+    freedom = np.array([_freedom(pull, lever, row) for row in inverse])
+    return np.asarray(change.T @ change, dtype=np.float64), freedom
+
+
+def _error_in_columns(solution: Solution, residual: Array) -> Array:
+    """What errors in the columns put into the scores of total least squares."""
+    spread = 1.0 + solution.noise**2 @ solution.values**2
+    loss = (residual**2).sum(axis=1)
+    pull = solution.noise**2 * solution.values / spread
+    return np.outer(loss, np.linalg.solve(solution.normal.T, pull))
+
+
+def _freedom(pull: Array, lever: Array, row: Array) -> float:
+    """Degrees of freedom of the scatter of one parameter, residuals taken as white."""
+    u = pull @ row
+    s = np.einsum("bij,bi->bj", lever, u)
+    g = np.diag((u**2).sum(axis=1)) - s @ s.T
+    square = (g**2).sum()
+    return float(np.trace(g) ** 2 / square) if square > 0 else 1.0
+
+
+def _back(r: Array, right: Array) -> Array:
+    """Solve with an upper triangular matrix."""
+    if len(r) == 0:
+        return np.zeros_like(right)
+    return np.asarray(scipy.linalg.solve_triangular(r, right), dtype=np.float64)
+
+
+def _right_divide(a: Array, r: Array) -> Array:
+    """``a r^-1`` for an upper triangular r."""
+    flat = a.reshape(-1, a.shape[-1])
+    out = scipy.linalg.solve_triangular(r, flat.T, trans="T").T
+    return np.asarray(out.reshape(a.shape), dtype=np.float64)

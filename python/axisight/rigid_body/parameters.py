@@ -1,0 +1,108 @@
+"""Names, units and nominal values of the parameters of a torque model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.rigid_body.coupling import MotorCoupling
+from axisight.rigid_body.friction import KINDS, DriveTerms
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+Extra = tuple[str, list[float], list[float], float, float]
+
+# Quantity of each link parameter and its unit, in the order of the regressor.
+LINK_QUANTITIES = (
+    ("mass", "kg"),
+    ("mass_x", "kg m"),
+    ("mass_y", "kg m"),
+    ("mass_z", "kg m"),
+    ("inertia_xx", "kg m^2"),
+    ("inertia_yy", "kg m^2"),
+    ("inertia_zz", "kg m^2"),
+    ("inertia_xy", "kg m^2"),
+    ("inertia_xz", "kg m^2"),
+    ("inertia_yz", "kg m^2"),
+)
+
+_UNITS = {
+    "inertia": ("kg m^2", "kg"),
+    "viscous": ("Nm s/rad", "N s/m"),
+    "coulomb": ("Nm", "N"),
+    "offset": ("Nm", "N"),
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """One parameter: name, unit, nominal value, and its extra column in the core if it has one."""
+
+    name: str
+    unit: str
+    nominal: float
+    extra: Extra | None = None
+
+
+def link_columns(robot: Robot) -> list[Column]:
+    """Return the standard inertial parameters of every link that has mass.
+
+    ``<joint>.mass``, ``mass_x`` .. ``mass_z`` (first moments) and ``inertia_xx`` ..
+    ``inertia_yz`` about the origin of the link frame, in link axes.
+    """
+    links, values = _core.inertial_parameters(robot.core)
+    names = robot.joint_names
+    return [
+        Column(f"{names[joint]}.{quantity}", unit, float(value))
+        for joint, block in zip(links, values.reshape(-1, len(LINK_QUANTITIES)), strict=True)
+        for (quantity, unit), value in zip(LINK_QUANTITIES, block, strict=True)
+    ]
+
+
+def drive_columns(
+    robot: Robot, terms: DriveTerms, coupling: MotorCoupling, row_map: Array
+) -> list[Column]:
+    """Return the columns of rotors, friction and offsets, axis by axis, then springs.
+
+    ``row_map`` (n_rows, n_joints) is what the rows of the regression make of joint torques.
+    """
+    joints = robot.core.axis_joints
+    place = np.zeros((robot.n_axes, robot.n_joints))
+    place[np.arange(robot.n_axes), joints] = 1.0
+    # Motor angles of joint angles, and rows of motor torques.
+    motor_motion = coupling.position @ place
+    motor_rows = row_map @ place.T @ coupling.torque
+    # In motor-side rows a motor torque is itself; rounding of the inverse has no place there.
+    motor_rows[np.abs(motor_rows) < 1e-13 * np.abs(motor_rows).max()] = 0.0
+    nominal = dict(robot.core.parameters())
+    columns = []
+    for axis, joint in enumerate(joints):
+        prismatic = robot.core.axis_is_prismatic[axis]
+        for kind, signal, motor_name, joint_name in KINDS:
+            for side in terms.sides(kind):
+                motor = side == "motor"
+                name = f"{robot.joint_names[joint]}.{motor_name if motor else joint_name}"
+                motion = motor_motion[axis] if motor else place[axis]
+                rows = motor_rows[:, axis] if motor else row_map[:, joint]
+                extra = (signal, motion.tolist(), rows.tolist(), *terms.settings(kind))
+                unit = _UNITS[kind][prismatic and not motor]
+                columns.append(Column(name, unit, nominal.get(name, 0.0), extra))
+    return columns + (_springs(robot, nominal, row_map) if terms.springs else [])
+
+
+def _springs(robot: Robot, nominal: dict[str, float], row_map: Array) -> list[Column]:
+    columns = []
+    for joint in sorted(set(range(robot.n_joints)) - set(robot.core.axis_joints)):
+        motion = np.eye(robot.n_joints)[joint].tolist()
+        # Without a motor the torque on the row is zero: inertia + K q + D q' = 0.
+        for quantity, unit, signal in (
+            ("stiffness", "Nm/rad", "position"),
+            ("damping", "Nm s/rad", "velocity"),
+        ):
+            name = f"{robot.joint_names[joint]}.{quantity}"
+            extra = (signal, motion, row_map[:, joint].tolist(), 0.0, 0.0)
+            columns.append(Column(name, unit, nominal[name], extra))
+    return columns

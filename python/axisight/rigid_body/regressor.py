@@ -1,0 +1,221 @@
+"""The torque of a chain as a linear function of its parameters (thesis (4.2))."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
+from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.parameters import Column, drive_columns, link_columns
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class TorqueModel:
+    """What is regressed: robot, drive terms, side of the torques, couplings.
+
+    Parameters
+    ----------
+    robot : chain and gears. Its masses and inertias are nominal values only.
+    terms : rotor, friction, offset and spring parameters; default none.
+    side : ``"joint"``: torques of all joints; ``"motor"``: motor torques of the driven axes.
+    coupling : gears between motors and joints; default the gear ratios of the robot.
+
+    Motions are always those of all joints, (n, n_joints) [rad, rad/s, rad/s^2]; on a
+    prismatic joint rad reads m and Nm reads N. Motors and gears count as rigid.
+
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        terms: DriveTerms | None = None,
+        side: Side = "joint",
+        coupling: MotorCoupling | None = None,
+    ) -> None:
+        if side not in ("motor", "joint"):
+            raise InputError(f'side: expected "motor" or "joint", got {side!r}')
+        self.robot = robot
+        self.terms = DriveTerms() if terms is None else terms
+        self.side: Side = side
+        self.coupling = gear_coupling(robot) if coupling is None else coupling
+        if self.coupling.n_axes != robot.n_axes:
+            raise InputError(
+                f"coupling: expected matrices for {robot.n_axes} axes, got {self.coupling.n_axes}"
+            )
+
+    @cached_property
+    def row_map(self) -> Array:
+        """Rows as combinations of joint torques, shape (n_rows, n_joints)."""
+        identity = np.eye(self.robot.n_joints)
+        if self.side == "joint":
+            return identity
+        driven = identity[self.robot.core.axis_joints]
+        rows: Array = np.linalg.solve(self.coupling.torque, driven).astype(np.float64)
+        rows[np.abs(rows) < 1e-14 * np.abs(rows).max()] = 0.0
+        return rows
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Parameters: ten for each link with mass, then those of the drives, then springs."""
+        drives = drive_columns(self.robot, self.terms, self.coupling, self.row_map)
+        return (*link_columns(self.robot), *drives)
+
+    @property
+    def n_rows(self) -> int:
+        """Torques per sample: joints on the joint side, axes on the motor side."""
+        return len(self.row_map)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of parameters."""
+        return len(self.columns)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Names of the parameters, ``<joint>.<quantity>``."""
+        return [column.name for column in self.columns]
+
+    @property
+    def units(self) -> list[str]:
+        """Units of the parameters."""
+        return [column.unit for column in self.columns]
+
+    @property
+    def nominal(self) -> Array:
+        """Values in the robot file, shape (n_parameters,); what it does not hold is zero."""
+        return np.array([column.nominal for column in self.columns])
+
+    @property
+    def row_names(self) -> list[str]:
+        """Names of the rows: joints."""
+        names = self.robot.joint_names
+        return names if self.side == "joint" else [names[j] for j in self.robot.core.axis_joints]
+
+    @property
+    def row_dim(self) -> str:
+        """Name of the dimension of rows."""
+        return "joint" if self.side == "joint" else "axis"
+
+    @property
+    def row_labels(self) -> list[str] | list[int]:
+        """Coordinates of the rows: joint names, or axis numbers from 1."""
+        return self.row_names if self.side == "joint" else self.robot.axis_numbers()
+
+    @cached_property
+    def extras(self) -> list[tuple[str, list[float], list[float], float, float]]:
+        """Extra columns as the core takes them."""
+        return [column.extra for column in self.columns if column.extra is not None]
+
+    def motion(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
+        """Check a motion and return it as float64 arrays (n, n_joints)."""
+        arrays = [
+            rows(name, value, self.robot.n_joints) for name, value in (("q", q), ("v", v), ("a", a))
+        ]
+        for name, array in zip(("v", "a"), arrays[1:], strict=True):
+            if len(array) != len(arrays[0]):
+                raise InputError(f"{name}: expected {len(arrays[0])} rows as q, got {len(array)}")
+        return arrays[0], arrays[1], arrays[2]
+
+    def matrix(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
+        """Return the regressor, shape (n, n_rows, n_parameters)."""
+        q, v, a = self.motion(q, v, a)
+        return _core.torque_regressor(
+            self.robot.core, q, v, a, rows=self.row_map, extras=self.extras, threads=threads
+        )
+
+
+def as_model(
+    robot: Robot | TorqueModel,
+    terms: DriveTerms | None,
+    side: Side | None,
+    coupling: MotorCoupling | None,
+) -> TorqueModel:
+    """Return the torque model of a robot and options, or the model given in its place."""
+    if isinstance(robot, TorqueModel):
+        if not (terms is None and side is None and coupling is None):
+            raise InputError(
+                "terms, side, coupling: expected none of them with a TorqueModel, which holds them"
+            )
+        return robot
+    if not isinstance(robot, Robot):
+        raise InputError(f"robot: expected a Robot or a TorqueModel, got {type(robot).__name__}")
+    return TorqueModel(robot, terms=terms, side=side or "joint", coupling=coupling)
+
+
+def torque_regressor(
+    robot: Robot,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    *,
+    terms: DriveTerms | None = None,
+    side: Side = "joint",
+    coupling: MotorCoupling | None = None,
+    threads: int = 0,
+) -> xr.DataArray:
+    """Return the regressor H of (4.2): torques are ``H @ parameters``.
+
+    Parameters
+    ----------
+    robot : chain and gears.
+    q, v, a : (n, n_joints) joint angles, velocities, accelerations [rad, rad/s, rad/s^2].
+    terms : rotor, friction and offset parameters of every axis; default none.
+    side : ``"joint"``: rows are torques of all joints [Nm]; ``"motor"``: motor torques of
+        the driven axes [Nm].
+    coupling : gears between motors and joints; default the gear ratios of the robot.
+    threads : threads to use, 0 for all; the result does not depend on it.
+
+    Returns
+    -------
+    DataArray (sample, joint, parameter), or (sample, axis, parameter) on the motor side.
+    Parameters are, for every link with mass, ``<joint>.mass`` [kg], ``mass_x``, ``mass_y``,
+    ``mass_z`` (first moments m c [kg m]) and ``inertia_xx`` .. ``inertia_yz`` (about the
+    origin of the link frame, link axes [kg m^2]), then those of ``terms``; coordinates
+    ``unit`` and ``nominal`` (values of the robot) go along ``parameter``. With them
+    the regressor gives inverse dynamics. Raises InputError for wrong shapes and non-finite
+    values.
+
+    """
+    model = TorqueModel(robot, terms=terms, side=side, coupling=coupling)
+    return xr.DataArray(
+        model.matrix(q, v, a, threads=threads),
+        dims=("sample", model.row_dim, "parameter"),
+        coords={
+            model.row_dim: model.row_labels,
+            "parameter": model.names,
+            "unit": ("parameter", model.units),
+            "nominal": ("parameter", model.nominal),
+        },
+        attrs={"units": "Nm per unit of the parameter", "side": side},
+    )
+
+
+def rows(field: str, value: ArrayLike, width: int) -> Array:
+    """Check an array (n, width) of finite numbers, at least one row."""
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in "fiu":
+            raise TypeError(f"{raw.dtype} numbers")
+        x = np.ascontiguousarray(raw, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{field}: expected real numbers of shape (n, {width}), got {error}"
+        ) from error
+    if x.ndim != 2 or x.shape[1] != width or len(x) == 0:
+        raise InputError(f"{field}: expected shape (n, {width}), n at least 1, got {x.shape}")
+    bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{field}: expected finite numbers, got {len(bad)} rows with NaN or infinity, "
+            f"the first at row {bad[0]}"
+        )
+    return x

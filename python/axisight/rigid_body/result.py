@@ -1,0 +1,245 @@
+"""The result of a rigid-body identification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.stats
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.errors import InputError
+from axisight.rigid_body.base import BaseParameters
+from axisight.rigid_body.findings import IdentificationFinding
+from axisight.rigid_body.least_squares import Solution
+from axisight.rigid_body.regressor import TorqueModel, rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBodyEstimate:
+    """Base parameters with their uncertainty, and how well they explain the torques.
+
+    base
+        What the parameters are.
+    method
+        ``"ls"``, ``"wls"`` or ``"tls"``.
+    values
+        Base parameters, shape (n_base,), units ``base.units``; eliminated ones are zero.
+    covariance
+        From the scatter of blocks, shape (n_base, n_base): holds for residuals that are
+        correlated in time and between axes.
+    covariance_white
+        The same if residuals were white, of each row its own variance.
+    degrees_of_freedom
+        Of the block scatter, per parameter, shape (n_base,).
+    residual_rms_nm, relative_error
+        Per row: root mean square of the residual [Nm], and over that of the torque.
+    residual_std_nm
+        Per row, with the degrees of freedom that the fit has taken.
+    condition_number, condition_number_scaled
+        Of the weighted regressor, and with its columns at unit length.
+    known
+        Parameters held fixed.
+    eliminated
+        Base parameters set to zero.
+    iterations, converged
+        Of the row weights.
+    n_samples, n_blocks
+        Behind the estimate and behind its scatter.
+    findings
+        What is doubtful about it.
+    """
+
+    base: BaseParameters
+    method: str
+    values: Array
+    covariance: Array
+    covariance_white: Array
+    degrees_of_freedom: Array
+    residual_rms_nm: Array
+    residual_std_nm: Array
+    relative_error: Array
+    condition_number: float
+    condition_number_scaled: float
+    known: Mapping[str, float]
+    eliminated: tuple[str, ...]
+    iterations: int
+    converged: bool
+    n_samples: int
+    n_blocks: int
+    findings: tuple[IdentificationFinding, ...]
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        base: BaseParameters,
+        keep: NDArray[np.intp],
+        method: str,
+        solution: Solution,
+        covariance: Array,
+        covariance_white: Array,
+        freedom: Array,
+        known: Mapping[str, float],
+        torque: Array,
+        weight: Array | None,
+        n_blocks: int,
+        findings: tuple[IdentificationFinding, ...],
+    ) -> RigidBodyEstimate:
+        """Put a solution for some of the base parameters together."""
+        n = len(base)
+        values, degrees = np.zeros(n), np.full(n, np.inf)
+        values[keep], degrees[keep] = solution.values, freedom
+        at = np.ix_(keep, keep)
+        full, full_white = np.zeros((n, n)), np.zeros((n, n))
+        full[at], full_white[at] = covariance, covariance_white
+        w = np.ones_like(torque) if weight is None else weight
+        total = np.maximum((w**2).sum(axis=0), 1e-300)
+        rms = np.sqrt(solution.loss / total)
+        size = np.sqrt(((w * torque) ** 2).sum(axis=0) / total)
+        r = solution.normal
+        return cls(
+            base=base,
+            method=method,
+            values=values,
+            covariance=full,
+            covariance_white=full_white,
+            degrees_of_freedom=degrees,
+            residual_rms_nm=rms,
+            residual_std_nm=solution.sigma,
+            relative_error=np.divide(rms, size, out=np.full_like(rms, np.nan), where=size > 0),
+            condition_number=float(np.linalg.cond(r)),
+            condition_number_scaled=float(np.linalg.cond(r / np.linalg.norm(r, axis=0))),
+            known=dict(known),
+            eliminated=tuple(name for i, name in enumerate(base.names) if i not in keep),
+            iterations=solution.iterations,
+            converged=solution.converged,
+            n_samples=len(torque),
+            n_blocks=n_blocks,
+            findings=findings,
+        )
+
+    def with_findings(self, findings: Iterable[IdentificationFinding]) -> RigidBodyEstimate:
+        """Return the same with these findings."""
+        return replace(self, findings=tuple(findings))
+
+    @property
+    def model(self) -> TorqueModel:
+        """The torque model."""
+        return self.base.model
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the base parameters."""
+        return self.base.names
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard errors from the scatter of blocks, shape (n_base,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def relative_standard_error(self) -> Array:
+        """Standard errors over absolute values; infinite where the value is zero."""
+        size = np.abs(self.values)
+        out = np.full_like(size, np.inf)
+        return np.divide(self.standard_error, size, out=out, where=size > 0)
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return the bounds of the confidence intervals, by Student's distribution."""
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
+        factor = scipy.stats.t.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)
+        half = factor * self.standard_error
+        return self.values - half, self.values + half
+
+    def standard(self, prior: ArrayLike | None = None) -> Array:
+        """Return standard parameters (model order) that give these base parameters.
+
+        Those nearest to ``prior``; see :meth:`BaseParameters.to_standard`. Known parameters
+        have their known values.
+        """
+        start = self.model.nominal if prior is None else np.array(prior, dtype=np.float64)
+        for name, value in self.known.items():
+            start[self.model.names.index(name)] = value
+        return self.base.to_standard(self.values, start)
+
+    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Return the torques of a motion, shape (n, n_rows) [Nm], on the side of the model."""
+        matrix = self.model.matrix(q, v, a)
+        held = np.array([self.known.get(name, 0.0) for name in self.model.names])
+        held[self.base.columns] += self.values
+        return np.asarray(matrix @ held, dtype=np.float64)
+
+    def torque_error(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, torque_nm: ArrayLike
+    ) -> xr.Dataset:
+        """Return the error on a motion, e.g. one held out.
+
+        Dataset over rows: ``rms_nm`` and ``relative_error``, rms(model - measured) over
+        rms(measured).
+        """
+        predicted = self.predict(q, v, a)
+        torque = rows("torque_nm", torque_nm, self.model.n_rows)
+        if len(torque) != len(predicted):
+            raise InputError(f"torque_nm: expected {len(predicted)} rows as q, got {len(torque)}")
+        rms = np.sqrt(((predicted - torque) ** 2).mean(axis=0))
+        size = np.sqrt((torque**2).mean(axis=0))
+        relative = np.divide(rms, size, out=np.full_like(rms, np.nan), where=size > 0)
+        dim = self.model.row_dim
+        return xr.Dataset(
+            {"rms_nm": (dim, rms, {"units": "Nm"}), "relative_error": (dim, relative)},
+            coords={dim: self.model.row_labels},
+        )
+
+    def table(self) -> xr.Dataset:
+        """Return values, standard errors and 95 % intervals by parameter."""
+        lower, upper = self.interval()
+        columns = {
+            "value": self.values,
+            "standard_error": self.standard_error,
+            "relative_standard_error": self.relative_standard_error,
+            "standard_error_white": np.sqrt(np.diag(self.covariance_white)),
+            "lower": lower,
+            "upper": upper,
+        }
+        return xr.Dataset(
+            {name: ("parameter", x) for name, x in columns.items()},
+            coords={
+                "parameter": self.names,
+                "unit": ("parameter", self.base.units),
+                "combination": ("parameter", self.base.combinations),
+            },
+            attrs={
+                "method": self.method,
+                "n_samples": self.n_samples,
+                "n_blocks": self.n_blocks,
+                "condition_number": self.condition_number,
+                "condition_number_scaled": self.condition_number_scaled,
+            },
+        )
+
+    def __str__(self) -> str:
+        """Return a table for a person."""
+        lines = [f"{'parameter':34}{'value':>12}{'std. error':>12}{'rel.':>8}  unit"]
+        rows_of = zip(
+            self.names,
+            self.values,
+            self.standard_error,
+            self.relative_standard_error,
+            self.base.units,
+            strict=True,
+        )
+        for name, value, error, relative, unit in rows_of:
+            rel = f"{100 * relative:7.1f}%" if np.isfinite(relative) else "       -"
+            lines.append(f"{name:34}{value:12.5g}{error:12.2g}{rel}  {unit}")
+        for name, rms, relative in zip(
+            self.model.row_names, self.residual_rms_nm, self.relative_error, strict=True
+        ):
+            lines.append(f"{name}: residual {rms:.3g} Nm rms, {100 * relative:.2g} % of the torque")
+        lines += [f"note: {finding}" for finding in self.findings]
+        return "\n".join(lines)

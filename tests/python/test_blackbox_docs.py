@@ -1,0 +1,70 @@
+"""What docs/black_box.md, identifiability.md and robot_files.md show runs and does what they say."""
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from axisight import blackbox, identifiability, robot_file
+
+
+def run(repository: Path, folder: Path, page: str) -> dict[str, Any]:
+    text = (repository / "docs" / page).read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        exec("\n".join(re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)), names)
+    return names
+
+
+def test_black_box_page(repository: Path, tmp_path: Path) -> None:
+    shown = run(repository, tmp_path, "black_box.md")
+    judge, states, arx = (shown[name] for name in ("judge", "states", "arx"))
+    assert blackbox.fit_percent(judge.output, states.model.simulate(judge))[0] > 95
+    mode = states.model.modes().isel(mode=1)
+    assert abs(mode["frequency_hz"] - shown["robot"].modes()["frequency_hz"][2]) < 0.1
+    assert blackbox.fit_percent(judge.output, arx.predict(judge))[0] > 80
+    assert blackbox.fit_percent(judge.output, arx.simulate(judge))[0] < 0
+    assert len(shown["tests"].advice()) == 2
+    assert np.isfinite(shown["response"]["variance"].values).all()
+    assert shown["model"].status == "converged" and shown["least"].order == 6
+    mode = shown["model"].modes().isel(mode=0)
+    assert abs(mode["frequency_hz"] - 12.0) < 5 * mode["frequency_std_hz"]
+
+
+def test_identifiability_page(repository: Path, tmp_path: Path) -> None:
+    shown = run(repository, tmp_path, "identifiability.md")
+    words = shown["found"].words()
+    assert "axis1.mass: not seen at all" in words
+    assert any("axis1.motor_inertia" in w for w in words)
+    advice = shown["recommend_experiments"](shown["slow"], shown["candidates"], limit=0.2)
+    assert advice[0].startswith("add tones around the resonance: separates"), advice
+
+
+def test_robot_files_page(repository: Path, tmp_path: Path) -> None:
+    shown = run(repository, tmp_path, "robot_files.md")
+    assert shown["back"].value("axis1.stiffness") == 1.482e6
+    page = (repository / "docs" / "robot_files.md").read_text(encoding="utf-8")
+    quoted = re.search(r"`(# identified: axis1\.stiffness[^`]*)`", page)
+    assert quoted and quoted.group(1) in (tmp_path / "axis1.toml").read_text()
+    assert {p.name for p in tmp_path.iterdir()} == {"axis1.toml", "axis1.identified.json"}
+
+
+@pytest.mark.parametrize("module", [blackbox, identifiability, robot_file])
+def test_public_names_are_documented(module) -> None:
+    names = getattr(module, "__all__", None) or [
+        n
+        for n, thing in vars(module).items()
+        if not n.startswith("_") and getattr(thing, "__module__", "") == module.__name__
+    ]
+    for name in names:
+        thing = getattr(module, name)
+        assert inspect.getdoc(thing) and not inspect.getdoc(thing).startswith(f"{name}("), name
+        if inspect.isfunction(thing):
+            text = inspect.getdoc(thing)
+            wanted = [p for p in inspect.signature(thing).parameters if p != "path"]
+            missing = [p for p in wanted if len(wanted) > 1 and p not in text]
+            assert not missing, (name, missing)

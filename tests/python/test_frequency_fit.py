@@ -1,0 +1,317 @@
+"""Fits of the linearized robot to frequency responses: oracles, recovery, uncertainty."""
+
+import control
+import numpy as np
+import pytest
+import xarray as xr
+
+from axisight import Effect, Parameter, Robot, frf
+from axisight.frequency_fit import (
+    FrequencyFit,
+    FrequencyFitOptions,
+    MeasuredResponse,
+    fit_responses,
+    model_response,
+)
+from frequency_fit_data import (
+    ELASTIC,
+    LINES_HZ,
+    POSES,
+    ROBOT,
+    TRUTH,
+    response,
+    responses,
+    starts,
+    true_values,
+)
+
+CRITERIA = (
+    "least_squares",
+    "weighted_least_squares",
+    "log_least_squares",
+    "weighted_log_least_squares",
+)
+
+
+def fitted(criterion: str, noise: float = 0.0, seed: int = 1, **options: object) -> FrequencyFit:
+    chosen = FrequencyFitOptions(criterion=criterion, **options)  # type: ignore[arg-type]
+    return fit_responses(ROBOT, responses(noise, seed), starts(ELASTIC), options=chosen)
+
+
+# Both sides solve with z I - A_d, whose condition is about 1e5 at 1 Hz: 1e-10 with room.
+def test_response_is_that_of_the_robot_and_of_python_control() -> None:
+    a, b, c = ROBOT.linearize(POSES[0])
+    plant = control.ss(a, b, c, np.zeros((3, 3)))
+    sampled = control.sample_system(plant, ROBOT.sample_time_s, method="zoh")
+    cases = {
+        "zero_order_hold": np.exp(2j * np.pi * LINES_HZ * ROBOT.sample_time_s),
+        "continuous": 2j * np.pi * LINES_HZ,
+    }
+    for sampling, at in cases.items():
+        system = sampled if sampling == "zero_order_hold" else plant
+        wanted = np.moveaxis(system(at), -1, 0)
+        found = model_response(ROBOT, LINES_HZ, POSES[0], sampling=sampling)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found.values, wanted, rtol=1e-8)
+    held = model_response(ROBOT, LINES_HZ, POSES[0])
+    np.testing.assert_allclose(
+        held.values, ROBOT.zoh_response(LINES_HZ, POSES[0]).values, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("quantity", "order"), [("velocity", 1), ("acceleration", 2)])
+def test_quantities_are_derivatives(quantity: str, order: int) -> None:
+    position = model_response(ROBOT, LINES_HZ)
+    other = model_response(ROBOT, LINES_HZ, quantity=quantity)  # type: ignore[arg-type]
+    factor = (2j * np.pi * LINES_HZ[:, None, None]) ** order
+    np.testing.assert_allclose(other.values, factor * position.values, rtol=1e-12)
+    assert other.attrs["units"] == ("rad/s/Nm", "rad/s^2/Nm")[order - 1]
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_parameters_come_back_exactly_without_noise(criterion: str) -> None:
+    fit = fitted(criterion)
+    # The loss at the truth is rounding of 1e-10 relative; standard deviations for an error of
+    # 10 % are up to 5 %, so that 1e-9 of that remains.
+    np.testing.assert_allclose(fit.values, true_values(ELASTIC), rtol=1e-7)
+    assert fit.status in ("loss_converged", "step_converged")
+    assert fit.loss < 1e-12 * fit.initial_loss
+    np.testing.assert_allclose(
+        fit.robot.zoh_response(LINES_HZ).values, ROBOT.zoh_response(LINES_HZ).values, rtol=1e-6
+    )
+
+
+def test_position_response_of_the_continuous_plant_and_masses_come_back() -> None:
+    names = ("axis3_yaw.mass", "axis3_yaw.com_x", "axis3_yaw.inertia_scale", "axis3_roll.stiffness")
+    data = [(pose, model_response(ROBOT, LINES_HZ, pose, sampling="continuous")) for pose in POSES]
+    options = FrequencyFitOptions(criterion="log_least_squares", sampling="continuous")
+    start = {name: 0.9 * TRUTH[name] for name in names}
+    fit = fit_responses(ROBOT, data, start, options=options)
+    np.testing.assert_allclose(fit.values, true_values(names), rtol=1e-7)
+
+
+def test_payload_is_part_of_the_model() -> None:
+    load = [Effect("payload", None, {"mass_kg": -50.0, "x_m": 0.9, "y_m": 0.0, "z_m": 0.1})]
+    data = [(pose, model_response(ROBOT, LINES_HZ, pose, effects=load)) for pose in POSES]
+    options = FrequencyFitOptions(criterion="log_least_squares")
+    start = starts(("axis2.stiffness", "axis3.stiffness"))
+    fit = fit_responses(ROBOT, data, start, effects=load, options=options)
+    np.testing.assert_allclose(fit.values, true_values(tuple(start)), rtol=1e-7)
+
+
+# 12 parameters: the sum of squares of errors in standard deviations (correlation accounted
+# for) is chi-squared, below 38 with probability 0.9998.
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_errors_are_as_large_as_the_covariance_says(criterion: str) -> None:
+    fit = fitted(criterion, noise=0.05)
+    error = fit.values - true_values(ELASTIC)
+    distance = error @ np.linalg.solve(fit.covariance, error)
+    assert 1.5 < distance < 38
+    assert fit.std_from == "response"
+    # 80 blocks less 12 parameters leave a relative deviation of 0.1 on average; few lines
+    # count in plain least squares, for which it is much larger.
+    ratio = fit.std_sandwich / fit.std_response
+    if criterion != "least_squares":
+        assert np.all((ratio > 0.6) & (ratio < 1.7))
+
+
+def test_misfit_counts_degrees_of_freedom() -> None:
+    fit = fitted("weighted_least_squares", noise=0.05)
+    assert fit.n_residuals == 2 * 2 * 40 * 9
+    # Mean of 1440 - 12 squares: 1 with standard deviation sqrt(2 / 1428) = 0.037.
+    assert fit.misfit == pytest.approx(1.0, abs=4 * 0.037)
+    residual = fit.core.residual
+    assert np.sum(residual**2) == pytest.approx(fit.loss, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "noise"), [("weighted_least_squares", 0.2), ("weighted_log_least_squares", 0.1)]
+)
+def test_intervals_cover_the_truth_in_95_percent(criterion: str, noise: float) -> None:
+    names = ELASTIC[::2]
+    options = FrequencyFitOptions(criterion=criterion, reweightings=1)  # type: ignore[arg-type]
+    inside = []
+    for run in range(300):
+        start = {name: 1.1 * TRUTH[name] for name in names}
+        fit = fit_responses(ROBOT, responses(noise, [3, run]), start, options=options)
+        true = true_values(names)
+        inside.append((fit.interval[:, 0] <= true) & (true <= fit.interval[:, 1]))
+    # 1,800 correlated trials: standard deviation between 0.5 % and 1.3 %.
+    assert 0.93 <= np.mean(inside) <= 0.97
+    assert np.mean(inside, axis=0).min() > 0.90
+
+
+def test_weights_by_the_measured_magnitude_would_be_biased() -> None:
+    """The reason for reweighting: lines whose error adds to the magnitude would count more."""
+    errors = {}
+    for passes in (0, 1):
+        options = FrequencyFitOptions(reweightings=passes)
+        found = []
+        for run in range(40):
+            data = responses(0.2, [4, run])
+            fit = fit_responses(ROBOT, data, {"axis3.motor_inertia": 0.008}, options=options)
+            found.append(np.log(fit.values[0] / TRUTH["axis3.motor_inertia"]))
+        # The mean of 40 against its own standard deviation.
+        errors[passes] = abs(np.mean(found)) / (np.std(found) / np.sqrt(40))
+    assert errors[1] < 3.5 < errors[0]
+
+
+def test_full_covariance_is_used() -> None:
+    """Output errors correlated over outputs: whitening equals rotating them apart."""
+    rng = np.random.default_rng(5)
+    data = []
+    for pose in POSES:
+        clean = response(pose, 0.0, rng)
+        size = np.abs(clean.response).mean()
+        mix = size * np.array([[0.2, 0, 0], [0.15 + 0.1j, 0.05, 0], [-0.1j, 0.03, 0.02]])
+        covariance = np.broadcast_to(mix @ mix.conj().T, (40, 3, 3, 3))
+        white = rng.normal(size=(2, 40, 3, 3)) * np.sqrt(0.5)
+        noisy = clean.response + mix @ (white[0] + 1j * white[1])
+        data.append((pose, noisy, covariance))
+
+    def fit(full: bool) -> FrequencyFit:
+        measured = []
+        for pose, g, c in data:
+            # The diagonal alone, (line, output, input).
+            own = np.real(np.einsum("ljoo->loj", c))
+            known = {"covariance": c} if full else {"variance": own}
+            measured.append(MeasuredResponse(pose, LINES_HZ, g, "acceleration", **known))  # type: ignore[arg-type]
+        options = FrequencyFitOptions(criterion="weighted_least_squares")
+        start = {name: 1.1 * TRUTH[name] for name in ELASTIC[:6]}
+        return fit_responses(ROBOT, measured, start, options=options)
+
+    full, diagonal = fit(True), fit(False)
+    assert full.misfit == pytest.approx(1.0, abs=0.15)
+    assert np.all(full.std < diagonal.std)
+    error = full.values - true_values(ELASTIC[:6])
+    assert error @ np.linalg.solve(full.covariance, error) < 27  # chi-squared, 6: 0.9999
+
+
+def test_diagonal_covariance_is_the_variance() -> None:
+    data = responses(0.05, 6)
+    other = []
+    for one in data:
+        assert one.variance is not None
+        matrix = np.zeros((40, 9, 9), complex)
+        matrix[:, range(9), range(9)] = one.variance.reshape(40, 9)
+        other.append(
+            MeasuredResponse(
+                one.joint_angle_rad, LINES_HZ, one.response, "acceleration", None, matrix
+            )
+        )
+    for criterion in ("weighted_least_squares", "weighted_log_least_squares"):
+        options = FrequencyFitOptions(criterion=criterion)  # type: ignore[arg-type]
+        fits = [fit_responses(ROBOT, d, starts(ELASTIC), options=options) for d in (data, other)]
+        np.testing.assert_allclose(fits[0].values, fits[1].values, rtol=1e-7)
+        np.testing.assert_allclose(fits[0].std, fits[1].std, rtol=1e-6)
+
+
+def test_robust_loss_holds_back_wild_lines() -> None:
+    data = responses(0.05, 7)
+    for one in data:
+        one.response[::8, 1, 1] *= 4
+    plain, robust = (
+        fit_responses(ROBOT, data, starts(ELASTIC), options=FrequencyFitOptions(loss=loss))  # type: ignore[arg-type]
+        for loss in ("squared", "huber")
+    )
+    errors = [np.abs(f.values / true_values(ELASTIC) - 1) for f in (plain, robust)]
+    assert np.linalg.norm(errors[1]) < 0.3 * np.linalg.norm(errors[0])
+    assert plain.std_from == "sandwich"
+    assert "the model is incomplete" in plain.warnings[0]
+
+
+def test_log_residuals_do_not_care_where_phases_wrap() -> None:
+    """A response turned by a common angle keeps every log residual's phase difference."""
+    data = responses(0.05, 8)
+    reference = fit_responses(ROBOT, data, starts(ELASTIC)).values
+    # Positions have other phases than accelerations, many about plus and minus pi.
+    turned = []
+    for one in data:
+        factor = (2j * np.pi * LINES_HZ[:, None, None]) ** 2
+        assert one.variance is not None
+        turned.append(
+            MeasuredResponse(
+                one.joint_angle_rad,
+                LINES_HZ,
+                one.response / factor,
+                "position",
+                one.variance / np.abs(factor) ** 2,
+            )
+        )
+    np.testing.assert_allclose(
+        fit_responses(ROBOT, turned, starts(ELASTIC)).values, reference, rtol=1e-8
+    )
+
+
+def test_priors_pull_and_frozen_parameters_stay() -> None:
+    data = responses(0.05, 9)
+    mean = 1.2 * TRUTH["axis1.stiffness"]
+    parameters = [
+        Parameter("axis1.stiffness", mean, 1e5, 1e7, 1e6, prior=(mean, 1e-6 * mean)),
+        Parameter("axis2.stiffness", 4e6, 1e5, 1e7, 1e6, frozen=True),
+        "axis3.stiffness",
+    ]
+    options = FrequencyFitOptions(uncertainty="response")
+    fit = fit_responses(ROBOT, data, parameters, options=options)
+    assert fit.names == ("axis1.stiffness", "axis3.stiffness")
+    assert fit.values[0] == pytest.approx(mean, rel=1e-5)
+    assert fit.std[0] <= 1.01e-6 * mean
+    assert dict(fit.robot.core.parameters())["axis2.stiffness"] == 4e6
+
+
+def test_several_starts_find_the_best_and_are_reproducible() -> None:
+    options = FrequencyFitOptions(starts=4, seed=3)
+    fits = [
+        fit_responses(ROBOT, responses(0.05, 10), starts(ELASTIC), options=options) for _ in "ab"
+    ]
+    assert len(fits[0].starts) == 4
+    assert fits[0].starts["loss"].is_monotonic_increasing
+    np.testing.assert_array_equal(fits[0].values, fits[1].values)
+
+
+def test_threads_do_not_change_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = responses(0.05, 11)
+    together = fit_responses(ROBOT, data, starts(ELASTIC))
+    again = fit_responses(ROBOT, data[::-1], starts(ELASTIC))
+    # Another order of the sums: rounding only.
+    np.testing.assert_allclose(together.values, again.values, rtol=1e-9)
+
+
+def test_datasets_of_the_estimators_are_taken_with_their_flags() -> None:
+    one = responses(0.05, 12)[0]
+    flag = np.zeros(40, np.int8)
+    flag[5] = frf.Flag.RANK_DEFICIENT
+    g = one.response.copy()
+    g[5] = np.nan
+    dataset = frf.frequency_response(
+        LINES_HZ,
+        g,
+        estimator="test",
+        variance=one.variance,
+        flag=flag,
+        output_unit="rad/s^2",
+        attrs={"sample_time_s": ROBOT.sample_time_s},
+    )
+    fit = fit_responses(ROBOT, [(POSES[0], dataset)], starts(ELASTIC[:6]))
+    assert fit.n_residuals == 2 * 39 * 9
+    assert any("1 flagged line" in warning for warning in fit.warnings)
+    array = one.response
+    plain = xr.DataArray(
+        array,
+        dims=("frequency_hz", "output", "input"),
+        coords={"frequency_hz": LINES_HZ},
+        attrs={"units": "rad/s^2/Nm"},
+    ).transpose("input", "frequency_hz", "output")
+    taken = MeasuredResponse.of(POSES[0], plain)
+    np.testing.assert_array_equal(taken.response, array)
+    assert taken.quantity == "acceleration"
+
+
+def test_result_as_tables() -> None:
+    fit = fitted("weighted_least_squares", noise=0.05)
+    table = fit.table()
+    assert list(table["parameter"]) == list(ELASTIC)
+    dataset = fit.to_xarray()
+    np.testing.assert_array_equal(dataset["value"], fit.values)
+    assert dataset.attrs["status"] == fit.status
+    np.testing.assert_allclose(np.diag(fit.correlation), 1.0)
+    assert isinstance(fit.robot, Robot)
