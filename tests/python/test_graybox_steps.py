@@ -359,7 +359,7 @@ def test_lines_are_those_of_the_reference(logs: list[Log]) -> None:
         found_lines = np.round(5 * frequency)
         assert np.isin(np.arange(5, 201), found_lines).mean() > 0.95
         assert found_lines.max() == 200
-    assert not any("give lines" in text for text in found.findings)
+    assert not any("found from the torque" in text for text in found.findings)
     blind = [replace(log, velocity_ref_rad_s=None) for log in logs]
     said = initial_model(
         blind[0],

@@ -36,6 +36,8 @@ from axisight.records import Experiment, prepare_records
 Real = NDArray[np.float64]
 Lines = Sequence[int] | NDArray[np.int64]
 
+_LEAST_DAMPING = 0.01
+"""Twice the damping ratio of a mass on its spring, at which a chain starts at least."""
 _LAG_S = 0.005
 """Spacing of the lags of residual tests: a robot's motion has little beyond 100 Hz."""
 
@@ -407,7 +409,10 @@ def _chain(
     out = {"J_m": chain.motor_inertia_kg_m2}
     for i, inertia in enumerate(chain.inertia_kg_m2[1:], 1):
         out["J_a" if i == 1 else f"J_a{i}"] = float(inertia)
-    for i, (k, d) in enumerate(zip(chain.stiffness_nm_rad, chain.damping_nm_s_rad, strict=True), 1):
+    # A cubic spring's notch can look undamped; the search starts off the bound.
+    least = _LEAST_DAMPING * np.sqrt(chain.stiffness_nm_rad * chain.inertia_kg_m2[1:])
+    dampers = np.maximum(chain.damping_nm_s_rad, least)
+    for i, (k, d) in enumerate(zip(chain.stiffness_nm_rad, dampers, strict=True), 1):
         out["k1" if i == 1 else f"k1_{i}"] = float(k)
         out["d" if i == 1 else f"d_{i}"] = float(d)
     return out
