@@ -105,9 +105,7 @@ def coverage(records: list[two_mass.Record], runs: int) -> None:
     """Share of 95 % intervals that hold the truth, by parameter."""
     hits = {"white": np.zeros(7), "sandwich": np.zeros(7)}
     exact = [
-        two_mass.Record(
-            r.torque, MODEL.simulate(TRUTH, r.torque, two_mass.SAMPLE_S).output.values
-        )
+        two_mass.Record(r.torque, MODEL.simulate(TRUTH, r.torque, two_mass.SAMPLE_S).output.values)
         for r in records
     ]
     for run in range(runs):

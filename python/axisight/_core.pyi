@@ -23,6 +23,9 @@ __all__ = [
     "MonteCarloStudy",
     "Robot",
     "__version__",
+    "axis_fit",
+    "axis_linearize",
+    "axis_simulate",
     "directions",
     "effect_table",
     "energy_regressor",
@@ -938,13 +941,20 @@ def inertial_parameters(robot: Robot) -> tuple[list[int], _Array]:
     Mass, first moments x y z, inertia about the link frame xx yy zz xy xz yz.
     """
 
+@type_check_only
 class _AxisModelSpec(Protocol):
-    masses: int
-    output: str
-    hold: str
-    smoothing: float
-    ripple_orders: list[float]
-    substeps: int
+    @property
+    def masses(self) -> int: ...
+    @property
+    def output(self) -> str: ...
+    @property
+    def hold(self) -> str: ...
+    @property
+    def smoothing(self) -> float: ...
+    @property
+    def ripple_orders(self) -> list[float]: ...
+    @property
+    def substeps(self) -> int: ...
 
 def axis_fit(
     model: _AxisModelSpec,

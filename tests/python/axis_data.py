@@ -9,8 +9,24 @@ from axisight.graybox import AxisData, AxisModel
 RATIO = 1 / 224.3
 SAMPLE_S = 5e-4
 # Wernholt (2004), Table 9.1: model m3 and the initial model m0.
-TRUTH = dict(J_m=0.0121, J_a=1130.0, k1=1.46e6, k3=3.72e10, d=2630.0, F_v=0.013, F_c=0.644)
-START = dict(J_m=0.0123, J_a=790.0, k1=0.814e6, k3=5.4e10, d=0.0, F_v=0.0136, F_c=0.642)
+TRUTH = {
+    "J_m": 0.0121,
+    "J_a": 1130.0,
+    "k1": 1.46e6,
+    "k3": 3.72e10,
+    "d": 2630.0,
+    "F_v": 0.013,
+    "F_c": 0.644,
+}
+START = {
+    "J_m": 0.0123,
+    "J_a": 790.0,
+    "k1": 0.814e6,
+    "k3": 5.4e10,
+    "d": 0.0,
+    "F_v": 0.0136,
+    "F_c": 0.642,
+}
 TWO = AxisModel(gear_ratio=RATIO)
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from axis_data import RATIO, SAMPLE_S, TRUTH, TWO, torque
 from scipy.integrate import solve_ivp
 
 import axisight
+from axis_data import RATIO, SAMPLE_S, TRUTH, TWO, torque
 from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox import AxisData, AxisModel
@@ -115,7 +115,7 @@ def test_agrees_with_the_general_simulator_on_the_preset():
 
 def test_energy_of_three_masses_is_conserved():
     model = AxisModel(n_masses=3, gear_ratio=0.01, cubic=(True, True))
-    p = dict(J_m=0.01, J_a=60.0, J_a2=40.0, k1=2e5, k3=3e8, k1_2=1e5, k3_2=2e8)
+    p = {"J_m": 0.01, "J_a": 60.0, "J_a2": 40.0, "k1": 2e5, "k3": 3e8, "k1_2": 1e5, "k3_2": 2e8}
     start = [0.0, 0.02, -0.01, 20.0, 0.1, -0.2]
     states = model.simulate(p, np.zeros(4000), SAMPLE_S, start=start).states.values
     _, x1, x2, w, v1, v2 = states.T
@@ -129,7 +129,7 @@ def test_energy_of_three_masses_is_conserved():
     assert np.abs(momentum - momentum[0]).max() < 1e-11 * np.abs(p["J_a"] * v1).max()
 
 
-EXTRA = dict(b=2e-4, F_s=0.3, v_s=4.0, F_a=0.002, u_0=0.1, a_6=0.2, b_6=-0.1)
+EXTRA = {"b": 2e-4, "F_s": 0.3, "v_s": 4.0, "F_a": 0.002, "u_0": 0.1, "a_6": 0.2, "b_6": -0.1}
 STRUCTURES = {
     "two masses": (TWO, TRUTH),
     "smoothed": (AxisModel(gear_ratio=RATIO, friction_smoothing_rad_s=0.5), TRUTH),

@@ -351,6 +351,28 @@ def test_identify_axis_recovers_m3(logs: list[Log]) -> None:
     assert len(found.tests) == 3
 
 
+def test_lines_are_those_of_the_reference(logs: list[Log]) -> None:
+    found = initial_model(logs[0], logs[1:], gear_ratio=RATIO, period_s=5.0, drop_periods=1)
+    for response in found.responses:
+        frequency = response["frequency_hz"].values
+        # The square wave excites odd lines below the band too, and may cancel a line in it.
+        found_lines = np.round(5 * frequency)
+        assert np.isin(np.arange(5, 201), found_lines).mean() > 0.95
+        assert found_lines.max() == 200
+    assert not any("found from the torque" in text for text in found.findings)
+    blind = [replace(log, velocity_ref_rad_s=None) for log in logs]
+    said = initial_model(
+        blind[0],
+        blind[1:],
+        gear_ratio=RATIO,
+        period_s=5.0,
+        drop_periods=1,
+        notch_band_hz=(4.0, 8.0),
+        plateau_from_hz=20.0,
+    )
+    assert any("found from the torque" in text for text in said.findings)
+
+
 def test_initial_model_of_one_amplitude_says_so(logs: list[Log]) -> None:
     found = initial_model(
         logs[0],

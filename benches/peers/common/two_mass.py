@@ -145,7 +145,9 @@ def references(seed: int = 1) -> list[Array]:
         clipping = ex.Clipping(iterations=100)
         found = ex.optimize_crest_factor(tones, starts=1, clipping=clipping, refinement="none")
         wave = found.signal.period
-        out.append(peak / np.abs(wave).max() * wave + ex.square(5.0, SAMPLE_S, amplitude=height).period)
+        out.append(
+            peak / np.abs(wave).max() * wave + ex.square(5.0, SAMPLE_S, amplitude=height).period
+        )
     return out
 
 

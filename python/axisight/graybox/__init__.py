@@ -2,6 +2,7 @@
 
 from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
 from axisight.graybox.axis_result import AxisFit, NoiseModel
+from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.chain_fit import ChainFit, fit_chain
 from axisight.graybox.collocated import Collocated, collocated
 from axisight.graybox.flexibilities import (
@@ -19,7 +20,7 @@ from axisight.graybox.landmarks import (
     high_frequency_gain,
 )
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
-from axisight.graybox.prediction_error import FitSettings, fit_axis
+from axisight.graybox.prediction_error import fit_axis
 from axisight.graybox.procedure import (
     AxisIdentification,
     InitialModel,

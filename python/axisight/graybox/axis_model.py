@@ -88,6 +88,7 @@ class AxisModel:
     substeps: int = 1
 
     def __post_init__(self) -> None:
+        """Check the structure and fill in what depends on the number of masses."""
         _whole("n_masses", self.n_masses, 2, MOST_MASSES)
         _whole("substeps", self.substeps, 1, 1000)
         _choice("output", self.output, tuple(OUTPUT_UNIT))
@@ -308,6 +309,7 @@ class AxisData:
     weight: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
+        """Check the samples and turn them into arrays."""
         label = self.name or "data set"
         torque = samples(f"{label}: torque_nm", self.torque_nm)
         object.__setattr__(self, "torque_nm", torque)

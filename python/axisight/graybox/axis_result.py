@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -14,9 +14,7 @@ from scipy import stats
 from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
-
-if TYPE_CHECKING:
-    from axisight.graybox.prediction_error import Point, Task
+from axisight.graybox.axis_search import Point, Task, free_run
 
 Array = NDArray[np.float64]
 
@@ -167,8 +165,6 @@ def fit_percent(measured: Array, modelled: Array) -> float:
 
 def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]) -> AxisFit:
     """Turn the end of a search into a result."""
-    from axisight.graybox.prediction_error import free_run
-
     model = task.model
     names = task.free_names
     errors, lengths = point.errors, [len(d) for d in task.data]
@@ -176,7 +172,8 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     variance = float(errors @ errors) / max(errors.size - skipped - len(point.matrix), 1)
     inverse, condition = inverse_normal(point.matrix)
     n = len(names)
-    covariance = variance * inverse
+    # What the data do not show stays unknown, even without any error.
+    covariance = np.where(np.isfinite(inverse), variance, 1.0) * inverse
     scatter = point.block_gradients.T @ point.block_gradients
     with np.errstate(invalid="ignore"):
         sandwich = inverse @ scatter @ inverse

@@ -17,6 +17,7 @@ from axisight.errors import InputError
 from axisight.frf import etfe
 from axisight.graybox.axis_model import AxisData, AxisModel
 from axisight.graybox.axis_result import AxisFit
+from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.chain_fit import fit_chain
 from axisight.graybox.flexibilities import (
     CubicSpring,
@@ -25,7 +26,7 @@ from axisight.graybox.flexibilities import (
     initial_flexibility,
     simulate_deflection,
 )
-from axisight.graybox.prediction_error import FitSettings, NoiseKind, fit_axis
+from axisight.graybox.prediction_error import NoiseKind, fit_axis
 from axisight.graybox.procedure_report import report
 from axisight.graybox.step_one import RigidBodyFriction, rigid_body_friction
 from axisight.graybox.validation import ResidualTests, fit_percent, residual_tests
@@ -35,6 +36,8 @@ from axisight.records import Experiment, prepare_records
 Real = NDArray[np.float64]
 Lines = Sequence[int] | NDArray[np.int64]
 
+_LEAST_DAMPING = 0.01
+"""Twice the damping ratio of a mass on its spring, at which a chain starts at least."""
 _LAG_S = 0.005
 """Spacing of the lags of residual tests: a robot's motion has little beyond 100 Hz."""
 
@@ -140,8 +143,8 @@ def initial_model(
     gear_ratio : r, joint angle per motor angle.
     axis : of logs, from 1.
     n_masses : of the model.
-    period_s, lines, drop_periods : of the broadband records; None: found, see
-        :func:`axisight.records.prepare_records`.
+    period_s, lines, drop_periods : of the broadband records; None: found from the reference of
+        logs, else from the torque, see :func:`axisight.records.prepare_records`.
     cutoff_hz, least_speed_rad_s : of step 1.
     notch_band_hz, plateau_from_hz : of step 2.
     spring_method : of :func:`cubic_spring`; ``"samples"`` is (9.14) to the letter.
@@ -160,7 +163,13 @@ def initial_model(
         cutoff_hz=cutoff_hz,
         least_speed_rad_s=least_speed_rad_s,
     )
-    responses = tuple(_response(r, period_s, lines, drop_periods) for r in records)
+    responses = []
+    findings = [*found.findings]
+    for record, data in zip(broadband, records, strict=True):
+        reference = _reference(record, axis)
+        response, notes = _response(data, reference, period_s, lines, drop_periods)
+        responses.append(response)
+        findings += [f"{data.name}: {text}" for text in notes]
     flexibilities = tuple(
         initial_flexibility(
             response,
@@ -172,9 +181,8 @@ def initial_model(
         )
         for response in responses
     )
-    findings = [*found.findings]
-    for record, one in zip(records, flexibilities, strict=True):
-        findings += [f"{record.name or 'broadband'}: {text}" for text in one.findings]
+    for data, one in zip(records, flexibilities, strict=True):
+        findings += [f"{data.name}: {text}" for text in one.findings]
     motor = float(np.mean([f.motor_inertia_kg_m2 for f in flexibilities]))
     arm = (found.inertia_kg_m2 - motor) / gear_ratio**2
     stiffness = np.array([arm * f.notch.frequency_rad_s**2 for f in flexibilities])
@@ -206,7 +214,7 @@ def initial_model(
         )
         parameters |= _chain(responses[quiet], n_masses, gear_ratio, findings)
     return InitialModel(
-        found, responses, flexibilities, spring, parameters, tuple(dict.fromkeys(findings))
+        found, tuple(responses), flexibilities, spring, parameters, tuple(dict.fromkeys(findings))
     )
 
 
@@ -337,13 +345,23 @@ def _position(data: AxisData) -> Real:
 
 
 def _response(
-    data: AxisData, period_s: float | None, lines: Lines | None, drop_periods: int | None
-) -> xr.Dataset:
+    data: AxisData,
+    reference: Real | None,
+    period_s: float | None,
+    lines: Lines | None,
+    drop_periods: int | None,
+) -> tuple[xr.Dataset, list[str]]:
+    """Return torque to motor acceleration, and what puts it in doubt."""
     run = Experiment(
-        data.sample_time_s, np.asarray(data.torque_nm), _position(data), name=data.name
+        data.sample_time_s, np.asarray(data.torque_nm), _position(data), reference, data.name
     )
     prepared = prepare_records([run], period_s=period_s, lines=lines, drop_periods=drop_periods)
-    return etfe(prepared.records, quantity="acceleration")
+    notes = [finding.message for finding in prepared.serious]
+    if lines is None and reference is None:
+        notes.append(
+            "excited lines were found from the torque, which friction distorts: give lines"
+        )
+    return etfe(prepared.records, quantity="acceleration"), notes
 
 
 def _spring(
@@ -391,7 +409,10 @@ def _chain(
     out = {"J_m": chain.motor_inertia_kg_m2}
     for i, inertia in enumerate(chain.inertia_kg_m2[1:], 1):
         out["J_a" if i == 1 else f"J_a{i}"] = float(inertia)
-    for i, (k, d) in enumerate(zip(chain.stiffness_nm_rad, chain.damping_nm_s_rad, strict=True), 1):
+    # A cubic spring's notch can look undamped; the search starts off the bound.
+    least = _LEAST_DAMPING * np.sqrt(chain.stiffness_nm_rad * chain.inertia_kg_m2[1:])
+    dampers = np.maximum(chain.damping_nm_s_rad, least)
+    for i, (k, d) in enumerate(zip(chain.stiffness_nm_rad, dampers, strict=True), 1):
         out["k1" if i == 1 else f"k1_{i}"] = float(k)
         out["d" if i == 1 else f"d_{i}"] = float(d)
     return out

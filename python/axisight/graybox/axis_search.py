@@ -1,0 +1,204 @@
+"""Searches for the parameters of an axis: the task, where a search stands, its rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.errors import InputError
+from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter, number
+
+Array = NDArray[np.float64]
+
+# Shares of the speed error fed back in rounds before the search proper, see `FitSettings`.
+GRADUAL = (0.2, 0.02)
+# Rounds need not be finished: where they end is a start.
+ROUGH = 1e-4
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Settings of `fit_axis`.
+
+    The search stops when the linear model promises to lower the loss by less than
+    ``loss_tolerance`` of it, when no parameter moves by more than ``step_tolerance`` of itself,
+    or after ``max_iterations`` accepted steps. The tolerances are tight because stiffness-like
+    parameters hardly change the loss: with the usual 1e-8 the cubic term is left far off.
+
+    ``gradual`` gives observer gains of rough searches that come before: the error of the
+    predicted motor speed is fed back to all speeds with that share per sample, which takes
+    most local minima out of the loss. ``()`` leaves them out, a third of the work saved where
+    the start is good. ``block_s`` is the length of the blocks of the sandwich covariance;
+    it should exceed the correlation time of the residuals. ``ar_order`` fixes the order of the
+    noise filter, otherwise chosen up to ``most_ar_order``; ``ar_rounds`` bounds the refits.
+    """
+
+    max_iterations: int = 100
+    loss_tolerance: float = 1e-12
+    step_tolerance: float = 1e-11
+    gradual: tuple[float, ...] = GRADUAL
+    block_s: float = 0.25
+    ar_order: int | None = None
+    most_ar_order: int = 30
+    ar_rounds: int = 5
+
+    def __post_init__(self) -> None:
+        """Check all numbers."""
+        for name in ("loss_tolerance", "step_tolerance", "block_s"):
+            if number(name, getattr(self, name)) <= 0:
+                raise InputError(f"{name}: expected a positive number, got {getattr(self, name)}")
+        for name in ("max_iterations", "most_ar_order", "ar_rounds"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, np.integer)) or value < 1:
+                raise InputError(f"{name}: expected a whole number from 1, got {value!r}")
+        order = self.ar_order
+        if order is not None and (not isinstance(order, (int, np.integer)) or order < 1):
+            raise InputError(f"ar_order: expected a whole number from 1, got {order!r}")
+        for gain in self.gradual:
+            if not 0 < number("gradual", gain) < 1:
+                raise InputError(f"gradual: expected gains between 0 and 1, got {gain}")
+
+
+@dataclass(frozen=True)
+class Task:
+    """Everything a search needs but its start."""
+
+    model: AxisModel
+    data: tuple[AxisData, ...]
+    table: tuple[AxisParameter, ...]
+    free: frozenset[str]
+    bounds: Mapping[str, tuple[float, float]]
+    settings: FitSettings
+
+    @property
+    def free_names(self) -> tuple[str, ...]:
+        """Free parameters in the order of the model."""
+        return tuple(p.name for p in self.table if p.name in self.free)
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a search stands: the core's vector of parameters and how errors are predicted."""
+
+    theta: tuple[float, ...]
+    gains: tuple[float, ...] = ()
+    predicts: bool = False
+    free_gains: bool = False
+    whitening: tuple[float, ...] = ()
+    status: str = ""
+    matrix: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    errors: Array = field(default_factory=lambda: np.zeros(0))
+    block_gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    loss: float = np.nan
+    initial_loss: float = np.nan
+    iterations: int = 0
+    evaluations: int = 0
+
+    def vector(self, task: Task) -> list[float]:
+        """All parameters with the present gains."""
+        n, first = task.model.n_gains(), len(task.model.vector({})) - task.model.n_gains()
+        theta = list(self.theta)
+        theta[first : first + n] = self.gains or [0.0] * n
+        return theta
+
+
+def first_point(task: Task, values: Mapping[str, float]) -> Point:
+    """The start of a search: parameters, no gains, and the start of every record."""
+    theta = task.model.vector(values)
+    for record in task.data:
+        begin = [0.0] * (2 * task.model.n_masses)
+        begin[0] = record.start_angle_rad()
+        if task.model.initial == "free" and task.model.output != "position":
+            speed = float(record.measured(task.model)[0])
+            joint = [values["r"] * speed] * (task.model.n_masses - 1)
+            begin[task.model.n_masses :] = [speed, *joint]
+        theta += begin
+    return Point(tuple(theta))
+
+
+def rigid_gains(model: AxisModel, ratio: float, share: float) -> tuple[float, ...]:
+    """Gains that turn all masses together: no spring is stretched by a correction."""
+    springs = model.n_masses - 1
+    return (*[0.0] * springs, share, *[ratio * share] * springs)
+
+
+def free_places(task: Task, point: Point) -> list[int]:
+    """Places of everything that may move in the core's vector."""
+    model = task.model
+    places = [i for name, i in model.places().items() if name in task.free]
+    shared, states = len(model.vector({})), 2 * model.n_masses
+    if point.free_gains:
+        places += range(shared - model.n_gains(), shared)
+    for s in range(len(task.data)):
+        begin = shared + s * states
+        if model.output == "position":
+            places.append(begin)
+        if model.initial == "free":
+            places += range(begin + 1, begin + states)
+    return places
+
+
+def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
+    """Minimize from a point; the counts of work add up."""
+    model, theta = task.model, point.vector(task)
+    free = set(free_places(task, point))
+    low = [-np.inf] * len(theta)
+    high = [np.inf] * len(theta)
+    for name, i in model.places().items():
+        low[i], high[i] = task.bounds[name] if name in task.free else (theta[i], theta[i])
+        if name.startswith(("J_", "k1", "v_s", "r")):
+            # Zero is no inertia, but a search may run there.
+            low[i] = max(low[i], 1e-6 * theta[i])
+    specs = [
+        (x, min(lo, x), max(hi, x), abs(x) or 1.0, i in free)
+        for i, (x, lo, hi) in enumerate(zip(theta, low, high, strict=True))
+    ]
+    found = _core.axis_fit(
+        model.core(),
+        [d.core(model, task.settings.block_s) for d in task.data],
+        specs,
+        whitening=list(point.whitening),
+        predicts=point.predicts,
+        max_iterations=task.settings.max_iterations,
+        loss_tolerance=task.settings.loss_tolerance,
+        step_tolerance=task.settings.step_tolerance,
+        cancel=token,
+    )
+    status, vector, loss, initial_loss, iterations, evaluations, matrix, errors, blocks = found
+    first = len(model.vector({})) - model.n_gains()
+    gains = tuple(vector[first : first + model.n_gains()].tolist()) if point.predicts else ()
+    return replace(
+        point,
+        theta=tuple(vector.tolist()),
+        gains=gains,
+        status=status,
+        matrix=matrix,
+        errors=errors,
+        block_gradients=blocks,
+        loss=loss,
+        initial_loss=initial_loss,
+        iterations=point.iterations + iterations,
+        evaluations=point.evaluations + evaluations,
+    )
+
+
+def search_rounds(task: Task, point: Point, ratio: float, token: _core.CancelToken) -> Point:
+    """Minimize the output error, in the rounds that the settings ask for."""
+    rough = replace(task, settings=replace(task.settings, loss_tolerance=ROUGH))
+    for gain in task.settings.gradual:
+        held = replace(point, gains=rigid_gains(task.model, ratio, gain), predicts=True)
+        point = search(rough, held, token)
+    return search(task, replace(point, gains=(), predicts=False), token)
+
+
+def free_run(task: Task, point: Point, i: int) -> Array:
+    """Simulate record ``i`` from its estimated start, without feedback of errors."""
+    model, record = task.model, task.data[i]
+    shared, states = len(model.vector({})), 2 * model.n_masses
+    begin = point.theta[shared + i * states : shared + (i + 1) * states]
+    theta = [*point.theta[:shared], *begin]
+    return _core.axis_simulate(model.core(), record.core(model), theta, predicts=False)[0]
