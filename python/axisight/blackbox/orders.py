@@ -28,26 +28,26 @@ def arx_orders(
 ) -> xr.Dataset:
     """Return a table of ARX orders, every combination, all judged on the same samples.
 
-      experiments
-          Data to fit, as in `axisight.blackbox.arx`.
-      na, nb, nk
-          Candidates, the same for every pair of channels.
-      validation
-          Fresh data for ``validation_loss``; without it that column is NaN.
+    experiments
+        Data to fit, as in `axisight.blackbox.arx`.
+    na, nb, nk
+        Candidates, the same for every pair of channels.
+    validation
+        Fresh data for ``validation_loss``; without it that column is NaN.
 
-      Variables over ``candidate``, with d parameters, N equations, L the covariance of the
-      one-step prediction errors (not corrected for d):
+    Variables over ``candidate``, with d parameters, N equations, L the covariance of the
+    one-step prediction errors (not corrected for d):
 
-      - ``na``, ``nb``, ``nk``, ``n_parameters``
-      - ``loss``: det L, ``validation_loss``: the same on validation data
-      - ``aic``: ln det L + 2 d / N, ``bic``: ln det L + d ln N / N, ``fpe``:
-      det L (1 + d/N) / (1 - d/N), with d / p for p outputs (Ljung, 1999, chapter 16)
-      - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
+    - ``na``, ``nb``, ``nk``, ``n_parameters``
+    - ``loss``: det L, ``validation_loss``: the same on validation data
+    - ``aic``: ln det L + 2 d / N, ``bic``: ln det L + d ln N / N, ``fpe``:
+    det L (1 + d/N) / (1 - d/N), with d / p for p outputs (Ljung, 1999, chapter 16)
+    - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
 
-      ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.
-      AIC and FPE tend to a high order with much data, BIC to the true one if it is among them.
+    ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.
+    AIC and FPE tend to a high order with much data, BIC to the true one if it is among them.
 
-      Raises InputError for misuse and experiments too short for the largest order.
+    Raises InputError for misuse and experiments too short for the largest order.
     """
     data = gathered(experiments, "experiments")
     fresh = None if validation is None else gathered(validation, "validation")
