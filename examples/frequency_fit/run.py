@@ -104,6 +104,8 @@ def measure(
     for run in range(realizations):
         place = number * realizations + run
         turn = np.random.default_rng([9, place]).uniform(0, 2 * np.pi, robot.n_axes)
+        # The linearized robot stays that of its starting point.
+        start = pose if model == "linear" else pose + turn * robot.core.gear_ratio
         period = references(robot, 5, place)
         simulated = simulate_batch(
             robot,
@@ -111,7 +113,7 @@ def measure(
             effects=ripple(robot, pose),
             noise_seed=5,
             first_run=3 * place,
-            start_rad=(pose + turn * robot.core.gear_ratio).tolist(),
+            start_rad=start.tolist(),
             model=model,
         )
         n = period.shape[1]

@@ -1,7 +1,11 @@
 """Axisight: identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
-from axisight import calibration, excitation, frf, montecarlo, records, rigid_body
-from axisight import excitation, frequency_fit, frf, montecarlo, records
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from axisight import excitation, frf, montecarlo, records
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.errors import (
     AxisightError,
@@ -31,6 +35,28 @@ from axisight.plots import plot_gap_map, plot_log, plot_overlay, plot_ranking, p
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate, simulate_batch
 
+if TYPE_CHECKING:
+    from axisight import (
+        blackbox,
+        calibration,
+        frequency_fit,
+        graybox,
+        identifiability,
+        rigid_body,
+        robot_file,
+    )
+
+# Packages with slow imports of their own, loaded when they are first named.
+_LATER = (
+    "blackbox",
+    "calibration",
+    "frequency_fit",
+    "graybox",
+    "identifiability",
+    "rigid_body",
+    "robot_file",
+)
+
 __all__ = [
     "AxisightError",
     "BackendError",
@@ -52,6 +78,7 @@ __all__ = [
     "StoreError",
     "StudyError",
     "Weighting",
+    "blackbox",
     "calibration",
     "check_log",
     "diagnose",
@@ -62,6 +89,8 @@ __all__ = [
     "fit",
     "frequency_fit",
     "frf",
+    "graybox",
+    "identifiability",
     "load_robot",
     "montecarlo",
     "plot_bode",
@@ -75,8 +104,15 @@ __all__ = [
     "read_log",
     "records",
     "rigid_body",
+    "robot_file",
     "robot_parameter",
     "robot_parameters",
     "simulate",
     "simulate_batch",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LATER:
+        return import_module(f"axisight.{name}")
+    raise AttributeError(f"module 'axisight' has no attribute {name!r}")

@@ -9,9 +9,10 @@ from scipy import interpolate, linalg, signal
 
 from axisight import Robot, load_robot
 from axisight.blackbox import fit_rational, rational_orders, realize
+from axisight.blackbox._model import evaluate
 from axisight.blackbox._sections import Domain, Sections, Weighted
 from axisight.blackbox._vector_fitting import relocated
-from axisight.blackbox.rational import projected_jacobian
+from axisight.blackbox.rational import _searched, projected_jacobian
 from axisight.errors import InputError
 from axisight.frf import logarithmic_mean, mfrf
 from axisight.frf.response import frequency_response
@@ -89,16 +90,17 @@ def test_poles_outside_are_mirrored(step: float | None) -> None:
     np.testing.assert_allclose(rate, [-2 + 30j, -2 - 30j, -1 + 5j, -1 - 5j], rtol=1e-9)
 
 
-def test_true_poles_stay_where_they_are() -> None:
-    """On exact data one relocation from the true poles is the identity."""
+def test_one_relocation_finds_the_poles_of_exact_data() -> None:
+    """The linear problem is then solved exactly, from the true poles and from others."""
     domain = Domain(100.0, None)
     x = domain.points(LINES)
     g = continuous(LINES).reshape(-1, 4)
     problem = Weighted(x, g, 1 / np.abs(g), np.stack([1 / x, 1 / x**2], axis=1))
     poles = OMEGA * (-ZETA + 1j * np.sqrt(1 - ZETA**2)) / 100
     poles = np.concatenate([poles, poles.conj()])
-    found = relocated(problem, Sections.of_poles(poles))
-    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(poles), rtol=1e-9)
+    for start in (poles, poles * 1.2, poles.real * 3 + 1.1j * poles.imag):
+        found = relocated(problem, Sections.of_poles(start))
+        np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(poles), rtol=1e-6)
 
 
 def test_projected_jacobian_gives_the_gradient_of_the_loss() -> None:
@@ -201,6 +203,19 @@ def test_one_direction_for_each_mode_is_refitted() -> None:
     assert least.order == 10 and least.status == "converged"
     # The residue of a mode, 2 x 2 complex, has 8 numbers, of rank one 6: two saved for each.
     assert -1e-6 <= least.loss - model.loss < 6 + 4 * np.sqrt(12)
+    # It is a minimum: to first order no entry of C or B lowers the loss.
+    scale, x = model.domain.scale_rad_s, model.problem.x
+    for name in ("b", "c"):
+        for place in ((4, 0), (7, 1)):
+            ends = []
+            for sign in (1, 0, -1):
+                b, c = least.b / scale, least.c.copy()
+                entry = b if name == "b" else c.T
+                entry[place] += 1e-2 * sign * np.abs(entry[place[0]]).max()
+                g = evaluate(least.a / scale, b, c, least.d, x)
+                left = model.problem.weight * (g.reshape(len(x), -1) - model.problem.values)
+                ends.append(np.sum(np.abs(left) ** 2))
+            assert abs(ends[0] - ends[2]) < 0.05 * (ends[0] + ends[2] - 2 * ends[1])
     cut = realize(model, rank=2)
     assert cut.order == 16 and cut.status == "exact"
 
@@ -224,6 +239,14 @@ def test_stability_is_kept_or_let_go() -> None:
     assert not free.stable and free.modes()["damping_ratio"].values[0] == pytest.approx(-0.02, 1e-4)
     kept = fit_rational(response, 2)
     assert kept.stable and kept.loss > 1e6 * free.loss
+    # A real pole outside, a start just inside: the search alone, let go, would cross.
+    g = 1 / (s - 2 * np.pi * 5)
+    free = fit_rational(noisy(g[:, None, None], LINES, 1e-3), 1, stable=False)
+    assert free.poles[0].real == pytest.approx(2 * np.pi * 5, rel=1e-3)
+    start = Sections.of_poles(free.domain.from_continuous(np.array([-0.5 + 0j])))
+    for stable in (True, False):
+        found, _, _ = _searched(free.problem, start, free.domain, stable, 60)
+        assert free.domain.stable(found.poles()) is stable
 
 
 def test_search_that_runs_out_says_so() -> None:

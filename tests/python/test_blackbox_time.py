@@ -143,8 +143,14 @@ def test_moesp_estimates_what_acts_within_the_sample() -> None:
 
 def test_moesp_takes_unknown_starts_and_coloured_noise() -> None:
     """The noise is 10 % and coloured; the poles come back to a percent of their distance."""
-    a, _, _ = known.modal_system()
+    a, b, c = known.modal_system()
     e = known.modal_experiment(3000, 0.0, 3)
+    parts = [slice(100, 400), slice(1500, 1900)]
+    exact = [Experiment(1.0, e.input[s], e.output[s]) for s in parts]
+    f = np.linspace(0.01, 0.49, 20)
+    truth = known.response(a, b, c, 0, f, 1.0)
+    got = state_space(exact, 4, method="moesp", window=10).response(f)["response"].values
+    np.testing.assert_allclose(got, truth, atol=1e-9 * np.abs(truth).max())
     colour = signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(4).normal(size=(3000, 2)), 0)
     noisy = e.output + 0.1 * e.output.std(axis=0) * colour / colour.std(axis=0)
     parts = [slice(100, 1500), slice(1500, 3000)]

@@ -15,17 +15,17 @@ from axisight import _core
 
 MODULES = (
     axisight,
+    axisight.blackbox,
     axisight.calibration,
-    axisight.excitation,
-    axisight.frf,
-    axisight.montecarlo,
-    axisight.records,
-    axisight.rigid_body,
     axisight.excitation,
     axisight.frequency_fit,
     axisight.frf,
+    axisight.graybox,
+    axisight.identifiability,
     axisight.montecarlo,
     axisight.records,
+    axisight.rigid_body,
+    axisight.robot_file,
 )
 PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}
 # The word says it all.

@@ -1,5 +1,8 @@
 """Fits of the linearized robot to frequency responses: oracles, recovery, uncertainty."""
 
+import importlib.util
+from pathlib import Path
+
 import control
 import numpy as np
 import pytest
@@ -315,3 +318,32 @@ def test_result_as_tables() -> None:
     assert dataset.attrs["status"] == fit.status
     np.testing.assert_allclose(np.diag(fit.correlation), 1.0)
     assert isinstance(fit.robot, Robot)
+
+
+def test_elastic_parameters_come_back_from_closed_loop_experiments_with_ripple(
+    repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The example in short: five poses, four realizations of 5 s, nonlinear robot, all noise on.
+
+    Ripple and motion bias a response by more than its scatter, so that standard errors are no
+    tolerance here. The bounds are twice what this run shows: 4 % and 0.5 % in the median.
+    Damping, which the motion over a resonance passes for, is only right in size.
+    """
+    path = repository / "examples" / "frequency_fit" / "run.py"
+    spec = importlib.util.spec_from_file_location("frequency_fit_example", path)
+    assert spec is not None and spec.loader is not None
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    monkeypatch.setattr(example, "PERIOD_S", 5.0)
+    monkeypatch.setattr(example, "LINES", np.arange(5, 201))
+    poses = [[0, 0.43, -1.2], [0, 0.43, -0.85], [0, 0.1, 0.2], [0, -0.9, 0.9], [0, 0.77, 0.9]]
+    data = [
+        example.measure(ROBOT, np.array(pose), i, 4, "nonlinear") for i, pose in enumerate(poses)
+    ]
+    fit = fit_responses(ROBOT, data, starts(example.NAMES))
+    error = np.abs(fit.values / true_values(example.NAMES) - 1)
+    damping = np.array(["damping" in name for name in example.NAMES])
+    assert len(error) == 13
+    assert error[~damping].max() < 0.08
+    assert np.median(error[~damping]) < 0.01
+    assert error[damping].max() < 0.9

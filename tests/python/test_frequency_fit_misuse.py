@@ -14,7 +14,9 @@ from axisight.frequency_fit import (
     identifiability,
     model_response,
 )
-from frequency_fit_data import LINES_HZ, POSES, ROBOT, TRUTH, response, responses, starts
+from axisight.frequency_fit.identifiability import assess
+from axisight.frequency_fit.parameters import specs
+from frequency_fit_data import ELASTIC, LINES_HZ, POSES, ROBOT, TRUTH, response, responses, starts
 
 NAMES = ("axis1.stiffness", "axis2.stiffness")
 CLEAN = response(POSES[0], 0.0, np.random.default_rng(0))
@@ -173,6 +175,18 @@ def test_too_few_lines_leave_combinations_unknown() -> None:
     change, single = (abs((x / base).values[0, 0, 0] - 1) for x in (other, alone))
     # The friction, not shown, moves along a little.
     assert change < 0.1 * single
+
+
+def test_two_unknown_combinations_are_told_apart() -> None:
+    """Whatever basis of the null space the eigenvectors are, each name appears once."""
+    seen = np.array([[1.0, 2.0, 0, 0, 0], [0, 0, 1.0, 1.0, 0], [0, 0, 0, 0, 1.0]])
+    mix = np.random.default_rng(1).normal(size=(3, 3))
+    found = assess(specs(ROBOT, ELASTIC[:5]), (mix @ seen).T @ (mix @ seen))
+    exponents = [c.exponents for c in found.unidentified]
+    assert len(exponents) == 2
+    powers = {frozenset(e): sorted(e.values()) for e in exponents}
+    assert powers[frozenset(ELASTIC[:2])] == pytest.approx([-0.5, 1.0])
+    assert powers[frozenset(ELASTIC[2:4])] == pytest.approx([-1.0, 1.0])
 
 
 def test_identifiability_before_any_data() -> None:

@@ -151,7 +151,7 @@ def test_total_least_squares_removes_the_bias_of_noisy_columns() -> None:
     clean = rng.normal(size=(1500, 3)) @ np.array([[1, 0.4, 0], [0, 1, 0.2], [0, 0, 1.0]])
     truth = np.array([2.0, -1.0, 0.5])
     noise = np.array([0.8, 0.0, 1.5])
-    level = 0.2
+    level = 0.4
     z, bias = [], []
     for _ in range(200):
         columns = clean + level * noise * rng.normal(size=clean.shape)
@@ -181,6 +181,23 @@ def test_block_covariance_is_the_plain_one_for_white_noise() -> None:
     assert ratio.min() > 0.6
     assert ratio.max() < 1.5
     assert found.degrees_of_freedom.max() < 200
+
+
+def test_block_covariance_is_unbiased_with_few_blocks() -> None:
+    """Ten blocks that weigh unequally: on average the variance of white noise."""
+    rng = np.random.default_rng(8)
+    columns = rng.normal(size=(200, 6)) * np.linspace(0.2, 2, 200)[:, None]
+    white = np.diag(np.linalg.inv(columns.T @ columns))
+    ratio = []
+    for _ in range(400):
+        rows = np.column_stack([columns, rng.normal(size=200)])
+        factors = Factors(triangle(rows.reshape(10, 1, 20, 7)), np.array([200.0]))
+        covariance, freedom = block_covariance(factors, solve_weighted(factors, np.ones(1)))
+        ratio.append(np.diag(covariance) / white)
+    # Five to nine degrees of freedom: each mean scatters by sqrt(2 / 5 / 400) = 3 %.
+    assert freedom.max() < 9
+    assert abs(np.mean(ratio) - 1) < 0.04
+    np.testing.assert_allclose(np.mean(ratio, axis=0), 1.0, atol=0.12)
 
 
 def coverage(colour: float, n: int, blocks: int) -> Array:

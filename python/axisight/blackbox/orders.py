@@ -41,7 +41,7 @@ def arx_orders(
       - ``na``, ``nb``, ``nk``, ``n_parameters``
       - ``loss``: det L, ``validation_loss``: the same on validation data
       - ``aic``: ln det L + 2 d / N, ``bic``: ln det L + d ln N / N, ``fpe``:
-    XX
+      det L (1 + d/N) / (1 - d/N), with d / p for p outputs (Ljung, 1999, chapter 16)
       - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
 
       ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.

@@ -94,10 +94,9 @@ def realize(
         Keep at most so many directions of each pole's residue (not of the integrators'), and
         refit; None keeps those above ``rank_tolerance``.
     rank_tolerance
-        Singular values of a residue below this share of its largest are dropped; the states
-        of a double pole in one section, which has no residues, cannot be told apart so and are refused.
+        Singular values of a residue below this share of its largest are dropped.
 
-    Raises InputError for misuse and for poles that coincide.
+    Raises InputError for misuse, and for real poles that coincide: their residues are infinite.
     """
     most = None if rank is None else whole("rank", rank, 1)
     if not 0 <= rank_tolerance < 1:

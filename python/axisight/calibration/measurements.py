@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.calibration.geometry import (
     Array,
@@ -158,7 +158,7 @@ class Checked:
         slope = by_place / self.std[0]
         if self.kind == "position":
             return off.ravel(), slope.reshape(-1, p)
-        turn = Rotation.from_matrix(
+        turn = scipy.spatial.transform.Rotation.from_matrix(
             chain.tool_rotation @ np.swapaxes(self.rotation, 1, 2)
         ).as_rotvec()
         by_turn = np.linalg.solve(left_jacobian(turn), jacobian[:, 3:])

@@ -29,6 +29,8 @@ Real = NDArray[np.float64]
 
 UNKNOWN_BEYOND = 0.5
 """A relative standard deviation from which on a combination counts as not identified."""
+NOTHING_BEYOND = 3.0
+"""A relative standard deviation, a factor of twenty, that counts as knowing nothing."""
 NUMERICAL_RANK = 1e-13
 """Eigenvalues of information, scaled to unit diagonal, below this share of the largest are zero."""
 SHOWN = 0.1
@@ -49,7 +51,7 @@ class Combination:
     def __str__(self) -> str:
         """In words."""
         names = list(self.exponents)
-        size = "not at all" if self.std > 1e3 else f"to {100 * self.std:.0f} % only"
+        size = "not at all" if self.std > NOTHING_BEYOND else f"to {100 * self.std:.0f} % only"
         if len(names) == 1:
             return f"{names[0]} is determined {size}"
         powers = " · ".join(

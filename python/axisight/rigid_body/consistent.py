@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import clarabel
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
@@ -338,6 +337,8 @@ class _Problem:
 
         The residual is a variable of its own: forming F^T F would square the condition.
         """
+        import clarabel  # noqa: PLC0415 - when it is used: it loads half of SciPy
+
         k, p = self.factor.shape
         # In units of the target, so that tolerances mean the same for every robot.
         unit = max(float(np.linalg.norm(self.target)), np.finfo(np.float64).tiny)

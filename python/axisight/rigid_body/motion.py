@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
-from scipy.signal import butter
 
 from axisight.errors import InputError
 from axisight.logs.filters import lowpass
@@ -195,7 +194,7 @@ def _butterworth(
     decimation: int,
     error: float,
 ) -> MotionEstimate:
-    poles = butter(order, 2.0 * cutoff_hz * step, output="zpk")[1]
+    poles = scipy.signal.butter(order, 2.0 * cutoff_hz * step, output="zpk")[1]
     slowest = float(np.abs(poles).max())
     # One sample more at least, for the central difference.
     trim = max(1, math.ceil(math.log(_TRANSIENT) / math.log(slowest)))
@@ -222,7 +221,7 @@ def _butterworth(
         return max(losses) - error
 
     # Every gain falls with frequency, to one half or less at the cutoff.
-    edge = float(brentq(excess, 1e-9 * cutoff_hz, cutoff_hz))
+    edge = float(scipy.optimize.brentq(excess, 1e-9 * cutoff_hz, cutoff_hz))
     return MotionEstimate(
         time_s=np.asarray(keep * step, dtype=np.float64),
         position_rad=here,

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import null_space, qr
-from scipy.optimize import minimize
 
 from axisight.errors import InputError
 from axisight.rigid_body.fourier import FourierTrajectory, series
@@ -230,7 +229,7 @@ class _Problem:
             rest = np.zeros((2, 1 + 2 * h))
             rest[0, 1 : 1 + h] = 1.0
             rest[1, 1 + h :] = np.arange(1, h + 1)
-            one = null_space(rest)
+            one = scipy.linalg.null_space(rest)
         # Velocities in units of their limit, centres in units of the range.
         out = np.zeros((n, 1 + 2 * h, n, one.shape[1]))
         for k in range(n):
@@ -263,7 +262,9 @@ class _Problem:
         flat = (phi / std[:, None]).reshape(-1, self.model.n_parameters)
         size = np.sqrt(np.mean(flat**2, axis=0))
         if columns is None:
-            _, r, order = qr(flat / np.where(size > 0, size, 1.0), mode="economic", pivoting=True)
+            _, r, order = scipy.linalg.qr(
+                flat / np.where(size > 0, size, 1.0), mode="economic", pivoting=True
+            )
             rank = int(np.sum(np.abs(np.diag(r)) > 1e-10 * abs(r[0, 0])))
             self.columns = np.sort(order[:rank])
         else:
@@ -349,7 +350,7 @@ class _Problem:
         for norm in _NORMS:
             memory = _Memory(self, norm)
             constraint: Any = {"type": "ineq", "fun": memory.limits, "jac": memory.limits_slope}
-            found = minimize(
+            found = scipy.optimize.minimize(
                 memory.cost,
                 x,
                 jac=memory.slope,

@@ -185,7 +185,7 @@ impl<'a> Relaxed<'a> {
                 .is_ok_and(|f| trace(&f.inverse(), &change) > 0.0);
             if rising { low = middle } else { high = middle }
         }
-        let step = if high == most { most } else { low };
+        let step = if high < most { low } else { most };
         let before = (self.weights.clone(), self.log_det());
         self.weights[from] -= step;
         self.weights[to] += step;

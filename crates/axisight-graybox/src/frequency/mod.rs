@@ -1,11 +1,13 @@
 //! The linearized robot fitted to frequency responses (thesis section 3.4.2).
 
+mod checks;
 mod design;
 mod direct;
 mod hold;
 mod minimize;
 mod modal;
 mod problem;
+mod residuals;
 mod response;
 mod second_order;
 mod weighting;

@@ -85,7 +85,7 @@ impl Modal {
         }
         let inverse = shape.clone().try_inverse()?;
         let condition = shape.norm() * inverse.norm();
-        if !(condition < LARGEST_CONDITION) {
+        if condition.is_nan() || condition >= LARGEST_CONDITION {
             return None;
         }
         // Back to the coordinates of the model: p = L^-T p'', forces L^-1.
@@ -182,8 +182,9 @@ impl Modal {
         self.close.contains(&(j.min(k), j.max(k)))
     }
 
-    /// `N(s) / ((s - a)(s - b)) = (N(a) + N(b)) / 2 / ((s - a)(s - b))
-    /// + (n2 (a + b) + n1) / 2 (1 / (s - a) + 1 / (s - b)) + n2`; the constants cancel in the sum.
+    /// Terms of close pairs: with `n2 s^2 + n1 s + n0 = N(s)` the quotient `N / ((s - a)(s - b))`
+    /// is `(N(a) + N(b)) / 2` over the product, `(n2 (a + b) + n1) / 2` over each pole alone,
+    /// and a constant that cancels in the sum.
     fn add_close(&self, moved: &Moved, out: &mut Coefficients) {
         let n_elements = self.n_axes() * (self.n_axes() + 1) / 2;
         for (number, (a, b)) in self.close.iter().enumerate() {

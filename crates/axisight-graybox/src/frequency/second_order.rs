@@ -142,7 +142,7 @@ impl<'a> Linearizer<'a> {
         let settled = self.settled_stiffness(&q)?;
         let mut derivatives = Vec::with_capacity(self.count);
         for (chunk, plant) in self.seeded.iter().enumerate() {
-            let moved = self.settled_angles(plant, &q, &settled);
+            let moved = settled_angles(plant, &q, &settled);
             let found = self.matrices(plant, &moved);
             let width = (self.count - chunk * WIDTH).min(WIDTH);
             let part = |values: &[D], seed: usize| {
@@ -181,26 +181,6 @@ impl<'a> Linearizer<'a> {
             spring + gravity[elastic[i].0 * n + elastic[j].0]
         });
         matrix.cholesky().ok_or(SecondOrderError::Unstable)
-    }
-
-    /// Joint angles whose derivatives keep the elastic joints in equilibrium.
-    fn settled_angles(&self, plant: &Plant<D>, q: &[f64], settled: &Settled) -> Vec<D> {
-        let rest: Vec<D> = vec![D::zero(); q.len()];
-        let mut angles: Vec<D> = q.iter().map(|x| D::constant(*x)).collect();
-        let force = plant.dynamics.evaluate(&angles, &rest).bias;
-        let residual: Vec<D> = plant
-            .elastic
-            .iter()
-            .map(|(joint, stiffness, _)| force[*joint] + *stiffness * angles[*joint])
-            .collect();
-        for seed in 0..WIDTH {
-            let slope = residual.iter().map(|r| -r.partials[seed]);
-            let slope = DVector::from_iterator(residual.len(), slope);
-            for ((joint, ..), x) in plant.elastic.iter().zip(settled.solve(&slope).iter()) {
-                angles[*joint].partials[seed] = *x;
-            }
-        }
-        angles
     }
 
     fn matrices<S: Scalar>(&self, plant: &Plant<S>, q: &[S]) -> Matrices<S> {
@@ -281,3 +261,23 @@ impl<'a> Linearizer<'a> {
 }
 
 type Settled = nalgebra::Cholesky<f64, nalgebra::Dyn>;
+
+/// Joint angles whose derivatives keep the elastic joints in equilibrium.
+fn settled_angles(plant: &Plant<D>, q: &[f64], settled: &Settled) -> Vec<D> {
+    let rest: Vec<D> = vec![D::zero(); q.len()];
+    let mut angles: Vec<D> = q.iter().map(|x| D::constant(*x)).collect();
+    let force = plant.dynamics.evaluate(&angles, &rest).bias;
+    let residual: Vec<D> = plant
+        .elastic
+        .iter()
+        .map(|(joint, stiffness, _)| force[*joint] + *stiffness * angles[*joint])
+        .collect();
+    for seed in 0..WIDTH {
+        let slope = residual.iter().map(|r| -r.partials[seed]);
+        let slope = DVector::from_iterator(residual.len(), slope);
+        for ((joint, ..), x) in plant.elastic.iter().zip(settled.solve(&slope).iter()) {
+            angles[*joint].partials[seed] = *x;
+        }
+    }
+    angles
+}

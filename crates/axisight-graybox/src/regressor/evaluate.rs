@@ -65,7 +65,7 @@ impl Regressor {
         let n = geometry.segments.len();
         let n_rows = row_map.len().checked_div(n).unwrap_or(0);
         if n_rows == 0 {
-            return Err(RegressorError::new("rows", "at least one row", "none"));
+            return Err(RegressorError::new("rows", "at least one row", &"none"));
         }
         check_rows("rows", row_map, n_rows, n)?;
         for extra in &extras {
@@ -147,6 +147,28 @@ impl Regressor {
         }
     }
 
+    /// Entries of all rows that lie side by side.
+    fn runs(&self) -> Vec<Run> {
+        let n_parameters = self.n_parameters();
+        let places = self
+            .rows
+            .iter()
+            .enumerate()
+            .flat_map(|(r, row)| row.iter().map(move |entry| r * n_parameters + entry.column));
+        let mut out: Vec<Run> = Vec::new();
+        for (first, place) in places.enumerate() {
+            match out.last_mut() {
+                Some(run) if run.place + run.len == place => run.len += 1,
+                _ => out.push(Run {
+                    place,
+                    first,
+                    len: 1,
+                }),
+            }
+        }
+        out
+    }
+
     /// The regressor `(n_samples, n_rows, n_parameters)`, row-major.
     ///
     /// # Errors
@@ -159,20 +181,17 @@ impl Regressor {
         if width == 0 {
             return Ok(out);
         }
+        let runs = self.runs();
         out.par_chunks_mut(TASK * width).enumerate().for_each_init(
-            || self.scratch(),
-            |scratch, (task, out)| {
+            || (self.scratch(), Vec::new()),
+            |(scratch, values), (task, out)| {
                 for (group, out) in out.chunks_mut(LANES * width).enumerate() {
                     self.sweep(scratch, motion, task * TASK + group * LANES);
-                    for (r, row) in self.rows.iter().enumerate() {
-                        for entry in row {
-                            let value = entry.value(scratch);
-                            let start = r * n_parameters + entry.column;
-                            let places = out[start..].iter_mut().step_by(width);
-                            for (place, x) in places.zip(value.0) {
-                                *place = x;
-                            }
-                        }
+                    values.clear();
+                    let entries = self.rows.iter().flatten();
+                    values.extend(entries.map(|entry| entry.value(scratch)));
+                    for (lane, sample) in out.chunks_exact_mut(width).enumerate() {
+                        copy_lane(&runs, values, lane, sample);
                     }
                 }
             },
@@ -196,6 +215,24 @@ impl Entry {
             sum = scratch.sweep.cells[*cell].fma(Lane::constant(*weight), sum);
         }
         sum
+    }
+}
+
+/// Entries side by side: where they go in a sample, the first of them, how many.
+struct Run {
+    place: usize,
+    first: usize,
+    len: usize,
+}
+
+/// One lane of the values to its sample.
+#[inline(always)]
+fn copy_lane(runs: &[Run], values: &[Lane], lane: usize, sample: &mut [f64]) {
+    for run in runs {
+        let to = &mut sample[run.place..run.place + run.len];
+        for (to, value) in to.iter_mut().zip(&values[run.first..run.first + run.len]) {
+            *to = value.0[lane];
+        }
     }
 }
 

@@ -66,7 +66,7 @@ impl Extra {
         ] {
             if x.len() != n || !x.iter().all(|v| v.is_finite()) {
                 let expected = format!("{n} finite numbers");
-                return Err(RegressorError::new(name, expected, format!("{x:?}")));
+                return Err(RegressorError::new(name, expected, &format!("{x:?}")));
             }
         }
         if let Signal::Direction {
@@ -76,7 +76,7 @@ impl Extra {
         {
             for (name, x) in [("dead_band", dead_band), ("smoothing", smoothing)] {
                 if !(x.is_finite() && x >= 0.0) {
-                    return Err(RegressorError::new(name, "a number not below zero", x));
+                    return Err(RegressorError::new(name, "a number not below zero", &x));
                 }
             }
         }

@@ -88,11 +88,11 @@ impl Regressor {
         if !increasing || request.columns.last().is_some_and(|last| *last >= p) {
             let expected = format!("increasing numbers below {p}");
             let got = format!("{:?}", request.columns);
-            return Err(RegressorError::new("columns", expected, got));
+            return Err(RegressorError::new("columns", expected, &got));
         }
         if request.blocks == 0 || request.blocks > n_samples {
             let expected = format!("1 to {n_samples} blocks");
-            return Err(RegressorError::new("blocks", expected, request.blocks));
+            return Err(RegressorError::new("blocks", expected, &request.blocks));
         }
         Ok(())
     }
@@ -136,14 +136,19 @@ impl Regressor {
             .collect();
         for start in (from..to).step_by(PIECE) {
             let end = to.min(start + PIECE);
-            pieces.iter_mut().for_each(|piece| piece.fill(EMPTY));
+            for piece in &mut pieces {
+                piece.fill(EMPTY);
+            }
             for first in (start..end).step_by(LANES) {
                 let lanes = LANES.min(end - first);
                 self.sweep(&mut scratch, motion, first);
                 for (r, (plan, piece)) in plans.iter().zip(&mut pieces).enumerate() {
                     let sample = |x: &[f64], lane: usize| x[(first + lane) * n_rows + r];
-                    let weight =
-                        |lane: usize| request.weight.map_or(1.0, |weight| sample(weight, lane));
+                    // Zero where a lane has no sample.
+                    let mut weight = [0.0; LANES];
+                    for (lane, weight) in weight.iter_mut().enumerate().take(lanes) {
+                        *weight = request.weight.map_or(1.0, |weight| sample(weight, lane));
+                    }
                     let mut rest = [0.0; LANES];
                     for (lane, rest) in rest.iter_mut().enumerate().take(lanes) {
                         *rest = sample(request.torque, lane);
@@ -158,8 +163,8 @@ impl Regressor {
                     let values = plan.kept.iter().map(|(_, i)| row[*i].value(&scratch).0);
                     let at = (first - start) / LANES;
                     for (column, value) in piece.iter_mut().zip(values.chain([rest])) {
-                        for lane in 0..lanes {
-                            column[at][lane] = value[lane] * weight(lane);
+                        for lane in 0..LANES {
+                            column[at][lane] = value[lane] * weight[lane];
                         }
                     }
                 }

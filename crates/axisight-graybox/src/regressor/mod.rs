@@ -32,7 +32,7 @@ pub struct RegressorError {
 }
 
 impl RegressorError {
-    fn new(field: &str, expected: impl Into<String>, got: impl ToString) -> Self {
+    fn new(field: &str, expected: impl Into<String>, got: &impl ToString) -> Self {
         Self {
             field: field.to_owned(),
             expected: expected.into(),
@@ -50,14 +50,14 @@ fn check_rows(
 ) -> Result<(), RegressorError> {
     if x.len() != n_samples * columns {
         let expected = format!("{n_samples} rows of {columns} numbers");
-        return Err(RegressorError::new(field, expected, x.len()));
+        return Err(RegressorError::new(field, expected, &x.len()));
     }
     match x.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
         Some(i) => Err(RegressorError::new(
             field,
             "finite numbers",
-            format!("{} at row {}, column {}", x[i], i / columns, i % columns),
+            &format!("{} at row {}, column {}", x[i], i / columns, i % columns),
         )),
     }
 }
