@@ -297,6 +297,7 @@ def simulate_deflection(
     gear_ratio : r, joint angle per motor angle.
 
     Raises InputError for arrays that differ in length or are not finite.
+
     """
     torque, velocity = (
         np.asarray(v, dtype=np.float64).ravel() for v in (torque_nm, velocity_rad_s)

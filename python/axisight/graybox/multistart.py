@@ -15,15 +15,8 @@ from axisight.errors import InputError
 from axisight.graybox.axis_checks import data_warnings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
-from axisight.graybox.prediction_error import (
-    GRADUAL,
-    FitSettings,
-    Point,
-    Task,
-    first_point,
-    prepare,
-    search_rounds,
-)
+from axisight.graybox.axis_search import FitSettings, Point, Task, first_point, search_rounds
+from axisight.graybox.prediction_error import prepare
 
 
 @dataclass(frozen=True)
@@ -76,11 +69,9 @@ def multistart_axis(
     the bounds. The draws are a function of (seed, number of the run) alone, and the result does
     not depend on ``threads`` (0 takes every core).
 
-    By default every fit approaches the simulation error in rounds (``settings.gradual``),
-    first with the speed error fed back: a start whose resonance is far off has local minima
-    otherwise. Errors and other arguments as in `fit_axis`.
+    Errors and other arguments as in `fit_axis`.
     """
-    chosen = settings or FitSettings(gradual=GRADUAL)
+    chosen = settings or FitSettings()
     for field, value, least in (
         ("n_starts", n_starts, 1),
         ("seed", seed, 0),
