@@ -38,7 +38,7 @@ MODEL = AxisModel(n_masses=2, gear_ratio=GEAR_RATIO, output="velocity_difference
 THREE_MASSES = replace(MODEL, n_masses=3, cubic=None)
 NAMES = ("J_m", "J_a", "k1", "k3", "d", "F_v", "F_c")
 # A share of 1e-9 of the loss is a hundredth of a standard error with 32,500 samples.
-_SETTINGS = FitSettings(max_iterations=30, loss_tolerance=1e-9, step_tolerance=1e-7)
+_SETTINGS = FitSettings(max_iterations=30, loss_tolerance=1e-9, step_tolerance=1e-7, gradual=())
 
 
 @dataclass(frozen=True)
