@@ -35,6 +35,17 @@ from axisight.robot_sidecar import Sidecar, first_fault, text_hash
 from axisight.storage import write_whole
 from axisight.toml_spans import value_spans
 
+__all__ = [
+    "Identified",
+    "Provenance",
+    "hash_file",
+    "identified",
+    "identified_by_fit",
+    "load_identified",
+    "sidecar_path",
+    "write_identified",
+]
+
 Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 
