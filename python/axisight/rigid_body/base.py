@@ -117,7 +117,10 @@ class BaseParameters:
         return np.asarray(start + scale * step, dtype=np.float64)
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
-        """Return the regressor of the base parameters, shape (n, n_rows, n_base)."""
+        """Return the regressor of the base parameters, shape (n, n_rows, n_base).
+
+        Arguments ``q``, ``v``, ``a``, ``threads`` as of :func:`torque_regressor`.
+        """
         return self.model.matrix(q, v, a, threads=threads)[..., self.columns]
 
 
