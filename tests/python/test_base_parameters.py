@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import axisight.rigid_body.base as base_module
 import pinocchio_model
-from axisight.errors import InputError
+from axisight.errors import AxisightError, InputError
 from axisight.rigid_body import USUAL_TERMS, TorqueModel, base_parameters
 from rigid_body_data import description, motion, random_chain, robot_of, wrist_arm
 
@@ -102,6 +103,18 @@ def test_rank_of_pinocchio_s_regressor(seed: int) -> None:
     h = h[:, size > 1e-10 * size.max()]
     rank = np.linalg.matrix_rank(h / np.linalg.norm(h, axis=0), tol=1e-8)
     assert len(base_parameters(robot)) == rank
+
+
+def test_a_rank_without_a_gap_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dependences that hold to a few 1e-6 are taken as such; not if others hold to 1e-4."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(20, 20))
+    factor[:, 18] = factor[:, 3] + 4e-6 * factor[:, 18]
+    monkeypatch.setattr(base_module, "random_factor", lambda *_: factor)
+    assert len(base_parameters(robot_of(planar([0.0, 0.0, -9.81])))) == 19
+    factor[:, 19] = factor[:, 4] + 1e-4 * factor[:, 19]
+    with pytest.raises(AxisightError, match=r"structural rank not clear: 19 .* with a gap of"):
+        base_parameters(robot_of(planar([0.0, 0.0, -9.81])))
 
 
 def test_seed_and_side_change_nothing_but_units_of_rounding() -> None:

@@ -23,9 +23,12 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Singular values of the scaled random regressor: structural zeros are rounding, 1e-15 or so
-# of the largest, and what is not zero stays above 1e-4 in any arm that is not degenerate.
-TOLERANCE = 1e-9
+# Singular values of the scaled random regressor: those of an arm that is not degenerate are
+# above 0.01; structural zeros are rounding, or, where axes are parallel but for angles written
+# as 1.5708, a few 1e-6.
+TOLERANCE = 1e-5
+# Between the two there must be a gap; an ordinary arm has 1e13.
+LEAST_GAP = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +117,10 @@ class BaseParameters:
         return np.asarray(start + scale * step, dtype=np.float64)
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
-        """Return the regressor of the base parameters, shape (n, n_rows, n_base)."""
+        """Return the regressor of the base parameters, shape (n, n_rows, n_base).
+
+        Arguments ``q``, ``v``, ``a``, ``threads`` as of :func:`torque_regressor`.
+        """
         return self.model.matrix(q, v, a, threads=threads)[..., self.columns]
 
 
@@ -142,7 +148,8 @@ def base_parameters(
     seed : of the random motions.
 
     Raises InputError for unknown names, and AxisightError if singular values and pivoted QR
-    disagree about the rank, that is if the robot is within rounding of a degenerate one.
+    disagree about the rank or show no gap, that is if the robot is within rounding of a
+    degenerate one.
 
     """
     model = as_model(robot, terms, side, coupling)
@@ -153,10 +160,11 @@ def base_parameters(
     found = group(factor, TOLERANCE, skip=silent)
     pivots = np.abs(np.diag(scipy.linalg.qr(found.scaled, mode="r", pivoting=True)[0]))
     rank_qr = int((pivots > TOLERANCE * pivots.max(initial=0.0)).sum())
-    if not found.rank == rank_qr == len(found.independent):
+    if not found.rank == rank_qr == len(found.independent) or found.gap < LEAST_GAP:
         raise AxisightError(
-            f"structural rank not clear: {found.rank} by singular values, {rank_qr} by QR with "
-            f"pivoting, {len(found.independent)} in order; is the robot nearly degenerate?"
+            f"structural rank not clear: {found.rank} by singular values, with a gap of "
+            f"{found.gap:.2g}, {rank_qr} by QR with pivoting, {len(found.independent)} in order; "
+            "a length or an angle of the robot is zero all but for rounding"
         )
     matrix = np.zeros((found.rank, model.n_parameters))
     matrix[:, free] = found.matrix

@@ -116,7 +116,7 @@ class TorqueModel:
         return [column.extra for column in self.columns if column.extra is not None]
 
     def motion(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
-        """Check a motion and return it as float64 arrays (n, n_joints)."""
+        """Check a motion ``q``, ``v``, ``a`` and return it as float64 arrays (n, n_joints)."""
         arrays = [
             rows(name, value, self.robot.n_joints) for name, value in (("q", q), ("v", v), ("a", a))
         ]
@@ -126,7 +126,10 @@ class TorqueModel:
         return arrays[0], arrays[1], arrays[2]
 
     def matrix(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
-        """Return the regressor, shape (n, n_rows, n_parameters)."""
+        """Return the regressor, shape (n, n_rows, n_parameters).
+
+        Arguments ``q``, ``v``, ``a``, ``threads`` as of :func:`torque_regressor`.
+        """
         q, v, a = self.motion(q, v, a)
         return _core.torque_regressor(
             self.robot.core, q, v, a, rows=self.row_map, extras=self.extras, threads=threads

@@ -150,7 +150,7 @@ class RigidBodyEstimate:
         return np.divide(self.standard_error, size, out=out, where=size > 0)
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return the bounds of the confidence intervals, by Student's distribution."""
+        """Return the bounds of the confidence intervals of a ``level``, by Student's distribution."""
         if not 0 < level < 1:
             raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
         factor = scipy.stats.t.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)
@@ -169,7 +169,10 @@ class RigidBodyEstimate:
         return self.base.to_standard(self.values, start)
 
     def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Return the torques of a motion, shape (n, n_rows) [Nm], on the side of the model."""
+        """Return the torques of a motion, shape (n, n_rows) [Nm], on the side of the model.
+
+        ``q``, ``v``, ``a``: (n, n_joints) angles, velocities, accelerations of the joints.
+        """
         matrix = self.model.matrix(q, v, a)
         held = np.array([self.known.get(name, 0.0) for name in self.model.names])
         held[self.base.columns] += self.values
@@ -178,7 +181,7 @@ class RigidBodyEstimate:
     def torque_error(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, torque_nm: ArrayLike
     ) -> xr.Dataset:
-        """Return the error on a motion, e.g. one held out.
+        """Return the error on a motion ``q``, ``v``, ``a``, e.g. one held out.
 
         Dataset over rows: ``rms_nm`` and ``relative_error``, rms(model - measured) over
         rms(measured).
