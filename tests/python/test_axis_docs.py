@@ -23,4 +23,4 @@ def test_page_recovers_its_truth(shown: dict[str, Any]) -> None:
         # Seven parameters within four standard deviations.
         assert np.all(off < 4 * fit.std)
     assert shown["low"] < shown["high"]
-    assert shown["share"] > 0.8
+    assert shown["share"] >= 0.5

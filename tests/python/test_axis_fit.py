@@ -140,8 +140,8 @@ def test_noise_filter_whitens_coloured_noise():
     white = 0.05 * rng.normal(size=12000)
     a = np.poly([0.95, 0.6])
     data = record(n=12000, seed=3, noise=signal.lfilter([1], a, white))
-    plain = fit_axis(TWO, data, START)
-    fit = fit_axis(TWO, data, START, noise_model="ar", settings=FitSettings(ar_order=2))
+    plain = fit_axis(TWO, data, TRUTH)
+    fit = fit_axis(TWO, data, TRUTH, noise_model="ar", settings=FitSettings(ar_order=2))
     assert fit.converged and fit.noise.kind == "ar"
     # Coefficients of a second-order process from n samples have a standard deviation of
     # sqrt(1 - a_2^2) / sqrt(n) = 0.0075, and as much again because the parameters are fitted.

@@ -84,6 +84,8 @@ pub(super) enum Regime {
 #[derive(Debug, Clone)]
 pub(super) struct Chain<S, const N: usize> {
     inverse_inertia: [S; N],
+    /// Motor acceleration by torque of the gear spring.
+    gear_mobility: S,
     linear: [S; N],
     cubic: [S; N],
     damping: [S; N],
@@ -124,8 +126,10 @@ impl<S: Number, const N: usize> Chain<S, N> {
         let harmonic = |(i, order): (usize, &f64)| {
             (*order, value(layout.ripple(i)), value(layout.ripple(i) + 1))
         };
+        let inverse_inertia: [S; N] = from_fn(|i| value(layout.inertia(i)).recip());
         Self {
-            inverse_inertia: from_fn(|i| value(layout.inertia(i)).recip()),
+            inverse_inertia,
+            gear_mobility: -(inverse_inertia[0] * ratio),
             linear: spring(&|i| layout.linear(i)),
             cubic: spring(&|i| layout.cubic(i)),
             damping: spring(&|i| layout.damping(i)),
@@ -149,23 +153,13 @@ impl<S: Number, const N: usize> Chain<S, N> {
         }
     }
 
-    /// Times the gear ratio, whose derivative only an extended chain carries.
+    /// `x` times the gear ratio, whose derivative only an extended chain carries, minus `y`.
     #[inline(always)]
-    fn geared<const EXTENDED: bool>(&self, x: S) -> S {
+    fn geared_less<const EXTENDED: bool>(&self, x: S, y: S) -> S {
         if EXTENDED {
-            x * self.ratio
+            x.fma(self.ratio, -y)
         } else {
-            x * self.plain_ratio
-        }
-    }
-
-    /// `onto` minus `x` times the gear ratio.
-    #[inline(always)]
-    fn less_geared<const EXTENDED: bool>(&self, x: S, onto: S) -> S {
-        if EXTENDED {
-            onto - x * self.ratio
-        } else {
-            x.times_plus(-self.plain_ratio, onto)
+            x.times_plus(self.plain_ratio, -y)
         }
     }
 
@@ -175,12 +169,11 @@ impl<S: Number, const N: usize> Chain<S, N> {
         // Loops, because the closures of `from_fn` are not always inlined.
         let (mut rates, mut torques) = ([S::zero(); N], [S::zero(); N]);
         for i in 1..N {
-            let before = if i == 1 {
-                self.geared::<EXTENDED>(x.speed[0])
+            rates[i] = if i == 1 {
+                self.geared_less::<EXTENDED>(x.speed[0], x.speed[1])
             } else {
-                x.speed[i - 1]
+                x.speed[i - 1] - x.speed[i]
             };
-            rates[i] = before - x.speed[i];
             let (deflection, rate) = if EXTENDED && i == 1 {
                 let (loaded, slope) = dead_zone(x.place[1], self.backlash);
                 (loaded, slope * rates[1])
@@ -188,15 +181,16 @@ impl<S: Number, const N: usize> Chain<S, N> {
                 (x.place[i], rates[i])
             };
             let stiffness = self.cubic[i].fma(deflection.square(), self.linear[i]);
-            torques[i] = stiffness.fma(deflection, self.damping[i] * rate);
+            // The rate comes last: every operation after it delays the next stage.
+            torques[i] = rate.fma(self.damping[i], stiffness * deflection);
         }
         (rates, torques)
     }
 
-    /// Torque on the motor but for the friction, and the torque of the gear spring on it.
+    /// Torque on the motor but for gear and friction.
     #[inline(always)]
-    fn drive<const EXTENDED: bool>(&self, x: &State<S, N>, gear: S, torque: f64) -> S {
-        let mut drive = self.less_geared::<EXTENDED>(gear, S::constant(torque));
+    fn drive<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> S {
+        let mut drive = S::constant(torque);
         if EXTENDED {
             drive += self.offset;
             for (order, cosine, sine) in &self.ripple {
@@ -241,9 +235,9 @@ impl<S: Number, const N: usize> Chain<S, N> {
             place[0] = x.speed[0];
         }
         let mut speed = [S::zero(); N];
-        let drive = self.drive::<EXTENDED>(x, springs[1], torque);
         let friction = self.friction::<EXTENDED>(x.speed[0], regime);
-        speed[0] = (drive - friction) * self.inverse_inertia[0];
+        let own = (self.drive::<EXTENDED>(x, torque) - friction) * self.inverse_inertia[0];
+        speed[0] = springs[1].fma(self.gear_mobility, own);
         for i in 1..N {
             let net = if i + 1 < N {
                 springs[i] - springs[i + 1]
@@ -263,7 +257,7 @@ impl<S: Number, const N: usize> Chain<S, N> {
     #[inline(always)]
     pub fn standing_drive<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> S {
         let (_, springs) = self.springs::<EXTENDED>(x);
-        self.drive::<EXTENDED>(x, springs[1], torque)
+        self.drive::<EXTENDED>(x, torque) - springs[1] * self.ratio
     }
 
     /// Torque that the friction of a standing motor withstands.

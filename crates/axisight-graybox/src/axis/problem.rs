@@ -261,22 +261,29 @@ impl<'a> AxisProblem<'a> {
         rows: &mut Rows,
     ) -> Result<(), AxisError> {
         #[cfg(target_arch = "x86_64")]
-        if N <= 3 && !EXTENDED && wide::available() {
+        if wide::available() && !EXTENDED {
             // SAFETY: the processor has the instructions.
             #[allow(unsafe_code)]
-            return unsafe { self.wide_pass::<N, EXTENDED>(task, rows) };
+            match N {
+                2 => return unsafe { self.wide_pass_of_two(task, rows) },
+                3 => return unsafe { self.wide_pass_of_three(task, rows) },
+                _ => {}
+            }
         }
         self.pass_of::<Lanes<LANES>, N, EXTENDED>(task, rows)
     }
 
+    // By name for the common chains: compiled for all of them, the package takes minutes longer.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f")]
-    fn wide_pass<const N: usize, const EXTENDED: bool>(
-        &self,
-        task: &Pass<'_>,
-        rows: &mut Rows,
-    ) -> Result<(), AxisError> {
-        self.pass_of::<wide::Wide, N, EXTENDED>(task, rows)
+    fn wide_pass_of_two(&self, task: &Pass<'_>, rows: &mut Rows) -> Result<(), AxisError> {
+        self.pass_of::<wide::Wide, 2, false>(task, rows)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn wide_pass_of_three(&self, task: &Pass<'_>, rows: &mut Rows) -> Result<(), AxisError> {
+        self.pass_of::<wide::Wide, 3, false>(task, rows)
     }
 
     #[inline(always)]

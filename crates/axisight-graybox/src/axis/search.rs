@@ -93,6 +93,10 @@ pub struct SearchResult {
 /// Damped trials, each damped more, before the search gives up.
 const MOST_TRIALS: usize = 12;
 
+/// Promise, in variances of one residual, below which a search has settled: parameters are
+/// then within a tenth of a standard deviation of the minimum.
+const SETTLED: f64 = 1e-2;
+
 /// Share of the energy of the data below which residuals are rounding errors.
 const ROUNDING: f64 = 1e-28;
 
@@ -175,7 +179,7 @@ impl Search<'_> {
                 let loss = point.normal.loss;
                 let promised = promise(&point.normal, &self.change(&theta, &next));
                 if self.moved(&theta, &next) <= self.options.step_tolerance {
-                    break 'search SearchStatus::StepConverged;
+                    break 'search self.stopped(&theta, &point.normal);
                 }
                 if promised <= self.options.loss_tolerance * loss && damping < 1.0 {
                     break 'search SearchStatus::LossConverged;
@@ -197,7 +201,7 @@ impl Search<'_> {
                         growth *= 2.0;
                         trials += 1;
                         if trials > MOST_TRIALS {
-                            break 'search SearchStatus::Stalled;
+                            break 'search self.stopped(&theta, &point.normal);
                         }
                     }
                 }
@@ -218,6 +222,18 @@ impl Search<'_> {
             evaluations: self.evaluations,
             normal: point.normal,
         })
+    }
+
+    /// A search that no longer moves: settled if the undamped step promises next to nothing of
+    /// what the noise of one parameter is worth, stalled otherwise.
+    fn stopped(&self, theta: &[f64], normal: &Normal) -> SearchStatus {
+        let undamped = self.step(theta, normal, 0.0);
+        let promised = promise(normal, &self.change(theta, &undamped));
+        if promised * normal.count as f64 <= SETTLED * normal.loss {
+            SearchStatus::StepConverged
+        } else {
+            SearchStatus::Stalled
+        }
     }
 
     fn change(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
