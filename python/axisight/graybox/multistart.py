@@ -69,7 +69,7 @@ def multistart_axis(
     the bounds. The draws are a function of (seed, number of the run) alone, and the result does
     not depend on ``threads`` (0 takes every core).
 
-    Errors and other arguments as in `fit_axis`.
+    ``fixed``, ``bounds``, ``settings`` and errors are as in `fit_axis`.
     """
     chosen = settings or FitSettings()
     for field, value, least in (
