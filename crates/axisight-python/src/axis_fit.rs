@@ -114,6 +114,9 @@ type Outcome<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// Numbers by sample, and several of them.
+type VectorAndMatrix<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
 fn outcome<'py>(py: Python<'py>, result: SearchResult) -> PyResult<Outcome<'py>> {
     let free = result.normal.gradient.len();
     Ok((
@@ -173,7 +176,7 @@ pub fn axis_linearize<'py>(
     whitening: Vec<f64>,
     predicts: bool,
     cancel: Option<&Bound<'py, CancelToken>>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<VectorAndMatrix<'py>> {
     let cancel = flag(cancel);
     let model = self::model(model)?;
     let data = self::sets(&sets);
@@ -199,7 +202,7 @@ pub fn axis_simulate<'py>(
     theta: Vec<f64>,
     predicts: bool,
     cancel: Option<&Bound<'py, CancelToken>>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<VectorAndMatrix<'py>> {
     let cancel = flag(cancel);
     let model = self::model(model)?;
     let columns = 2 * model.masses;

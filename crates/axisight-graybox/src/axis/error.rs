@@ -28,6 +28,8 @@ pub enum AxisError {
 
 impl AxisError {
     /// Misuse of `field`.
+    // Callers hand over what they have just computed.
+    #[allow(clippy::needless_pass_by_value)]
     pub(super) fn invalid(
         field: impl Into<String>,
         expected: impl Into<String>,

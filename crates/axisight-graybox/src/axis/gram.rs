@@ -104,9 +104,6 @@ impl Rows {
 
     /// Multiply by the root of a weight.
     pub fn weigh(&mut self, root: f64) {
-        if root == 1.0 {
-            return;
-        }
         self.residual.iter_mut().for_each(|r| *r *= root);
         self.partials
             .as_flattened_mut()

@@ -101,7 +101,7 @@ impl<S: Number, const N: usize> Motion<S, N> {
             Regime::Slip(speed.signum())
         } else {
             self.changes
-                .from_standstill::<EXTENDED>(&x.values(), ramp.torque)
+                .leaving_standstill::<EXTENDED>(&x.values(), ramp.torque)
         };
         let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime);
         let lasts = match regime {
@@ -123,7 +123,7 @@ impl<S: Number, const N: usize> Motion<S, N> {
 
 impl<S: Number, const N: usize> Changes<S, N> {
     #[inline(never)]
-    fn from_standstill<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64) -> Regime {
+    fn leaving_standstill<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64) -> Regime {
         let drive = self.plain.standing_drive::<EXTENDED>(x, torque);
         if drive.abs() <= self.plain.breakaway() {
             Regime::Stick
@@ -168,7 +168,7 @@ impl<S: Number, const N: usize> Changes<S, N> {
             }
             if matches!(regime, Regime::Slip(_)) {
                 x.speed[0] = S::zero();
-                regime = self.from_standstill::<EXTENDED>(&x.values(), ramp.torque);
+                regime = self.leaving_standstill::<EXTENDED>(&x.values(), ramp.torque);
             } else {
                 let drive = self
                     .plain

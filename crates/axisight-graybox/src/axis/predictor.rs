@@ -81,7 +81,8 @@ impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
                 Output::Position => x.place[0],
                 Output::VelocityDifference => (x.place[0] - last_place) * (1.0 / data.sample_time),
             };
-            if !(x.speed[0].lane(0).abs() < LARGEST_SPEED) {
+            let speed = x.speed[0].lane(0).abs();
+            if speed.is_nan() || speed >= LARGEST_SPEED {
                 return Err(AxisError::Diverged {
                     set: data.number,
                     sample: k,

@@ -93,12 +93,13 @@ pub struct SearchResult {
 /// Damped trials, each damped more, before the search gives up.
 const MOST_TRIALS: usize = 12;
 
-/// Promise, in variances of one residual, below which a search has settled: parameters are
-/// then within a tenth of a standard deviation of the minimum.
-const SETTLED: f64 = 1e-2;
+/// Promise, in variances of one residual, below which a search has settled: all parameters
+/// together are then within 0.7 standard deviations of the minimum. Instants at which the friction
+/// changes put kinks of that size into a noisy loss.
+const SETTLED: f64 = 0.5;
 
 /// Share of the energy of the data below which residuals are rounding errors.
-const ROUNDING: f64 = 1e-28;
+const ROUNDING: f64 = 1e-24;
 
 struct Search<'a> {
     problem: &'a AxisProblem<'a>,
