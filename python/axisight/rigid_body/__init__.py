@@ -23,6 +23,7 @@ from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
 from axisight.rigid_body.motion import MotionEstimate, estimate_motion
 from axisight.rigid_body.regressor import TorqueModel, torque_regressor
 from axisight.rigid_body.result import RigidBodyEstimate
+from axisight.rigid_body.robot_values import identified_bodies
 from axisight.rigid_body.trajectories import MotionLimits, TrajectoryDesign, optimize_trajectory
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "energy_regressor",
     "estimate_motion",
     "gear_coupling",
+    "identified_bodies",
     "identify_by_energy",
     "identify_consistent",
     "identify_rigid_body",

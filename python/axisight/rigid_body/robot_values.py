@@ -1,0 +1,122 @@
+"""Standard parameters of a torque model as values of a robot file."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.rigid_body.regressor import TorqueModel
+from axisight.robot_file import INERTIA, Identified, Provenance, identified
+
+Array = NDArray[np.float64]
+
+LINK = 10
+# Terms the robot format has no place for: effect and parameter of the effect.
+EFFECTS = {
+    "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
+    "torque_offset": ("torque_offset", "offset_nm"),
+}
+ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def identified_bodies(
+    model: TorqueModel,
+    theta: ArrayLike,
+    provenance: Provenance,
+    *,
+    covariance: ArrayLike | None = None,
+) -> Identified:
+    """Return standard parameters in the terms of a robot file, for `write_identified`.
+
+    First moments become centres of mass and inertias about the link frame those about the
+    centre of mass: I_c = I - (|h|^2 1 - h h^T) / m with h = m c. Coulomb friction and torque
+    offsets become effects.
+
+    model
+        On the motor side, where the robot file has its friction and rotor inertias.
+    theta
+        (p,) in the order of ``model.names``: ``ConsistentParameters.theta``, or
+        ``RigidBodyEstimate.standard()``, whose bodies need not exist (`write_identified`
+        refuses those).
+    provenance
+        Where they come from.
+    covariance
+        (p, p) of theta, carried through to first order; without it standard errors are unknown.
+
+    Raises InputError for a model on the joint side, numbers that do not fit the model or are
+    not finite, and masses that are not positive.
+    """
+    if model.side != "motor":
+        raise InputError(f"model: expected side 'motor', got {model.side!r}")
+    values = np.asarray(theta, dtype=np.float64)
+    if values.shape != (model.n_parameters,) or not np.isfinite(values).all():
+        raise InputError(
+            f"theta: expected {model.n_parameters} finite numbers, got shape {values.shape}"
+        )
+    out = values.copy()
+    jacobian = np.eye(len(values))
+    names = list(model.names)
+    for first in range(0, len(names), LINK):
+        joint, _, quantity = names[first].rpartition(".")
+        if quantity != "mass":
+            break
+        link = slice(first, first + LINK)
+        if values[first] <= 0:
+            raise InputError(
+                f"theta: expected a positive {names[first]}, got {values[first]}: "
+                "identify_consistent finds bodies that can exist"
+            )
+        out[link], jacobian[link, link] = _about_centre(values[link])
+        quantities = ("mass", "com_x", "com_y", "com_z", *INERTIA)
+        names[link] = [f"{joint}.{quantity}" for quantity in quantities]
+    spread = None
+    if covariance is not None:
+        given = np.asarray(covariance, dtype=np.float64)
+        if given.shape != jacobian.shape:
+            raise InputError(f"covariance: expected shape {jacobian.shape}, got {given.shape}")
+        spread = jacobian @ given @ jacobian.T
+        spread = (spread + spread.T) / 2
+    effects = []
+    for i, name in enumerate(names):
+        joint, _, quantity = name.rpartition(".")
+        if quantity in EFFECTS:
+            effect, parameter = EFFECTS[quantity]
+            found = Effect(effect, _axis(model, joint), {parameter: float(out[i])})
+            names[i] = f"{found.label}.{parameter}"
+            effects.append(found)
+    return identified(
+        dict(zip(names, out.tolist(), strict=True)),
+        provenance,
+        covariance=spread,
+        effects=effects,
+    )
+
+
+def _axis(model: TorqueModel, joint: str) -> int:
+    """Number of the axis, from 1, of a driven joint."""
+    driven = [n.removesuffix(".motor_inertia") for n in _rotors(model)]
+    return driven.index(joint) + 1
+
+
+def _rotors(model: TorqueModel) -> list[str]:
+    return [n for n, _ in model.robot.core.parameters() if n.endswith(".motor_inertia")]
+
+
+def _about_centre(link: Array) -> tuple[Array, Array]:
+    """Mass, centre of mass, inertia about it, and their derivatives by link parameters."""
+    mass, h = link[0], link[1:4]
+    out, jacobian = link.copy(), np.eye(LINK)
+    out[1:4] = h / mass
+    jacobian[1:4, 0] = -h / mass**2
+    jacobian[1:4, 1:4] = np.eye(3) / mass
+    for row, (i, j) in enumerate(ELEMENTS, start=4):
+        same = float(i == j)
+        moment = same * (h @ h) - h[i] * h[j]
+        out[row] -= moment / mass
+        jacobian[row, 0] = moment / mass**2
+        for k in range(3):
+            slope = 2 * same * h[k] - (i == k) * h[j] - (j == k) * h[i]
+            jacobian[row, 1 + k] = -slope / mass
+    return out, jacobian
