@@ -97,8 +97,10 @@ fn continuous_response_is_that_of_the_state_space_model() {
 }
 
 /// Central differences of fourth order with relative steps h of 1e-3: truncation about h^4;
-/// rounding 3/2 of what a response is off, up to 1e-10 at half a hertz (see above), over h,
-/// so 2e-7. A step of elastic stiffness or mass moves the equilibrium.
+/// rounding 3/2 of that of a response over h. Responses are a sum over poles, some of which
+/// nearly coincide without gravity: they round to some 1e-10, the differences to some 1e-7
+/// (smaller steps give more, in proportion). A step of elastic stiffness or mass moves the
+/// equilibrium.
 #[test]
 fn derivatives_agree_with_finite_differences() {
     for (name, robot) in variations() {
@@ -124,7 +126,7 @@ fn derivatives_agree_with_finite_differences() {
                     let error = (exact - slope).norm() * size / at(&found, 0, line).norm();
                     let parameter = values[i].0.name(&robot);
                     assert!(
-                        error < 2e-7,
+                        error < 1e-6,
                         "{name} {hold:?} {parameter} {}: {error:.1e}",
                         f[line]
                     );
