@@ -174,9 +174,7 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     n = len(names)
     # What the data do not show stays unknown, even without any error.
     covariance = np.where(np.isfinite(inverse), variance, 1.0) * inverse
-    scatter = point.block_gradients.T @ point.block_gradients
-    with np.errstate(invalid="ignore"):
-        sandwich = inverse @ scatter @ inverse
+    sandwich = _sandwich(inverse, point.block_gradients)
     std = np.sqrt(np.diag(covariance)[:n])
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance[:n, :n] / np.outer(std, std)
@@ -218,6 +216,20 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         starts=starts,
         noise=noise,
     )
+
+
+# Blocks for each parameter below which their scatter says nothing.
+LEAST_BLOCKS = 3
+
+
+def _sandwich(inverse: Array, gradients: Array) -> Array:
+    """Covariance from the scatter of block gradients; NaN where the blocks are too few."""
+    blocks, n = gradients.shape
+    if blocks < LEAST_BLOCKS * n:
+        return np.full_like(inverse, np.nan)
+    with np.errstate(invalid="ignore"):
+        out = inverse @ (gradients.T @ gradients) @ inverse * (blocks / (blocks - n))
+    return np.asarray(out, dtype=np.float64)
 
 
 def inverse_normal(matrix: Array) -> tuple[Array, float]:

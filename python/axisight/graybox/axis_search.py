@@ -29,12 +29,14 @@ class FitSettings:
     or after ``max_iterations`` accepted steps. The tolerances are tight because stiffness-like
     parameters hardly change the loss: with the usual 1e-8 the cubic term is left far off.
 
-    ``gradual`` gives observer gains of rough searches that come before: the error of the
-    predicted motor speed is fed back to all speeds with that share per sample, which takes
-    most local minima out of the loss. ``()`` leaves them out, a third of the work saved where
-    the start is good. ``block_s`` is the length of the blocks of the sandwich covariance;
-    it should exceed the correlation time of the residuals. ``ar_order`` fixes the order of the
-    noise filter, otherwise chosen up to ``most_ar_order``; ``ar_rounds`` bounds the refits.
+    ``gradual`` gives observer gains of rough searches: the error of the predicted motor speed
+    is fed back to all speeds with that share per sample, which takes some local minima out of
+    the loss and puts others in. The search is done both ways, straight from the start and
+    after the rough ones, and the lower loss is kept; a warning tells where they disagree.
+    ``()`` leaves the second way out, two thirds of the work saved. ``block_s`` is the length
+    of the blocks of the sandwich covariance; it should exceed the correlation time of the
+    residuals. ``ar_order`` fixes the order of the noise filter, otherwise chosen up to
+    ``most_ar_order``; ``ar_rounds`` bounds the refits.
     """
 
     max_iterations: int = 100
@@ -97,6 +99,8 @@ class Point:
     initial_loss: float = np.nan
     iterations: int = 0
     evaluations: int = 0
+    # Losses at which other ways from the same start ended.
+    others: tuple[float, ...] = ()
 
     def vector(self, task: Task) -> list[float]:
         """All parameters with the present gains."""
@@ -187,12 +191,57 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
 
 
 def search_rounds(task: Task, point: Point, ratio: float, token: _core.CancelToken) -> Point:
-    """Minimize the output error, in the rounds that the settings ask for."""
+    """Minimize the output error, straight and after the rough rounds; return the better end.
+
+    Neither way finds the global minimum always, and they fail on different records.
+    """
+    ends: list[Point] = []
+    failure = None
+    for rounds in dict.fromkeys(((), tuple(task.settings.gradual))):
+        try:
+            ends.append(_search_after(task, point, rounds, ratio, token))
+        except InputError as error:  # the motion diverged; the other way may do
+            failure = error
+    if not ends:
+        assert failure is not None
+        raise failure
+    best = min(ends, key=lambda end: end.loss)
+    return replace(
+        best,
+        iterations=sum(end.iterations for end in ends),
+        evaluations=sum(end.evaluations for end in ends),
+        others=tuple(end.loss for end in ends if end is not best),
+    )
+
+
+def _search_after(
+    task: Task, point: Point, rounds: tuple[float, ...], ratio: float, token: _core.CancelToken
+) -> Point:
     rough = replace(task, settings=replace(task.settings, loss_tolerance=ROUGH))
-    for gain in task.settings.gradual:
+    for gain in rounds:
         held = replace(point, gains=rigid_gains(task.model, ratio, gain), predicts=True)
         point = search(rough, held, token)
     return search(task, replace(point, gains=(), predicts=False), token)
+
+
+# Share of the energy of the data by which losses of one minimum may differ.
+SAME_MINIMUM = 1e-6
+# Share below which (a fit of 99 %) the data are explained and no lower minimum is missed.
+EXPLAINED = 1e-4
+
+
+def disagreement(task: Task, point: Point) -> list[str]:
+    """Words where ways from the same start ended at different losses."""
+    energy = sum(d.weight * float(np.sum(d.measured(task.model) ** 2)) for d in task.data)
+    other = max(point.others, default=point.loss)
+    if point.loss <= EXPLAINED * energy:
+        return []
+    if other - point.loss <= max(SAME_MINIMUM * energy, 1e-3 * point.loss):
+        return []
+    return [
+        f"local minima: two searches from this start ended at losses {point.loss:.4g} (kept) and "
+        f"{other:.4g}; a lower one may exist: try multistart_axis"
+    ]
 
 
 def free_run(task: Task, point: Point, i: int) -> Array:

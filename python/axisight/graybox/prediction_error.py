@@ -17,6 +17,7 @@ from axisight.graybox.axis_search import (
     FitSettings,
     Point,
     Task,
+    disagreement,
     first_point,
     free_run,
     rigid_gains,
@@ -94,6 +95,7 @@ def fit_axis(
     token = _core.CancelToken()
     point = first_point(task, values)
     point = search_rounds(task, point, values["r"], token)
+    warnings = (*data_warnings(model, task.data, task.free_names), *disagreement(task, point))
     if noise_model == "innovations":
         gains = rigid_gains(model, values["r"], FIRST_GAIN)
         point = search(task, replace(point, gains=gains, predicts=True, free_gains=True), token)
@@ -104,7 +106,7 @@ def fit_axis(
         gains=point.gains,
         whitening=point.whitening,
     )
-    return conclude(task, point, noise, data_warnings(model, task.data, task.free_names))
+    return conclude(task, point, noise, warnings)
 
 
 def prepare(

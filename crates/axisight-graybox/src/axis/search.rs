@@ -176,17 +176,19 @@ impl Search<'_> {
             }
             let (mut growth, mut trials) = (2.0, 0);
             loop {
-                let next = self.step(&theta, &point.normal, damping);
+                let Step { next, worth } = self.step(&theta, &point.normal, damping);
                 let loss = point.normal.loss;
                 let promised = promise(&point.normal, &self.change(&theta, &next));
+                if worth <= self.options.loss_tolerance * loss && damping < 1.0 {
+                    break 'search SearchStatus::LossConverged;
+                }
                 if self.moved(&theta, &next) <= self.options.step_tolerance {
                     break 'search self.stopped(&theta, &point.normal);
                 }
-                if promised <= self.options.loss_tolerance * loss && damping < 1.0 {
-                    break 'search SearchStatus::LossConverged;
-                }
-                match self.evaluate(&next) {
-                    Ok(trial) if trial.normal.loss < loss => {
+                // A step that was cut may lead uphill: a shorter one is cut less.
+                let trial = (promised > 0.0).then(|| self.evaluate(&next)).transpose();
+                match trial {
+                    Ok(Some(trial)) if trial.normal.loss < loss => {
                         let ratio = (loss - trial.normal.loss) / promised;
                         let cube = (2.0 * ratio - 1.0).powi(3);
                         damping = (damping * (1.0 - cube).clamp(0.1, 2.0)).max(1e-15);
@@ -197,7 +199,9 @@ impl Search<'_> {
                     }
                     Err(AxisError::Cancelled) => return Err(AxisError::Cancelled),
                     failed => {
-                        self.spare = failed.ok();
+                        if let Ok(Some(trial)) = failed {
+                            self.spare = Some(trial);
+                        }
                         damping *= growth;
                         growth *= 2.0;
                         trials += 1;
@@ -228,9 +232,8 @@ impl Search<'_> {
     /// A search that no longer moves: settled if the undamped step promises next to nothing of
     /// what the noise of one parameter is worth, stalled otherwise.
     fn stopped(&self, theta: &[f64], normal: &Normal) -> SearchStatus {
-        let undamped = self.step(theta, normal, 0.0);
-        let promised = promise(normal, &self.change(theta, &undamped));
-        if promised * normal.count as f64 <= SETTLED * normal.loss {
+        let Step { worth, .. } = self.step(theta, normal, 0.0);
+        if worth * normal.count as f64 <= SETTLED * normal.loss {
             SearchStatus::StepConverged
         } else {
             SearchStatus::Stalled
@@ -250,7 +253,7 @@ impl Search<'_> {
     }
 
     /// Damped step, with parameters on a bound that it would push outwards left out.
-    fn step(&self, theta: &[f64], normal: &Normal, damping: f64) -> Vec<f64> {
+    fn step(&self, theta: &[f64], normal: &Normal, damping: f64) -> Step {
         let n = self.free.len();
         let mut held = vec![false; n];
         for _ in 0..=n {
@@ -269,11 +272,22 @@ impl Search<'_> {
                 }
             }
             if !hit {
-                return next;
+                let worth = promise(normal, step.as_slice());
+                return Step { next, worth };
             }
         }
-        theta.to_vec()
+        Step {
+            next: theta.to_vec(),
+            worth: 0.0,
+        }
     }
+}
+
+/// A step, cut to what the parameters may do.
+struct Step {
+    next: Vec<f64>,
+    /// What it promised before it was cut: a search is at its end when that is nothing.
+    worth: f64,
 }
 
 /// By how much the linear model lowers the loss.
