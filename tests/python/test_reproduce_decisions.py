@@ -51,7 +51,7 @@ def test_claims_say_undecided(tmp_path):
 
 
 def test_quick_writes_one_small_picture(tmp_path):
-    figure = Figure(figsize=(2, 1))
+    figure = Figure(figsize=(4, 3))
     made = Item("figure-1.1", "x", {}, {"": figure})
     (only,) = write_item(made, tmp_path, quick=True)
     assert only.suffix == ".png"
