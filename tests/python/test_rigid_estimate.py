@@ -392,3 +392,11 @@ def test_misuse_names_the_field() -> None:
         identify_rigid_body(other, q, v, a, torque, base=base)
     with pytest.raises(InputError, match="all fixed"):
         identify_rigid_body(model, q, v, a, torque, known=dict.fromkeys(model.names, 1.0))
+
+
+@pytest.mark.parametrize("method", ["ls", "wls", "tls"])
+def test_zero_torques_are_refused_by_every_method(method):
+    model, base, _ = arm()
+    q, v, a = motion(model.robot, 200)
+    with pytest.raises(InputError, match="torque_nm: expected measured torques, got zeros only"):
+        identify_rigid_body(model, q, v, a, np.zeros((200, 3)), base=base, method=method)

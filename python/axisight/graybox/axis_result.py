@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from axisight import _core
+from axisight.blackbox import fit_percent
 from axisight.errors import InputError
 from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
 from axisight.graybox.axis_search import Point, Task, free_run
@@ -119,7 +120,7 @@ class AxisFit:
     def fit_to(self, data: AxisData, *, predicted: bool = False) -> float:
         """Return the model fit (3.54) [%] to a record started at rest, for cross-validation."""
         run = self.predict if predicted else self.simulate
-        return fit_percent(data.measured(self.model), run(data))
+        return float(fit_percent(data.measured(self.model), run(data))[0])
 
     def to_xarray(self) -> xr.Dataset:
         """Return values and uncertainty as a Dataset over ``parameter``."""
@@ -156,13 +157,6 @@ class AxisFit:
         return "\n".join([*rows, f"fit {fits}", f"status {self.status}", *self.warnings])
 
 
-def fit_percent(measured: Array, modelled: Array) -> float:
-    """Return the model fit (3.54) [%]; minus infinity for a measurement that never moves."""
-    spread = float(np.linalg.norm(measured - measured.mean()))
-    error = float(np.linalg.norm(measured - modelled))
-    return 100 * (1 - error / spread) if spread > 0 else -np.inf
-
-
 def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]) -> AxisFit:
     """Turn the end of a search into a result."""
     model = task.model
@@ -192,7 +186,7 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     for i, (d, part, root) in enumerate(zip(task.data, parts, roots, strict=True)):
         measured = d.measured(model)
         run = measured + part / root if simulated else free_run(task, point, i)
-        fits.append(fit_percent(measured, run))
+        fits.append(float(fit_percent(measured, run)[0]))
     return AxisFit(
         model=model,
         parameters=parameters,

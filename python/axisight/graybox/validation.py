@@ -14,6 +14,7 @@ import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from axisight import blackbox
 from axisight.errors import InputError
 
 Real = NDArray[np.float64]
@@ -29,14 +30,13 @@ def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
 
     ``100 (1 - |y - yhat| / |y - mean(y)|)``, y the ``measured`` output and yhat the ``simulated``
     or predicted one, (n,): 100 for a perfect model, 0 for one no better than the mean, negative
-    for worse. Raises InputError for others,
-    values that are not finite, and a measurement that does not vary.
+    for worse. Raises InputError for other shapes, values that are not finite, and a measurement
+    that does not vary.
     """
     y, model = _pair("measured", measured, "simulated", simulated)
-    spread = float(np.linalg.norm(y - y.mean()))
-    if spread == 0:
+    if np.ptp(y) == 0:
         raise InputError("measured: expected values that vary, got a constant")
-    return 100 * (1 - float(np.linalg.norm(y - model)) / spread)
+    return float(blackbox.fit_percent(y, model)[0])
 
 
 @dataclass(frozen=True, eq=False)

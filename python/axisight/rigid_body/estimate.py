@@ -109,6 +109,8 @@ def identify_rigid_body(
     weight = _weights(sample_weight, (len(motion[0]), model.n_rows))
     if len(torque) != len(motion[0]):
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
+    if not torque.any():
+        raise InputError("torque_nm: expected measured torques, got zeros only")
     factors = _factors(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
     )
