@@ -14,6 +14,7 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.frf import Flag
+from axisight.frf.quantity import RATES
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -22,11 +23,7 @@ Quantity = Literal["position", "velocity", "acceleration"]
 Sampling = Literal["zero_order_hold", "continuous"]
 PoseTuple = tuple[list[float], Real, Complex, Real | None, Complex | None, Complex | None, int]
 
-UNITS: dict[str, Quantity] = {
-    "rad/Nm": "position",
-    "rad/s/Nm": "velocity",
-    "rad/s^2/Nm": "acceleration",
-}
+UNITS: dict[str, Quantity] = {f"rad{rate}/Nm": quantity for quantity, rate in RATES.items()}
 ORDER: dict[Quantity, int] = {"position": 0, "velocity": 1, "acceleration": 2}
 DIMS = ("frequency_hz", "output", "input")
 

@@ -10,14 +10,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
-from axisight.graybox.collocated import Collocated, collocated, sandwich
+from axisight.graybox.collocated import Collocated, collocated, standard_errors
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MODEL_FLOOR = 0.05
 _ITERATIONS = 25
+_MOST_PASSES = 20
+_SETTLED = 1e-4
 _START_DAMPING = 0.03
 _ROOM = 0.05
 _POOR_DB = 3.0
@@ -207,6 +208,8 @@ def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
 class _Problem:
     """Residuals of the logarithm of the response, and their exact derivatives.
 
+    Lines are weighted by noise relative to the measured response, until ``reweigh``.
+
     Unknowns: logarithms of masses and springs (within a thousandfold of the start), dampers,
     friction and delay relative to a scale.
     """
@@ -214,9 +217,8 @@ class _Problem:
     def __init__(self, data: Collocated, start: SpringMassChain, delay: bool) -> None:
         self._omega = data.angular_rad_s
         self._log = np.log(data.acceleration)
-        known = np.isfinite(data.variance)
-        noise = np.where(known, data.variance, 0.0) / np.abs(data.acceleration) ** 2
-        self._weight = 1 / np.sqrt(noise + _MODEL_FLOOR**2)
+        self._data = data
+        self._weight = data.weight(data.acceleration)
         self.n = start.n_masses
         self._ratio = start.gear_ratio
         middle = float(np.sqrt(self._omega[0] * self._omega[-1]))
@@ -269,17 +271,29 @@ class _Problem:
         unit[0] = 1.0
         return np.asarray(np.linalg.solve(system, unit[None])[..., 0])
 
+    def _model(self, x: Real) -> Complex:
+        """Torque to acceleration of the motor, without delay."""
+        return np.asarray(-(self._omega**2) * self._motion(x)[:, 0] / self._ratio**2)
+
+    def reweigh(self, x: Real) -> float:
+        """Take weights from the model; return how much they change, relative, in the mean."""
+        before, self._weight = self._weight, self._data.weight(self._model(x))
+        return float(np.mean(np.abs(self._weight / before - 1)))
+
     def error(self, x: Real) -> Complex:
         """Logarithm of modelled over measured response, phase within half a turn."""
-        s = 1j * self._omega
-        model = s**2 * self._motion(x)[:, 0] / self._ratio**2
-        apart = np.log(model) - s * self.parts(x)[4] - self._log
+        apart = np.log(self._model(x)) - 1j * self._omega * self.parts(x)[4] - self._log
         return np.asarray(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
 
     def residual(self, x: Real) -> Real:
         """Weighted errors, real and imaginary parts."""
         left = self.error(x) * self._weight
         return np.concatenate([left.real, left.imag])
+
+    def standard_errors(self, x: Real) -> Real:
+        """Standard errors of the unknowns with the weights of the model ``x``."""
+        noise = self._weight**2 * self._data.noise(self._model(x))
+        return standard_errors(self.jacobian(x), self.residual(x), noise)
 
     def jacobian(self, x: Real) -> Real:
         """Derivatives of the residuals: d(e^T D^-1 e) = -x^T dD x, D symmetric."""
@@ -300,24 +314,35 @@ class _Problem:
         return np.vstack([slope.real, slope.imag])
 
 
+def _reweighted(problem: _Problem) -> tuple[scipy.optimize.OptimizeResult, bool]:
+    """Fit, take the weights from the model, and fit again until they stand."""
+    at = problem.first
+    for _ in range(_MOST_PASSES):
+        found: scipy.optimize.OptimizeResult = scipy.optimize.least_squares(
+            problem.residual,
+            at,
+            jac=problem.jacobian,
+            bounds=(problem.lower, problem.upper),
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+            max_nfev=300,
+        )
+        at = found.x
+        if problem.reweigh(at) < _SETTLED:
+            return found, True
+    return found, False
+
+
 def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: list[str]) -> ChainFit:
     problem = _Problem(data, start, delay)
-    found: scipy.optimize.OptimizeResult = scipy.optimize.least_squares(
-        problem.residual,
-        problem.first,
-        jac=problem.jacobian,
-        bounds=(problem.lower, problem.upper),
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-12,
-        max_nfev=300,
-    )
+    found, settled = _reweighted(problem)
     inertia, stiffness, damping, friction, late = problem.parts(found.x)
     n, ratio = problem.n, start.gear_ratio
-    deviation = np.sqrt(np.diag(sandwich(problem.jacobian(found.x), found.fun)))
+    deviation = problem.standard_errors(found.x)
     error = 20 / np.log(10) * float(np.median(np.abs(problem.error(found.x))))
     found_chain = SpringMassChain(inertia, stiffness, damping, ratio)
-    converged = found.status > 0
+    converged = found.status > 0 and settled
     if not converged:
         findings.append("the fit stopped before it converged: try fewer masses or another start")
     if error > _POOR_DB:

@@ -1,0 +1,54 @@
+"""What the output of a frequency response is: a position, a velocity or an acceleration."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from axisight.arguments import one_of
+from axisight.errors import InputError
+from axisight.frf._lines import ORDER, Quantity
+
+RATES: dict[Quantity, str] = {"position": "", "velocity": "/s", "acceleration": "/s^2"}
+"""What follows the unit of the position in that of its derivatives."""
+
+_OUTPUTS: dict[str, Quantity] = {
+    unit + rate: quantity for unit in ("rad", "m") for quantity, rate in RATES.items()
+}
+
+
+def quantity_of(response: xr.Dataset, quantity: str | None = None) -> Quantity:
+    """Return what the output of ``response`` is.
+
+    response
+        Dataset as `axisight.frf.frequency_response` returns.
+    quantity
+        What the caller knows; goes before all else.
+
+    Else the unit of the response tells, ``rad``, ``rad/s`` or ``rad/s^2`` (or m) over that of the
+    input, or the attribute ``quantity`` of the Dataset. Raises InputError where both are silent
+    or contradict each other, and for another ``quantity``.
+    """
+    if quantity is not None:
+        return _known("quantity", quantity)
+    unit = response["response"].attrs.get("units")
+    by_unit = _OUTPUTS.get(str(unit).rpartition("/")[0])
+    stated = response.attrs.get("quantity")
+    by_name = None if stated is None else _known("response: attribute quantity", stated)
+    found = by_unit or by_name
+    if found is None:
+        raise InputError(
+            "quantity: expected position, velocity or acceleration, for the response does not say "
+            "what its output is: it has no attribute quantity, and its units are "
+            f"{unit!r} where {', '.join(_OUTPUTS)} over the unit of the input would tell"
+        )
+    if by_name not in (None, found):
+        raise InputError(
+            f"response: expected units and attribute quantity that agree, got {unit!r} and "
+            f"{stated!r}; say with quantity= which is right"
+        )
+    return found
+
+
+def _known(field: str, value: object) -> Quantity:
+    name = one_of(field, value, ORDER)
+    return next(q for q in RATES if q == name)
