@@ -11,11 +11,13 @@ import xarray as xr
 from axisight.errors import InputError
 from axisight.frf import frequency_response
 from axisight.graybox.chain_fit import fit_chain
+from axisight.graybox.collocated import Collocated, collocated
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 from axisight.robot import load_robot
 
 FREQUENCY_HZ = np.arange(5, 201) / 5
 RATIO = 1 / 224.3
+VISCOUS = 0.05  # friction of the motor [Nm s/rad]
 
 
 def chain(n: int, rng: np.random.Generator) -> SpringMassChain:
@@ -178,6 +180,108 @@ def test_standard_errors_of_the_fit_are_right() -> None:
     # Mean square of 120 normal scores: one within 0.26 at two deviations; the weights add
     # a tolerance to the noise, so that the scatter is that of a slightly different problem.
     assert 0.6 < np.mean(np.square(score)) < 1.5
+
+
+def rubbed_response(
+    true: SpringMassChain, relative: float, rng: np.random.Generator, periods: int | None = None
+) -> xr.Dataset:
+    """Response with viscous friction, noise relative to it; variance known, or of a few periods."""
+    free = true.acceleration_response(FREQUENCY_HZ)
+    value = 1 / (1 / free + VISCOUS / (2j * np.pi * FREQUENCY_HZ))
+    std = relative * np.abs(value)
+    count = periods or 1
+    error = rng.normal(size=(2, count, len(value))) * np.sqrt(count / 2)
+    every = value + std * (error[0] + 1j * error[1])
+    mean, variance, freedom = every.mean(axis=0), std**2, None
+    if periods:
+        variance = (np.abs(every - mean) ** 2).sum(axis=0) / (periods * (periods - 1))
+        freedom = np.full((len(value), 1, 1), periods - 1.0)
+    return frequency_response(
+        FREQUENCY_HZ,
+        mean[:, None, None],
+        estimator="given",
+        variance=variance[:, None, None],
+        degrees_of_freedom=freedom,
+        output_unit="rad/s^2",
+    )
+
+
+@pytest.mark.parametrize(("relative", "periods"), [(0.01, None), (0.1, None), (0.1, 2)])
+def test_fit_is_unbiased_and_its_intervals_hold(relative: float, periods: int | None) -> None:
+    true = chain(3, np.random.default_rng(3))
+    names = ("inertia", "stiffness", "damping")
+    units = ("_kg_m2", "_nm_rad", "_nm_s_rad")
+    scores = []
+    for run in range(60):
+        rng = np.random.default_rng([13, run])
+        found = fit_chain(rubbed_response(true, relative, rng, periods), 3, gear_ratio=RATIO)
+        assert found.status == "converged"
+        score = [
+            (getattr(found.chain, n + u) - getattr(true, n + u))
+            / getattr(found, f"{n}_standard_error")
+            for n, u in zip(names, units, strict=True)
+        ]
+        scores.append(np.concatenate(score))
+    z = np.array(scores)
+    # The mean of 60 scores is normal with 1 / sqrt(60) = 0.13; 3.5 of these for seven of them.
+    # Weights from the measured magnitude put five of the seven at 0.9 to 1.5 for 10 %.
+    assert np.abs(z.mean(axis=0)).max() < 0.45
+    # Coverage 95 %; 60 runs of some four independent parameters: 1.4 %, three of these.
+    assert 0.905 < np.mean(np.abs(z) < 1.96) < 0.99
+
+
+def test_a_variance_of_few_periods_is_smoothed_relative_to_the_model() -> None:
+    n = 4000
+    rng = np.random.default_rng(0)
+    model = np.geomspace(0.1, 10.0, n)
+    # One degree of freedom: exponential, the least of them is 1 / 4000 of their mean.
+    variance = 0.04 * model**2 * rng.exponential(size=n)
+    frequency = np.arange(1.0, n + 1)
+    one = Collocated(frequency, model.astype(complex), variance, np.ones(n))
+    noise = one.noise(model)
+    # Eleven logarithms of variance pi^2 / 6 leave 0.15, so that the mean is exp(0.075) = 1.08
+    # of the truth; 364 independent stretches with 0.4 give it within 0.06.
+    assert noise.mean() / 0.04 == pytest.approx(1.08, abs=0.07)
+    # The least is some four standard deviations of the logarithm away, at the ends with six lines
+    # 0.5 each: a tenth.
+    assert noise.min() > 0.1 * 0.04
+    for freedom in (None, np.full(n, np.inf), np.full(n, 10.0)):
+        known = Collocated(frequency, model.astype(complex), variance, freedom)
+        np.testing.assert_array_equal(known.noise(model), variance / model**2)
+    # Lines of unknown variance have none, and do not spoil their neighbours.
+    variance[::7] = np.nan
+    some = Collocated(frequency, model.astype(complex), variance, np.ones(n)).noise(model)
+    assert not some[::7].any() and (some[1::7] > 0).all()
+
+
+def test_quantity_is_read_and_never_assumed() -> None:
+    true = chain(2, np.random.default_rng(0))
+    acceleration = true.acceleration_response(FREQUENCY_HZ)
+    iw = 2j * np.pi * FREQUENCY_HZ
+    attrs = {"quantity": "acceleration"}
+
+    def data(order: int, unit: str, attrs: dict[str, str] | None = None) -> xr.Dataset:
+        value = (acceleration / iw ** (2 - order))[:, None, None]
+        return frequency_response(
+            FREQUENCY_HZ, value, estimator="given", output_unit=unit, input_unit="A", attrs=attrs
+        )
+
+    for given in (data(0, "rad"), data(1, "rad/s"), data(2, "rad/s^2"), data(2, "g", attrs)):
+        np.testing.assert_allclose(collocated(given).acceleration, acceleration, rtol=1e-12)
+    silent = data(1, "deg/s")
+    for call in (collocated, lambda d: fit_chain(d, 2)):
+        with pytest.raises(InputError, match=r"quantity: expected position.*units are 'deg/s/A'"):
+            call(silent)
+    silent["response"].attrs.clear()
+    with pytest.raises(InputError, match="units are None"):
+        collocated(silent)
+    np.testing.assert_allclose(collocated(silent, quantity="velocity").acceleration, acceleration)
+    with pytest.raises(InputError, match=r"units and attribute quantity that agree, got 'rad/A'"):
+        collocated(data(0, "rad", attrs))
+    with pytest.raises(InputError, match="quantity: expected one of position, velocity"):
+        collocated(silent, quantity="speed")
+    with pytest.raises(InputError, match="attribute quantity: expected one of position"):
+        collocated(data(0, "rad", {"quantity": "jerk"}))
 
 
 def test_very_noisy_response_still_gives_a_chain_and_says_so() -> None:

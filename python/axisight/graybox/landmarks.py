@@ -9,13 +9,12 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
-from axisight.graybox.collocated import Collocated, sandwich
+from axisight.graybox.collocated import Collocated, standard_errors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _WINDOW = 0.3
-_MODEL_FLOOR = 0.05
 _SURROUNDINGS = 3
 _FEWEST = 8
 _DEPTH_DB = 6.0
@@ -23,6 +22,7 @@ _EDGE_LINES = 2
 _PLATEAU_FROM = 1.6
 _PEAK_DB = 3.0
 _LARGEST_STEP = 0.25
+_PASSES = 4
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,8 @@ def find_notch(data: Collocated, *, band_rad_s: tuple[float, float] | None = Non
 
     with complex c: delay, friction and the flanks of neighbours. w0 and zeta by nonlinear, c by
     linear least squares (variable projection), lines weighted by their variance and a
-    tolerance of 5 % of the response for what the local model lacks.
+    tolerance of 5 % of the response for what the local model lacks, both relative to the model
+    of the last of four passes.
 
     Raises InputError if the lowest line is at the edge of the band, or no 6 dB below what
     lies on either side, that is where the band holds no notch.
@@ -127,8 +128,9 @@ def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequency
     """Return the gain far above the resonances from lines above ``from_rad_s``.
 
     There |G| = g (1 + c / w^2 + e / w^4) to sixth order in 1 / w, c being the sum of the squared
-    resonances less that of the notches. g, c and e by linear least squares, lines weighted by
-    their variance and a tolerance of 5 %; the standard error is from the scatter.
+    resonances less that of the notches. g, c and e by least squares on the logarithm, which noise
+    does not shift, lines weighted by their variance and a tolerance of 5 % relative to the model
+    of the last of four passes; the standard error is from the scatter.
 
     Raises InputError if fewer than eight lines are left, or the response at the upper
     end of the band is still a quarter above its level: then there is no plateau to read J_m from.
@@ -146,8 +148,13 @@ def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequency
             f"high-frequency gain 1 / J_m, got {len(omega)} up to {top:.3g} rad/s; {advice}"
         )
     basis = np.vander((from_rad_s / omega) ** 2, 3, increasing=True)
-    weight = 1 / _relative_deviation(high) / size
-    level, covariance = _least_squares(basis * weight[:, None], size * weight)
+    modelled = size
+    for _ in range(_PASSES):
+        weight = high.weight(modelled)
+        # A Gauss-Newton step of the logarithm: relative errors, the logarithm as target.
+        slope = basis * (weight / modelled)[:, None]
+        level, covariance = _least_squares(slope, (1 + np.log(size / modelled)) * weight)
+        modelled = np.abs(basis @ level)
     gain = level[0]
     correction = float(basis[-1] @ level / gain - 1)
     if not abs(correction) < _LARGEST_STEP:
@@ -173,12 +180,6 @@ def _level_db(data: Collocated) -> Real:
     return np.asarray(scipy.signal.medfilt(20 * np.log10(np.abs(data.acceleration)), 3))
 
 
-def _relative_deviation(data: Collocated) -> Real:
-    known = np.isfinite(data.variance)
-    noise = np.where(known, data.variance, 0.0) / np.abs(data.acceleration) ** 2
-    return np.asarray(np.sqrt(noise + _MODEL_FLOOR**2))
-
-
 def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
     """Solution and covariance with the variance the residuals show."""
     solution, _, _, _ = np.linalg.lstsq(basis, target, rcond=None)
@@ -197,41 +198,82 @@ def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
             f"response: expected at least {_FEWEST} lines within 30 % of {start_rad_s:.3g} rad/s, "
             f"got {len(omega)}; excite more lines there"
         )
-    log = np.log(np.abs(near.acceleration)) + 1j * np.unwrap(np.angle(near.acceleration))
-    weight = 1 / _relative_deviation(near)
-    shape = np.vander(omega / start_rad_s - 1, _SURROUNDINGS, increasing=True) * weight[:, None]
-    smooth, _ = np.linalg.qr(shape)
+    local = _Local(near, start_rad_s, sign)
+    at = np.array([start_rad_s, 0.05])
+    spacing = float(np.median(np.diff(omega)))
+    for _ in range(_PASSES):
+        found = scipy.optimize.least_squares(
+            local.residual,
+            at,
+            jac=local.slope,
+            bounds=([omega[0], 1e-6], [omega[-1], 1.0]),
+            x_scale=np.array([spacing, 0.01]),
+        )
+        at, modelled = found.x, local.modelled(found.x)
+        error = local.standard_errors(found.x, modelled)
+        local.weigh(modelled)
+    frequency, damping = (float(v) for v in at)
+    return Landmark(frequency, damping, float(error[0]), float(error[1]), len(omega))
 
-    def free(values: Complex) -> Real:
-        """What the surroundings cannot take up, real and imaginary parts."""
-        left = values * weight
-        left = left - smooth @ (smooth.T @ left)
+
+class _Local:
+    """A pair of zeros (sign 1) or poles (-1) with smooth surroundings, which are projected out.
+
+    Unknowns: frequency and damping ratio. Lines are weighted by noise relative to the measured
+    response, until ``weigh``.
+    """
+
+    def __init__(self, data: Collocated, start_rad_s: float, sign: float) -> None:
+        self._data = data
+        self._omega = data.angular_rad_s
+        self._sign = sign
+        value = data.acceleration
+        self._log = np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value))
+        self._shape = np.vander(self._omega / start_rad_s - 1, _SURROUNDINGS, increasing=True)
+        self.weigh(value)
+
+    def weigh(self, modelled: Complex) -> None:
+        """Take weights from a modelled response."""
+        self._weight = self._data.weight(modelled)
+        self._smooth, self._mix = np.linalg.qr(self._shape * self._weight[:, None])
+
+    def _free(self, values: Complex) -> Real:
+        """What the surroundings cannot take up, weighted, real and imaginary parts."""
+        left = values * self._weight
+        left = left - self._smooth @ (self._smooth.T @ left)
         return np.concatenate([left.real, left.imag])
 
-    def pair(theta: Real) -> Complex:
+    def _pair(self, theta: Real) -> Complex:
+        omega = self._omega
         return np.asarray(theta[0] ** 2 - omega**2 + 2j * theta[1] * theta[0] * omega)
 
-    def residual(theta: Real) -> Real:
-        factor = pair(theta)
+    def _rest(self, theta: Real) -> Complex:
+        """The logarithm of the response without the pair."""
+        factor = self._pair(theta)
         phase = np.unwrap(np.angle(factor))
-        return free(log - sign * (np.log(np.abs(factor)) + 1j * phase))
+        return np.asarray(self._log - self._sign * (np.log(np.abs(factor)) + 1j * phase))
 
-    def slope(theta: Real) -> Real:
-        factor = pair(theta)
-        by_frequency = (2 * theta[0] + 2j * theta[1] * omega) / factor
-        by_damping = 2j * theta[0] * omega / factor
-        return np.stack([-sign * free(by_frequency), -sign * free(by_damping)], axis=1)
+    def residual(self, theta: Real) -> Real:
+        """Weighted errors."""
+        return self._free(self._rest(theta))
 
-    spacing = float(np.median(np.diff(omega)))
-    found = scipy.optimize.least_squares(
-        residual,
-        np.array([start_rad_s, 0.05]),
-        jac=slope,
-        bounds=([omega[0], 1e-6], [omega[-1], 1.0]),
-        x_scale=np.array([spacing, 0.01]),
-    )
-    # The surroundings take parameters too: three complex ones.
-    taken = np.sqrt(len(omega) / max(len(omega) - _SURROUNDINGS - 1, 1))
-    error = taken * np.sqrt(np.diag(sandwich(slope(found.x), found.fun)))
-    frequency, damping = (float(v) for v in found.x)
-    return Landmark(frequency, damping, float(error[0]), float(error[1]), len(omega))
+    def slope(self, theta: Real) -> Real:
+        """Derivatives of the residuals by frequency and damping, (2 n, 2)."""
+        factor = self._pair(theta)
+        by_frequency = (2 * theta[0] + 2j * theta[1] * self._omega) / factor
+        by_damping = 2j * theta[0] * self._omega / factor
+        return -self._sign * np.stack([self._free(by_frequency), self._free(by_damping)], axis=1)
+
+    def modelled(self, theta: Real) -> Complex:
+        """Response of pair and surroundings."""
+        weighted = self._smooth.T @ (self._rest(theta) * self._weight)
+        around = self._shape @ np.linalg.solve(self._mix, weighted)
+        return np.asarray(self._pair(theta) ** self._sign * np.exp(around))
+
+    def standard_errors(self, theta: Real, modelled: Complex) -> Real:
+        """Standard errors of frequency and damping, (2,)."""
+        noise = self._weight**2 * self._data.noise(modelled)
+        # The surroundings take from the residuals too.
+        around = scipy.linalg.block_diag(self._smooth, self._smooth)
+        slope = np.hstack([self.slope(theta), around])
+        return standard_errors(slope, self.residual(theta), noise)[:2]
