@@ -200,6 +200,52 @@ def test_block_covariance_is_unbiased_with_few_blocks() -> None:
     np.testing.assert_allclose(np.mean(ratio, axis=0), 1.0, atol=0.12)
 
 
+def test_block_covariance_knows_where_no_scatter_shows() -> None:
+    rng = np.random.default_rng(9)
+
+    def of(blocks: int, rows: int, columns: Array) -> tuple[Array, Array]:
+        stack = np.column_stack([columns, rng.normal(size=blocks * rows)])
+        factors = Factors(
+            triangle(stack.reshape(blocks, 1, rows, -1)), np.array([float(blocks * rows)])
+        )
+        return block_covariance(factors, solve_weighted(factors, np.ones(1)))
+
+    # As many equations as parameters; all in one block.
+    for blocks, rows in ((3, 2), (1, 60)):
+        covariance, freedom = of(blocks, rows, rng.normal(size=(blocks * rows, 6)))
+        assert np.isnan(covariance).all()
+        assert not freedom.any()
+    # The second parameter shows in one block only, the others everywhere.
+    columns = rng.normal(size=(200, 3))
+    columns[20:, 1] = 0.0
+    covariance, freedom = of(10, 20, columns)
+    assert np.isnan(covariance[1]).all()
+    assert np.isnan(covariance[:, 1]).all()
+    assert np.isfinite(covariance[np.ix_([0, 2], [0, 2])]).all()
+    assert freedom[1] == 0
+    assert freedom[[0, 2]].min() > 5
+
+
+def test_two_blocks_are_told_and_their_intervals_hold() -> None:
+    model, base, values = arm()
+    q, v, a = smooth_motion(model.robot, 400, 0.02, 1)
+    torque = model.matrix(q, v, a) @ values
+    truth = base.from_standard(values)
+    inside = []
+    for run in range(40):
+        data = noisy(torque, run)
+        found = identify_rigid_body(model, q, v, a, data, base=base, blocks=2)
+        (finding,) = [f for f in found.findings if f.kind is FindingKind.FREEDOM]
+        assert not finding.serious
+        assert "expected 3 or more degrees of freedom, got 1" in finding.message
+        lower, upper = found.interval()
+        inside.append((lower <= truth) & (truth <= upper))
+    # One degree of freedom, intervals of 12.7 standard errors: 95 % or a little more.
+    assert np.mean(inside) > 0.92
+    full = identify_rigid_body(model, q, v, a, noisy(torque, 0), base=base, blocks=20)
+    assert all(f.kind is not FindingKind.FREEDOM for f in full.findings)
+
+
 def coverage(colour: float, n: int, blocks: int) -> Array:
     """Share of 300 realizations whose 95 % interval holds the truth, per parameter."""
     model, base, values = arm()

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 MOST_CONDITION = 1e3
 # Standard errors by which something must be negative to be called so.
 CLEARLY = 3.0
+# Degrees of freedom below which a standard deviation is itself uncertain by 40 % and more.
+LEAST_FREEDOM = 3.0
 # Samples at which inertias are looked at.
 LOOKS = 50
 
@@ -33,6 +35,23 @@ def condition(result: RigidBodyEstimate) -> list[IdentificationFinding]:
         "what is known, or eliminate"
     )
     return [IdentificationFinding(FindingKind.CONDITION, text, names=names)]
+
+
+def freedom(
+    names: list[str], degrees: Array, advice: str, *, serious: bool
+) -> list[IdentificationFinding]:
+    """Return a finding if standard errors rest on fewer than three degrees of freedom.
+
+    ``degrees`` (n,) are those of ``names``; ``advice`` ends the message.
+    """
+    few = tuple(name for name, d in zip(names, degrees, strict=True) if d < LEAST_FREEDOM)
+    if not few:
+        return []
+    text = (
+        f"standard errors of {', '.join(few[:3])}{' and others' if len(few) > 3 else ''}: expected "
+        f"{LEAST_FREEDOM:g} or more degrees of freedom, got {degrees.min():.2g}; {advice}"
+    )
+    return [IdentificationFinding(FindingKind.FREEDOM, text, serious, few)]
 
 
 def friction_sign(result: RigidBodyEstimate) -> list[IdentificationFinding]:

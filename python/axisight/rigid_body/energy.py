@@ -9,6 +9,7 @@ is one equation, linear in the same parameters as the torques.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,9 +19,11 @@ import scipy.integrate
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.errors import IdentifiabilityError, InputError
+from axisight.errors import IdentifiabilityError, IdentificationWarning, InputError
+from axisight.rigid_body import checks
 from axisight.rigid_body.base import BaseParameters
 from axisight.rigid_body.estimate import DATA_TOLERANCE, default_blocks, known_base, numbers
+from axisight.rigid_body.findings import IdentificationFinding
 from axisight.rigid_body.grouping import group
 from axisight.rigid_body.least_squares import (
     Factors,
@@ -29,6 +32,7 @@ from axisight.rigid_body.least_squares import (
     triangle,
 )
 from axisight.rigid_body.regressor import TorqueModel, rows
+from axisight.rigid_body.result import student_interval
 
 Array = NDArray[np.float64]
 
@@ -59,13 +63,15 @@ class EnergyEstimate:
         What the parameters are.
     values, covariance
         Base parameters (n_base,) and their covariance (n_base, n_base) from the scatter of
-        blocks of windows.
+        blocks of windows; NaN for parameters with fewer than three degrees of freedom.
     degrees_of_freedom
-        Of that scatter, per parameter.
+        Of that scatter, per parameter; zero where there are as many windows as parameters.
     residual_rms_j, relative_error
         Root mean square of the residual [J], and over that of the work.
     condition_number_scaled
         Of the regressor with its columns at unit length.
+    findings
+        What is doubtful about it.
     """
 
     base: BaseParameters
@@ -75,11 +81,16 @@ class EnergyEstimate:
     residual_rms_j: float
     relative_error: float
     condition_number_scaled: float
+    findings: tuple[IdentificationFinding, ...] = ()
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors, shape (n_base,)."""
+        """Standard errors, shape (n_base,); NaN where the windows are too few to tell."""
         return np.sqrt(np.diag(self.covariance))
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return the bounds of the confidence intervals of a ``level``, by Student's distribution."""
+        return student_interval(self.values, self.standard_error, self.degrees_of_freedom, level)
 
 
 def identify_by_energy(
@@ -101,7 +112,8 @@ def identify_by_energy(
     blocks : number of blocks of consecutive windows for the standard errors; default 30 with
         at least two windows each.
 
-    Raises InputError for unknown names, IdentifiabilityError where the windows do not
+    Warns with IdentificationWarning, as the findings, where the windows are too few for standard
+    errors. Raises InputError for unknown names, IdentifiabilityError where the windows do not
     determine the parameters.
 
     """
@@ -124,6 +136,12 @@ def identify_by_energy(
     factors = Factors(factor, np.array([float(n)]))
     solution = solve_weighted(factors, np.ones(1))
     covariance, freedom = block_covariance(factors, solution)
+    few = freedom < checks.LEAST_FREEDOM
+    covariance[few], covariance[:, few] = np.nan, np.nan
+    advice = f"{n} windows for {k} parameters tell too little of their scatter, take more windows"
+    findings = checks.freedom(base.names, freedom, advice, serious=True)
+    for finding in findings:
+        warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     residual = float(np.sqrt(solution.loss[0] / n))
     size = float(np.sqrt((regression.work_j**2).mean()))
     r = solution.normal
@@ -135,6 +153,7 @@ def identify_by_energy(
         residual_rms_j=residual,
         relative_error=residual / size if size > 0 else float("nan"),
         condition_number_scaled=float(np.linalg.cond(r / np.linalg.norm(r, axis=0))),
+        findings=tuple(findings),
     )
 
 

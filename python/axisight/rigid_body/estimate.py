@@ -158,6 +158,9 @@ def identify_rigid_body(
         n_blocks=len(factors.blocks),
         findings=tuple(findings),
     )
+    advice = "take interval(), which counts them, longer data or more blocks"
+    kept = [base.names[i] for i in keep]
+    findings += checks.freedom(kept, freedom, advice, serious=False)
     findings += checks.condition(result)
     findings += checks.friction_sign(result)
     findings += checks.gear_sign(result, factors, motion)

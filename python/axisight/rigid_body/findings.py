@@ -21,6 +21,8 @@ class FindingKind(StrEnum):
     """Friction that drives."""
     WEIGHTS = "weights"
     """Row weights did not settle."""
+    FREEDOM = "freedom"
+    """Standard errors rest on too few blocks or equations."""
     ELIMINATED = "eliminated"
     """Parameters were set to zero because the data do not show them."""
 

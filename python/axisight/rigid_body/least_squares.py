@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Share of its variance that the scatter of a parameter must show to be called its variance.
+LEAST_SHOWN = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Factors:
@@ -193,7 +196,8 @@ def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array
     The sandwich for residuals that are correlated in time within blocks and between rows,
     each block's residuals enlarged by what the fit has taken from them, so that it is
     unbiased where residuals are white; degrees of freedom by Satterthwaite's rule (Bell and
-    McCaffrey 2002, the correction called CR2).
+    McCaffrey 2002, the correction called CR2). Parameters whose scatter does not show, for there
+    are as many equations as parameters or one block decides them alone, have NaN and none.
     """
     k, weight = factors.k, solution.weight
     n_blocks = len(factors.blocks)
@@ -213,7 +217,10 @@ def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array
     change = score @ inverse.T
     pull = enlarge @ lever
     freedom = np.array([_freedom(pull, lever, row) for row in inverse])
-    return np.asarray(change.T @ change, dtype=np.float64), freedom
+    covariance = np.asarray(change.T @ change, dtype=np.float64)
+    blind = freedom == 0
+    covariance[blind], covariance[:, blind] = np.nan, np.nan
+    return covariance, freedom
 
 
 def _error_in_columns(solution: Solution, residual: Array) -> Array:
@@ -225,12 +232,15 @@ def _error_in_columns(solution: Solution, residual: Array) -> Array:
 
 
 def _freedom(pull: Array, lever: Array, row: Array) -> float:
-    """Degrees of freedom of the scatter of one parameter, residuals taken as white."""
+    """Degrees of freedom of the scatter of one parameter, residuals taken as white; 0 if blind."""
     u = pull @ row
     s = np.einsum("bij,bi->bj", lever, u)
     g = np.diag((u**2).sum(axis=1)) - s @ s.T
-    square = (g**2).sum()
-    return float(np.trace(g) ** 2 / square) if square > 0 else 1.0
+    # What the scatter amounts to in the mean; the variance itself, unless directions are hidden.
+    mean = float(np.trace(g))
+    if mean < LEAST_SHOWN * float(row @ row):
+        return 0.0
+    return mean**2 / float((g**2).sum())
 
 
 def _back(r: Array, right: Array) -> Array:

@@ -151,11 +151,7 @@ class RigidBodyEstimate:
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return the bounds of the confidence intervals of a ``level``, by Student's distribution."""
-        if not 0 < level < 1:
-            raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
-        factor = scipy.stats.t.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)
-        half = factor * self.standard_error
-        return self.values - half, self.values + half
+        return student_interval(self.values, self.standard_error, self.degrees_of_freedom, level)
 
     def standard(self, prior: ArrayLike | None = None) -> Array:
         """Return standard parameters (model order) that give these base parameters.
@@ -246,3 +242,13 @@ class RigidBodyEstimate:
             lines.append(f"{name}: residual {rms:.3g} Nm rms, {100 * relative:.2g} % of the torque")
         lines += [f"note: {finding}" for finding in self.findings]
         return "\n".join(lines)
+
+
+def student_interval(
+    values: Array, standard_error: Array, degrees_of_freedom: Array, level: float
+) -> tuple[Array, Array]:
+    """Return the bounds of the intervals of a ``level`` by Student's distribution, (n,) each."""
+    if not 0 < level < 1:
+        raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
+    half = scipy.stats.t.ppf(0.5 + 0.5 * level, degrees_of_freedom) * standard_error
+    return values - half, values + half
