@@ -31,6 +31,7 @@ from axisight.effects import Effect
 from axisight.errors import InputError, RobotError
 from axisight.fitting import Fitted
 from axisight.robot import Robot, load_robot
+from axisight.robot_file_checks import check_agreement, check_effects, checked_covariance
 from axisight.robot_sidecar import Sidecar, first_fault, text_hash
 from axisight.storage import write_whole
 from axisight.toml_spans import value_spans
@@ -126,12 +127,13 @@ def identified(
     effects
         Effects found, with their parameters.
 
-    Raises InputError for values that are not finite, negative standard errors, and a covariance
-    that is not symmetric, of another size, or at odds with the standard errors.
+    Raises InputError for values that are not finite, negative standard errors, a covariance
+    that is not symmetric and positive semidefinite, of another size, or at odds with the standard
+    errors, and values of effect parameters that ``effects`` contradict.
     """
     names = tuple(values)
     numbers = np.array([_number(f"values[{n!r}]", values[n]) for n in names])
-    matrix = None if covariance is None else _covariance(covariance, len(names))
+    matrix = None if covariance is None else checked_covariance(covariance, len(names))
     errors = np.full(len(names), np.nan)
     if matrix is not None:
         errors = np.sqrt(np.diag(matrix))
@@ -148,6 +150,7 @@ def identified(
                 f"got {number}"
             )
         errors[place] = number
+    check_agreement(names, numbers, effects)
     return Identified(names, numbers, errors, provenance, matrix, tuple(effects))
 
 
@@ -213,10 +216,16 @@ def write_identified(
 
     Returns the path of the sidecar. Each file is written whole or not at all, the sidecar first, whose
     hash of the robot tells whether both belong together. Raises RobotError for values no body has
-    (mass or stiffness not positive, negative damping or friction, an inertia that is not positive
-    definite or breaks the triangle inequality), InputError for unknown names and files in the way.
+    (mass or stiffness not positive, negative damping or friction, Coulomb friction of effects
+    included, an inertia that is not positive definite or breaks the triangle inequality),
+    InputError for unknown names, axes the robot does not have, values that their effect
+    contradicts, a covariance that is none, and files in the way.
     """
     robot = source if isinstance(source, Robot) else load_robot(source)
+    check_effects(found.effects, robot.n_axes)
+    check_agreement(found.names, found.values, found.effects)
+    if found.covariance is not None:
+        checked_covariance(found.covariance, len(found.names))
     path = Path(target)
     sidecar = sidecar_path(path)
     for file in (path, sidecar):
@@ -445,18 +454,6 @@ def _number(name: str, value: float) -> float:
     return number
 
 
-def _covariance(value: ArrayLike, n: int) -> Array:
-    matrix = np.asarray(value, np.float64)
-    if matrix.shape != (n, n) or not np.isfinite(matrix).all():
-        raise InputError(
-            f"covariance: expected finite numbers, shape ({n}, {n}), got {matrix.shape}"
-        )
-    size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
-    if np.any(np.abs(matrix - matrix.T) > 1e-9 * size) or np.any(np.diag(matrix) < 0):
-        raise InputError("covariance: expected a symmetric matrix of non-negative variances")
-    return matrix
-
-
 def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     """Return what `write_identified` wrote: values, uncertainty, effects, provenance, robot.
 
@@ -467,7 +464,7 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         False takes both as they are.
 
     The result's ``robot`` has the effects that were found. Raises InputError for files that are missing, of
-    another schema, or do not belong together, RobotError for the robot.
+    another schema, or do not belong together, RobotError for the robot and impossible effects.
     """
     given = Path(path)
     sidecar = given if given.name.endswith(".identified.json") else sidecar_path(given)
@@ -489,6 +486,7 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         )
     source = report.provenance
     effects = tuple(Effect(e.name, e.axis, e.parameters) for e in report.effects)
+    check_effects(effects, robot.n_axes)
     names = tuple(p.name for p in report.parameters)
     values = np.array([p.value for p in report.parameters])
     errors = [np.nan if p.standard_error is None else p.standard_error for p in report.parameters]
@@ -498,7 +496,7 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         standard_errors=np.array(errors),
         covariance=None
         if report.covariance is None
-        else _covariance(report.covariance, len(names)),
+        else checked_covariance(report.covariance, len(names)),
         effects=effects,
         robot=Robot(robot.core, effects),
         provenance=Provenance(

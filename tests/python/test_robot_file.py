@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from axisight import Effect, Fitted, InputError, Robot, RobotError, _core, load_robot
+from axisight.effects import effect_table
 from axisight.presets import PRESETS
 from axisight.robot_file import (
     Provenance,
@@ -22,6 +24,7 @@ from axisight.robot_file import (
     render,
     write_identified,
 )
+from axisight.simulation import simulate
 from axisight.toml_spans import value_spans
 
 WHEN = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
@@ -264,6 +267,80 @@ def test_values_no_body_has_are_refused(values, words: str, tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("effect", "error", "words"),
+    [
+        (
+            Effect("coulomb_friction", 1, {"coulomb_nm": -0.5}),
+            RobotError,
+            r"coulomb_friction@1\.coulomb_nm: expected 0 to 10000 Nm, got -0\.5",
+        ),
+        (Effect("torque_offset", 1, {"offset_nm": np.nan}), RobotError, "offset_nm: .* got nan"),
+        (Effect("backlash", 1, {"half_width_rad": 0.2}), RobotError, "expected 0 to 0.05 rad"),
+        (
+            Effect("coulomb_friction", 2, {"coulomb_nm": 0.5}),
+            InputError,
+            "coulomb_friction@2: expected an axis from 1 to 1, got 2",
+        ),
+        (Effect("coulomb_friction"), InputError, "expected an axis from 1 to 1, got none"),
+        (Effect("payload", 1), InputError, "payload@1: expected no axis"),
+    ],
+)
+def test_effects_no_robot_has_are_refused(effect, error, words: str, tmp_path: Path) -> None:
+    found = identified({"axis1.stiffness": 1.5e6}, SOURCE, effects=[effect])
+    with pytest.raises(error, match=words):
+        write_identified("two_mass_axis", tmp_path / "r.toml", found)
+    assert not list(tmp_path.iterdir())
+    # The core is of the same opinion.
+    with pytest.raises(InputError):
+        simulate(load_robot("two_mass_axis"), np.zeros(10), effects=[effect])
+
+
+def test_every_effect_may_stand_at_its_neutral_values_and_bounds(tmp_path: Path) -> None:
+    robot = load_robot("irb6600_like")
+    for name, info in effect_table().items():
+        axis = 3 if info.scope == "axis" else None
+        for which in ("neutral", "lower", "upper"):
+            given = {p.name: getattr(p, which) for p in info.parameters}
+            found = identified({}, SOURCE, effects=[Effect(name, axis, given)])
+            write_identified(robot, tmp_path / "r.toml", found, overwrite=True)
+            assert load_identified(tmp_path / "r.toml").effects == found.effects
+
+
+def test_values_and_their_effects_must_agree(tmp_path: Path) -> None:
+    name = "coulomb_friction@1.coulomb_nm"
+    effect = Effect("coulomb_friction", 1, {"coulomb_nm": 0.65})
+    for value in (0.65, 0.65 * (1 + 1e-15)):
+        identified({name: value}, SOURCE, effects=[effect])
+    good = identified({name: 0.65}, SOURCE, effects=[effect])
+    for other in (
+        Effect("coulomb_friction", 1, {"coulomb_nm": 0.66}),
+        Effect("coulomb_friction", 1),  # neutral: none
+    ):
+        with pytest.raises(InputError, match=r"coulomb_nm: expected 0\.\d+ as the effect"):
+            identified({name: 0.65}, SOURCE, effects=[other])
+        with pytest.raises(InputError, match=r"coulomb_nm: expected 0\.\d+ as the effect"):
+            write_identified("two_mass_axis", tmp_path / "r.toml", replace(good, effects=(other,)))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "matrix", [[[1.0, 5.0], [5.0, 1.0]], [[0.0, 5.0], [5.0, 1.0]], [[1e-12, 2e-3], [2e-3, 1e6]]]
+)
+def test_covariances_of_nothing_are_refused(matrix, tmp_path: Path) -> None:
+    values = {"axis1.stiffness": 1.5e6, "axis1.damping": 2.6e3}
+    with pytest.raises(InputError, match="covariance: expected a positive semidefinite matrix"):
+        identified(values, SOURCE, covariance=matrix)
+    found = replace(identified(values, SOURCE), covariance=np.array(matrix))
+    with pytest.raises(InputError, match="covariance: expected a positive semidefinite matrix"):
+        write_identified("two_mass_axis", tmp_path / "r.toml", found)
+    assert not list(tmp_path.iterdir())
+    # One of fewer dimensions than parameters is none of these, whatever the units.
+    row = np.random.default_rng(0).normal(size=(2, 40)) * np.geomspace(1e-6, 1e6, 40)
+    free = identified({f"p{i}": 0.0 for i in range(40)}, SOURCE, covariance=row.T @ row)
+    assert free.covariance is not None
+
+
 def test_misuse_is_named(tmp_path: Path) -> None:
     write = write_identified
     for values, words in (
@@ -313,6 +390,14 @@ def test_changed_robots_and_spoilt_sidecars_are_told(tmp_path: Path) -> None:
         ('"value": 1500000.0', '"value": "much"', "parameters"),
         ("2024-05-06T", "once", "ISO date"),
         ("{", "", "Invalid JSON"),
+    ):
+        assert old in good
+        sidecar.write_text(good.replace(old, new, 1))
+        with pytest.raises(InputError, match=words):
+            load_identified(target)
+    for old, new, words in (
+        ('"coulomb_nm": 0.644', '"coulomb_nm": -0.644', "coulomb_friction@1.coulomb_nm: expected 0"),
+        ('"axis": 1', '"axis": 3', "expected an axis from 1 to 1, got 3"),
     ):
         assert old in good
         sidecar.write_text(good.replace(old, new, 1))

@@ -1,0 +1,84 @@
+"""What a robot file and its sidecar must not say: impossible effects, contradictions, no covariance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.effects import Effect, effect_info
+from axisight.errors import InputError, RobotError
+
+Array = NDArray[np.float64]
+
+# Share of its largest eigenvalue by which rounding, of transformed covariances too, may make the
+# least one of a correlation matrix negative.
+ROUNDING = 1e-6
+
+
+def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
+    """Check that a robot of ``n_axes`` axes can have these effects.
+
+    Raises InputError for an axis that the robot does not have or an effect that has none,
+    RobotError for parameters outside the bounds of the table of effects (negative Coulomb
+    friction).
+    """
+    for effect in effects:
+        info = effect_info(effect.name)
+        if info.scope == "arm" and effect.axis is not None:
+            raise InputError(
+                f"effects: {effect.label}: expected no axis, it acts on the whole arm, got axis "
+                f"{effect.axis}"
+            )
+        if info.scope == "axis" and not 1 <= (effect.axis or 0) <= n_axes:
+            got = "none" if effect.axis is None else str(effect.axis)
+            raise InputError(f"effects: {effect.label}: expected an axis from 1 to {n_axes}, got {got}")
+        given = effect.parameters or {}
+        for p in info.parameters:
+            value = given.get(p.name, p.neutral)
+            # Written so that NaN is refused.
+            if not p.lower <= value <= p.upper:
+                raise RobotError(
+                    f"effects: {effect.label}.{p.name}: expected {p.lower:g} to {p.upper:g} "
+                    f"{p.unit}, got {value!r}"
+                )
+
+
+def check_agreement(names: Sequence[str], values: Array, effects: Iterable[Effect]) -> None:
+    """Check that values of effect parameters are those that the effects themselves have.
+
+    Raises InputError naming the first that is not.
+    """
+    found = dict(zip(names, values.tolist(), strict=True))
+    for effect in effects:
+        given = effect.parameters or {}
+        for p in effect_info(effect.name).parameters:
+            name = f"{effect.label}.{p.name}"
+            own = given.get(p.name, p.neutral)
+            if name in found and not math.isclose(found[name], own, rel_tol=1e-12):
+                raise InputError(
+                    f"{name}: expected {own!r} as the effect in effects has it, got {found[name]!r}"
+                )
+
+
+def checked_covariance(value: ArrayLike, n: int) -> Array:
+    """Return a covariance (n, n); raises InputError unless symmetric and positive semidefinite."""
+    matrix = np.asarray(value, np.float64)
+    if matrix.shape != (n, n) or not np.isfinite(matrix).all():
+        raise InputError(
+            f"covariance: expected finite numbers, shape ({n}, {n}), got {matrix.shape}"
+        )
+    variance = np.diag(matrix)
+    size = np.sqrt(np.abs(np.outer(variance, variance)))
+    if np.any(np.abs(matrix - matrix.T) > 1e-9 * size) or np.any(variance < 0):
+        raise InputError("covariance: expected a symmetric matrix of non-negative variances")
+    deviation = np.sqrt(np.where(variance > 0, variance, 1.0))
+    eigenvalues = np.linalg.eigvalsh(matrix / np.outer(deviation, deviation)) if n else np.zeros(1)
+    if eigenvalues[0] < -ROUNDING * max(eigenvalues[-1], 1.0):
+        raise InputError(
+            "covariance: expected a positive semidefinite matrix, got a correlation matrix with "
+            f"eigenvalue {eigenvalues[0]:.3g}"
+        )
+    return matrix
