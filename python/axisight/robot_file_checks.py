@@ -34,7 +34,9 @@ def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
             )
         if info.scope == "axis" and not 1 <= (effect.axis or 0) <= n_axes:
             got = "none" if effect.axis is None else str(effect.axis)
-            raise InputError(f"effects: {effect.label}: expected an axis from 1 to {n_axes}, got {got}")
+            raise InputError(
+                f"effects: {effect.label}: expected an axis from 1 to {n_axes}, got {got}"
+            )
         given = effect.parameters or {}
         for p in info.parameters:
             value = given.get(p.name, p.neutral)

@@ -246,6 +246,21 @@ def test_two_blocks_are_told_and_their_intervals_hold() -> None:
     assert all(f.kind is not FindingKind.FREEDOM for f in full.findings)
 
 
+def test_elimination_takes_what_shows_no_scatter_first() -> None:
+    model, base, values = arm()
+    q, v, a = smooth_motion(model.robot, 400, 0.02, 1)
+    torque = noisy(model.matrix(q, v, a) @ values, 0)
+    half = np.repeat([1.0, 0.0], 200)  # one of two blocks has no weight: no scatter at all
+    options = {"base": base, "blocks": 2, "sample_weight": half}
+    found = identify_rigid_body(model, q, v, a, torque, **options)
+    assert np.isnan(found.standard_error).all()
+    assert np.isnan(found.interval()).all()
+    few = [f for f in found.findings if f.kind is FindingKind.FREEDOM]
+    assert [f.names for f in few] == [tuple(base.names)]
+    less = identify_rigid_body(model, q, v, a, torque, eliminate=0.3, **options)
+    assert len(less.eliminated) == len(base) - 1
+
+
 def coverage(colour: float, n: int, blocks: int) -> Array:
     """Share of 300 realizations whose 95 % interval holds the truth, per parameter."""
     model, base, values = arm()

@@ -396,7 +396,11 @@ def test_changed_robots_and_spoilt_sidecars_are_told(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=words):
             load_identified(target)
     for old, new, words in (
-        ('"coulomb_nm": 0.644', '"coulomb_nm": -0.644', "coulomb_friction@1.coulomb_nm: expected 0"),
+        (
+            '"coulomb_nm": 0.644',
+            '"coulomb_nm": -0.644',
+            "coulomb_friction@1.coulomb_nm: expected 0",
+        ),
         ('"axis": 1', '"axis": 3', "expected an axis from 1 to 1, got 3"),
     ):
         assert old in good

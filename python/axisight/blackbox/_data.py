@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.errors import InputError
@@ -73,6 +74,28 @@ def lines(frequency_hz: ArrayLike, sample_time_s: float | None) -> Real:
             f"frequency_hz: expected at most {0.5 / sample_time_s:g} Hz (Nyquist), got {f[-1]:g}"
         )
     return f
+
+
+def slowest_first(roots: Complex) -> Complex:
+    """Return poles of discrete time in descending order of magnitude."""
+    return np.asarray(roots[np.argsort(-np.abs(roots), kind="stable")])
+
+
+def parameter_table(names: Sequence[str], values: Real, std: Real, **attrs: object) -> xr.Dataset:
+    """Return values and standard errors over ``parameter``, with these attributes."""
+    return xr.Dataset(
+        {"value": ("parameter", values), "std": ("parameter", std)},
+        coords={"parameter": list(names)},
+        attrs=attrs,
+    )
+
+
+def response_variance(slope: Complex, covariance: Real) -> Real:
+    """Return the variance (n_freq, n_out, n_in) of a response to first order.
+
+    ``slope`` (n_freq, n_out, n_in, n_parameters) are its derivatives.
+    """
+    return np.asarray(np.einsum("foik,kl,foil->foi", slope, covariance, slope.conj()).real)
 
 
 def fit_percent(measured: ArrayLike, model: ArrayLike) -> Real:

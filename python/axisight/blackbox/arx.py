@@ -26,6 +26,9 @@ from axisight.blackbox._data import (
     gathered,
     lines,
     order_matrix,
+    parameter_table,
+    response_variance,
+    slowest_first,
 )
 from axisight.blackbox._model import StateSpaceModel, expect_experiment
 from axisight.errors import InputError
@@ -101,8 +104,7 @@ class ARXModel:
             return np.zeros(0, np.complex128)
         companion = np.eye(p * lags, k=-p)
         companion[:p] = np.hstack(list(-self.a[1:]))
-        values = np.linalg.eigvals(companion).astype(np.complex128)
-        return values[np.argsort(-np.abs(values), kind="stable")]
+        return slowest_first(np.linalg.eigvals(companion).astype(np.complex128))
 
     @property
     def stable(self) -> bool:
@@ -111,10 +113,8 @@ class ARXModel:
 
     def parameters(self) -> xr.Dataset:
         """Return values and standard errors over ``parameter``."""
-        return xr.Dataset(
-            {"value": ("parameter", self.values), "std": ("parameter", self.std)},
-            coords={"parameter": list(self.names)},
-            attrs={"n_rows": self.n_rows, "condition": self.condition},
+        return parameter_table(
+            self.names, self.values, self.std, n_rows=self.n_rows, condition=self.condition
         )
 
     def response(
@@ -151,7 +151,7 @@ class ARXModel:
                 slope[..., k] = (
                     -inverse[:, :, i, None] * (delayed[:, None] * g[:, channel])[:, None]
                 )
-        return np.asarray(np.einsum("foik,kl,foil->foi", slope, self.covariance, slope.conj()).real)
+        return response_variance(slope, self.covariance)
 
     def predict(self, experiment: Experiment) -> Real:
         """Return the one-step prediction (n, p), (3.35); NaN before the largest lag.

@@ -28,6 +28,9 @@ from axisight.blackbox._data import (
     gathered,
     lines,
     order_matrix,
+    parameter_table,
+    response_variance,
+    slowest_first,
     whole,
 )
 from axisight.blackbox._model import StateSpaceModel
@@ -84,8 +87,7 @@ class OutputErrorModel:
     def poles(self) -> Complex:
         """Roots of every F, slowest (largest) first."""
         every = [np.roots(f) for row in self.f for f in row]
-        values = np.concatenate(every).astype(np.complex128)
-        return values[np.argsort(-np.abs(values), kind="stable")]
+        return slowest_first(np.concatenate(every).astype(np.complex128))
 
     @property
     def stable(self) -> bool:
@@ -94,10 +96,8 @@ class OutputErrorModel:
 
     def parameters(self) -> xr.Dataset:
         """Return values and standard errors over ``parameter``."""
-        return xr.Dataset(
-            {"value": ("parameter", self.values), "std": ("parameter", self.std)},
-            coords={"parameter": list(self.names)},
-            attrs={"n_rows": self.n_rows, "status": self.status},
+        return parameter_table(
+            self.names, self.values, self.std, n_rows=self.n_rows, status=self.status
         )
 
     def simulate(self, experiment: Experiment) -> Real:
@@ -128,7 +128,7 @@ class OutputErrorModel:
             hz,
             g,
             estimator="output_error",
-            variance=np.einsum("foik,kl,foil->foi", slope, self.covariance, slope.conj()).real,
+            variance=response_variance(slope, self.covariance),
             input_unit=input_unit,
             output_unit=output_unit,
             attrs={"n_rows": self.n_rows, "status": self.status},

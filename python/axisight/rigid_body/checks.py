@@ -37,7 +37,13 @@ def condition(result: RigidBodyEstimate) -> list[IdentificationFinding]:
     return [IdentificationFinding(FindingKind.CONDITION, text, names=names)]
 
 
-def freedom(
+def freedom(result: RigidBodyEstimate) -> list[IdentificationFinding]:
+    """Return a finding if standard errors rest on few blocks; intervals take that into account."""
+    advice = "take interval(), which counts them, longer data or more blocks"
+    return few_degrees(result.names, result.degrees_of_freedom, advice, serious=False)
+
+
+def few_degrees(
     names: list[str], degrees: Array, advice: str, *, serious: bool
 ) -> list[IdentificationFinding]:
     """Return a finding if standard errors rest on fewer than three degrees of freedom.

@@ -139,7 +139,7 @@ def identify_by_energy(
     few = freedom < checks.LEAST_FREEDOM
     covariance[few], covariance[:, few] = np.nan, np.nan
     advice = f"{n} windows for {k} parameters tell too little of their scatter, take more windows"
-    findings = checks.freedom(base.names, freedom, advice, serious=True)
+    findings = checks.few_degrees(base.names, freedom, advice, serious=True)
     for finding in findings:
         warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     residual = float(np.sqrt(solution.loss[0] / n))

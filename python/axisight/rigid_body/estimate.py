@@ -82,7 +82,8 @@ def identify_rigid_body(
         are exact. Default: errors in proportion to the root mean square of each column,
         offsets and Coulomb friction exact.
     eliminate : largest relative standard error to keep, e.g. 0.3; the parameters beyond it
-        are set to zero one by one, the worst first. Default: none are.
+        are set to zero one by one, the worst first, those of unknown error before all others.
+        Default: none are.
     deficient : what to do with data that do not separate all base parameters: ``"raise"`` an
         IdentifiabilityError, or ``"group"`` them further, with a warning.
     blocks : number of blocks of consecutive samples for the standard errors; they
@@ -158,10 +159,7 @@ def identify_rigid_body(
         n_blocks=len(factors.blocks),
         findings=tuple(findings),
     )
-    advice = "take interval(), which counts them, longer data or more blocks"
-    kept = [base.names[i] for i in keep]
-    findings += checks.freedom(kept, freedom, advice, serious=False)
-    findings += checks.condition(result)
+    findings += [*checks.freedom(result), *checks.condition(result)]
     findings += checks.friction_sign(result)
     findings += checks.gear_sign(result, factors, motion)
     for finding in findings:
@@ -207,6 +205,8 @@ def _least_certain(solution: Solution, covariance: Array, limit: float | None) -
     error = np.sqrt(np.diag(covariance))
     # Written without a division: a value of zero is as uncertain as can be.
     excess = error / np.maximum(np.abs(solution.values), 1e-300)
+    # Nothing is as uncertain as what shows no scatter.
+    excess[np.isnan(excess)] = np.inf
     worst = int(np.argmax(excess))
     return worst if excess[worst] > limit else None
 
