@@ -49,7 +49,8 @@ class HighFrequencyGain:
     """Level of torque to acceleration far above the resonances, 1 / J_m.
 
     gain, standard_error
-        [rad/s^2/Nm], at infinite frequency.
+        [rad/s^2/Nm], at infinite frequency; the error is that of noise, without what the series
+        leaves out, up to 1 % from 1.6 times the last peak on.
     correction
         How much larger the response still is at the upper end of the band, relative.
     from_rad_s, to_rad_s
