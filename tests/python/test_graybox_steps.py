@@ -215,7 +215,7 @@ def test_a_variance_of_two_periods_serves_the_landmarks() -> None:
             np.array(apart) / [notch.frequency_standard_error_rad_s, notch.damping_standard_error]
         )
     # Mean square of 120 scores: one within 0.13 at one deviation, less where seventeen lines
-    # make the larger of two errors count. Weighted line by line it is 1.5.
+    # make the larger of two errors count. Weighted line by line it is 1.9.
     assert 0.5 < np.mean(np.square(score)) < 1.2
 
 
