@@ -467,6 +467,7 @@ _PoseResponse: TypeAlias = tuple[
     _Array,
     NDArray[np.complex128],
     _Array | None,
+    _Array | None,
     NDArray[np.complex128] | None,
     NDArray[np.complex128] | None,
     int,

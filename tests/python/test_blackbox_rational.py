@@ -95,7 +95,7 @@ def test_one_relocation_finds_the_poles_of_exact_data() -> None:
     domain = Domain(100.0, None)
     x = domain.points(LINES)
     g = continuous(LINES).reshape(-1, 4)
-    problem = Weighted(x, g, 1 / np.abs(g), np.stack([1 / x, 1 / x**2], axis=1))
+    problem = Weighted(x, g, 1 / np.abs(g), np.stack([1 / x, 1 / x**2], axis=1), np.ones(g.shape))
     poles = OMEGA * (-ZETA + 1j * np.sqrt(1 - ZETA**2)) / 100
     poles = np.concatenate([poles, poles.conj()])
     for start in (poles, poles * 1.2, poles.real * 3 + 1.1j * poles.imag):
@@ -194,6 +194,46 @@ def test_uncertainty_is_the_scatter_and_the_loss_a_chi_square() -> None:
     assert np.mean(white) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 240))
 
 
+def of_three(g: np.ndarray, seed: int) -> xr.Dataset:
+    """Mean of three realizations and its sample variance."""
+    rng = np.random.default_rng([3, seed])
+    parts = rng.normal(size=(2, 3, *g.shape)) * np.sqrt(1.5) * 0.02
+    error = (parts[0] + 1j * parts[1]) * np.abs(g)
+    mean = error.mean(axis=0)
+    variance = np.mean(np.abs(error - mean) ** 2, axis=0) / 2
+    attrs = {"degrees_of_freedom": 2}
+    return frequency_response(LINES, g + mean, estimator="t", variance=variance, attrs=attrs)
+
+
+def test_three_realizations_make_honest_uncertainty() -> None:
+    """As above, with variances of two degrees of freedom: weighed by their own, lines made the
+    distance 32 and the loss 1.9. 20 runs: 6 +- 3 sqrt(12 / 20) = 2.3; the loss, whose yardstick is
+    uncertain too, 1 +- 3 sqrt((2 + 1) / 1900 / 20) = 0.027."""
+    g = continuous(LINES)
+    truth = fit_rational(noisy(g, LINES, 1e-10), 6, integrators=2).modes()
+    distances, losses, chances, discs = [], [], [], []
+    for seed in range(20):
+        model = fit_rational(of_three(g, seed), 6, integrators=2)
+        modes = model.modes()
+        size = [
+            (modes[n] - truth[n]) / modes[s]
+            for n, s in (("frequency_hz", "frequency_std_hz"), ("damping_ratio", "damping_std"))
+        ]
+        distances.append(np.sum(np.square(size)))
+        attrs = model.residual_tests().attrs
+        losses.append(attrs["reduced_loss"])
+        chances.append(attrs["loss_p"])
+        found = model.response(LINES)
+        discs.append(np.mean(np.abs(found["response"].values - g) ** 2 / found["variance"].values))
+        assert not model.warnings
+    assert np.mean(distances) == pytest.approx(6.0, abs=2.3)
+    assert np.mean(losses) == pytest.approx(1.0, abs=0.027)
+    assert np.mean(chances) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 20))
+    assert np.mean(discs) == pytest.approx(1.0, abs=0.2)
+    own = fit_rational(of_three(g, 0), 6, integrators=2, neighbours=0)
+    assert any("own variance of 2 degrees" in text for text in own.warnings)
+
+
 def test_one_direction_for_each_mode_is_refitted() -> None:
     """Rank one: 10 states instead of 16, and the loss grows by the saved parameters only, each
     one on average."""
@@ -282,7 +322,7 @@ def test_robot_is_recovered_at_the_noise_of_the_thesis() -> None:
     robot, records = measured()
     response = logarithmic_mean(records)
     f = response["frequency_hz"].values
-    options = {"integrators": 2, "sample_time_s": robot.sample_time_s, "smooth_lines": 21}
+    options = {"integrators": 2, "sample_time_s": robot.sample_time_s}
     model = fit_rational(response, 10, **options)
     assert model.status == "converged" and model.stable
     modes, truth = model.modes(), robot.modes()
@@ -305,9 +345,7 @@ def test_robot_is_recovered_at_the_noise_of_the_thesis() -> None:
 def test_residuals_show_the_bias_of_an_estimate() -> None:
     """Y U^-1 over all realizations is biased where U is weak: no order makes its residuals white."""
     robot, records = measured()
-    model = fit_rational(
-        mfrf(records), 10, integrators=2, sample_time_s=robot.sample_time_s, smooth_lines=21
-    )
+    model = fit_rational(mfrf(records), 10, integrators=2, sample_time_s=robot.sample_time_s)
     assert (model.residual_tests()["whiteness_p"] < 1e-3).all()
 
 
@@ -320,7 +358,7 @@ def test_residuals_show_the_bias_of_an_estimate() -> None:
         (lambda r: fit_rational(r, 2, weighting="log"), "weighting"),
         (lambda r: fit_rational(r.drop_vars("variance"), 2), "expected a variance"),
         (lambda r: fit_rational(r.assign(variance=r["variance"] * np.nan), 2), "positive variance"),
-        (lambda r: fit_rational(r, 2, smooth_lines=4), "odd number"),
+        (lambda r: fit_rational(r, 2, neighbours=-4), "neighbours: expected a whole"),
         (lambda r: fit_rational(r, 2, sample_time_s=-1.0), "sample_time_s"),
         (lambda r: fit_rational(r, 2, sample_time_s=0.1), "Nyquist"),
         (lambda r: fit_rational(r.isel(frequency_hz=[0]), 4), "more than 4 lines"),

@@ -45,12 +45,13 @@ pub struct FrequencyOptionSpec {
     step_tolerance: f64,
 }
 
-/// Joint angles, frequencies, response, variance, covariance, reference of logarithmic weights,
-/// derivative order; arrays of all lines and elements flat.
+/// Joint angles, frequencies, response, variance, variance to weigh by, covariance, reference of
+/// logarithmic weights, derivative order; arrays of all lines and elements flat.
 type PoseTuple<'py> = (
     Vec<f64>,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, Complex64>,
+    Option<PyReadonlyArray1<'py, f64>>,
     Option<PyReadonlyArray1<'py, f64>>,
     Option<PyReadonlyArray1<'py, Complex64>>,
     Option<PyReadonlyArray1<'py, Complex64>>,
@@ -58,13 +59,18 @@ type PoseTuple<'py> = (
 );
 
 fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
-    let (joint_angle, frequency_hz, response, variance, covariance, reference, order) = tuple;
+    let (joint_angle, frequency_hz, response, variance, weighing, covariance, reference, order) =
+        tuple;
     let plain = |a: &PyReadonlyArray1<'_, f64>| a.as_array().to_vec();
     let complex = |a: &PyReadonlyArray1<'_, Complex64>| a.as_array().to_vec();
-    let uncertainty = match (variance, covariance) {
-        (None, None) => Uncertainty::Unknown,
-        (Some(variance), None) => Uncertainty::Variance(plain(&variance)),
-        (None, Some(covariance)) => Uncertainty::Covariance(complex(&covariance)),
+    let uncertainty = match (variance, weighing, covariance) {
+        (None, None, None) => Uncertainty::Unknown,
+        (Some(variance), None, None) => Uncertainty::Variance(plain(&variance)),
+        (Some(variance), Some(weighing), None) => Uncertainty::Pooled {
+            stated: plain(&variance),
+            weighing: plain(&weighing),
+        },
+        (None, None, Some(covariance)) => Uncertainty::Covariance(complex(&covariance)),
         _ => {
             return Err(InputError::new_err(
                 "expected a variance or a covariance, got both",

@@ -155,13 +155,20 @@ class Weighted:
     """Elements of a response, each as rows of real numbers with its own weights.
 
     ``x`` (n_freq,), ``values`` (n_freq, n_elements), ``weight`` real of the same shape, ``extra``
-    the columns that every model has: powers 1/x, 1/x^2 and one.
+    the columns that every model has: powers 1/x, 1/x^2 and one. ``spread``, shaped as ``weight``,
+    is the variance that the real and the imaginary part of a weighted residual should have.
     """
 
     x: Complex
     values: Complex
     weight: Real
     extra: Complex
+    spread: Real
+
+    @property
+    def row_spread(self) -> Real:
+        """Variances of the weighted rows, (n_elements, 2 n_freq)."""
+        return np.hstack([self.spread.T, self.spread.T])
 
     @property
     def targets(self) -> Real:

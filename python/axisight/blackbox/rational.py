@@ -11,20 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize, stats
 
 from axisight.blackbox import _vector_fitting
 from axisight.blackbox._data import Complex, Real, lines, whole
 from axisight.blackbox._sections import Domain, Sections, Solved, Weighted
+from axisight.blackbox._weights import UsableLines, Weighting, usable_lines
 from axisight.errors import AxisightError, InputError
 from axisight.frf.response import DIMS, frequency_response
-
-Weighting = Literal["variance", "relative", "absolute"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,7 @@ class RationalModel:
     fitted. ``status``: ``converged``, or ``not_converged`` (the best found is given); ``warnings``
     say what to do. ``loss`` is the sum of squares of weighted residuals, real and imaginary
     parts, of expectation ``degrees_of_freedom`` where the weights come from a known variance.
+    ``variance_freedom``: complex degrees of freedom of a variance that is estimated, else None.
     """
 
     poles: Complex
@@ -48,6 +47,7 @@ class RationalModel:
     degrees_of_freedom: int
     n_parameters: int
     weighting: Weighting
+    variance_freedom: float | None
     n_out: int
     n_in: int
     iterations: int
@@ -122,18 +122,7 @@ class RationalModel:
         x = self.domain.points(f)
         columns = np.hstack([self.sections.basis(x), _extras(x, self.integrators, self._direct)])
         g = columns @ self.numerators.T
-        variance = np.empty(g.shape)
-        solved = self.problem.residues(self.sections)
-        slopes = _slopes(self.problem, self.sections, solved)
-        for e, theta in enumerate(self.numerators):
-            # Residues follow the poles: d theta = -rows^+ slopes d poles.
-            inverse = np.linalg.pinv(solved.r[e])
-            follow = inverse @ solved.q[e].T @ slopes[e]
-            total = self.sections.slopes(x, theta[: self.order]) - columns @ follow
-            variance[:, e] = self.noise_scale**2 * np.sum(np.abs(columns @ inverse) ** 2, axis=1)
-            variance[:, e] += np.einsum(
-                "fi,ij,fj->f", total, self.pole_covariance, total.conj()
-            ).real
+        variance = self._variance(x, columns)
         shape = (len(f), self.n_out, self.n_in)
         return frequency_response(
             f,
@@ -145,13 +134,41 @@ class RationalModel:
             attrs={"order": self.order, "integrators": self.integrators, "status": self.status},
         )
 
+    def _variance(self, x: Complex, columns: Complex) -> Real:
+        """Variance of every element: noise moves the poles, and residues with and without them.
+
+        With rows Q r of an element, its noise e and that of all, dp = W J^T e_all are the poles
+        and r^-1 Q^T (e - S dp) the residues, S the slopes by the poles.
+        """
+        solved = self.problem.residues(self.sections)
+        slopes = _slopes(self.problem, self.sections, solved)
+        jacobian = _projected(slopes, solved)
+        inverse, _ = _normal_inverse(jacobian.reshape(-1, self.order))
+        spread = self.noise_scale**2 * self.problem.row_spread
+        out = np.empty((*columns.shape[:1], len(self.numerators)))
+        for e, theta in enumerate(self.numerators):
+            q, own = solved.q[e], spread[e][:, None]
+            direct = columns @ np.linalg.pinv(solved.r[e])
+            total = self.sections.slopes(x, theta[: self.order]) - direct @ (q.T @ slopes[e])
+            together = (q.T @ (own * jacobian[e])) @ inverse
+            out[:, e] = _quadratic(direct, q.T @ (own * q), direct)
+            out[:, e] += _quadratic(total, self.pole_covariance, total)
+            out[:, e] += 2 * _quadratic(direct, together, total)
+        return out
+
     @property
     def _direct(self) -> bool:
         return bool(self.problem.extra.shape[1] > self.integrators)
 
     @property
+    def reduced_loss(self) -> float:
+        """Loss over what the variance makes it: one if the model holds."""
+        expected = self.degrees_of_freedom * float(self.problem.spread.mean())
+        return self.loss / max(expected, 1e-300)
+
+    @property
     def noise_scale(self) -> float:
-        """Standard deviation of weighted residuals: one with a known variance, else estimated."""
+        """Factor on the standard deviations of weighted residuals: one with a variance given."""
         if self.weighting == "variance":
             return 1.0
         return float(np.sqrt(self.loss / max(self.degrees_of_freedom, 1)))
@@ -159,8 +176,9 @@ class RationalModel:
     def residual_tests(self, lags: int = 10) -> xr.Dataset:
         """Return whether the residuals are what the variance says, and white over the lines.
 
-        Attributes: ``reduced_loss`` (loss over degrees of freedom, one if all is well) and
-        ``loss_p``, the probability of so large a loss by chance (NaN without a known variance).
+        Attributes: ``reduced_loss`` (loss over what the variance makes it, one if all is well) and
+        ``loss_p``, the probability of so large a loss by chance (NaN without a variance), by the
+        F distribution where the variance itself is estimated.
         Over (output, input): ``whiteness_p``, of so much correlation between lines up to ``lags``
         apart; ``largest``, the largest residual in standard deviations. Raises InputError for
         fewer than four times ``lags`` lines.
@@ -177,7 +195,13 @@ class RationalModel:
         ]
         statistic = 2 * n * np.sum((np.stack(related) / power) ** 2, axis=0)
         shape = (self.n_out, self.n_in)
-        known = self.weighting == "variance"
+        reduced = self.reduced_loss
+        chance = np.nan
+        if self.weighting == "variance":
+            freedom = self.variance_freedom or np.inf
+            # Real and imaginary part of every element count.
+            other = min(2 * freedom * self.problem.values.size, 1e12)
+            chance = float(stats.f.sf(reduced, self.degrees_of_freedom, other))
         return xr.Dataset(
             {
                 "whiteness_p": (DIMS[1:], stats.chi2.sf(statistic, 2 * most).reshape(shape)),
@@ -185,10 +209,8 @@ class RationalModel:
             },
             coords={"output": np.arange(1, shape[0] + 1), "input": np.arange(1, shape[1] + 1)},
             attrs={
-                "reduced_loss": self.loss / max(self.degrees_of_freedom, 1),
-                "loss_p": float(stats.chi2.sf(self.loss, self.degrees_of_freedom))
-                if known
-                else np.nan,
+                "reduced_loss": reduced,
+                "loss_p": chance,
             },
         )
 
@@ -201,7 +223,7 @@ def fit_rational(
     integrators: int = 0,
     direct: bool = False,
     weighting: Weighting = "variance",
-    smooth_lines: int = 1,
+    neighbours: int | None = None,
     stable: bool = True,
     start_rad_s: ArrayLike | None = None,
     max_iterations: int = 60,
@@ -223,9 +245,11 @@ def fit_rational(
         ``"variance"``: by the standard deviation of the response, which makes the loss a
         chi-square; ``"relative"``: by one over its magnitude; ``"absolute"``: none. With the
         last two the noise is estimated from the residuals.
-    smooth_lines
-        Average the variance over so many neighbouring lines (odd): wanted where it comes from few periods,
-        because a weight from a variance that is too small by chance rules the fit.
+    neighbours
+        How many neighbouring lines say by which variance a line is weighed: a weight from a
+        variance that is too small by chance rules the fit. None: none where the variance is
+        known (no ``degrees_of_freedom``) or rests on 30, else as many as make 30 together; 0:
+        each line by its own. Uncertainties come from the variance as given, not the pooled one.
     stable
         Keep the poles stable: mirrored while vector fitting, never left in the search. The
         integrators stay.
@@ -244,7 +268,10 @@ def fit_rational(
         raise InputError(f"integrators: expected 0, 1 or 2, got {integrators!r}")
     if n + integrators + direct == 0:
         raise InputError("order: expected at least one pole, integrator or direct term, got none")
-    f, g, weight = _weights(response, weighting, whole("smooth_lines", smooth_lines, 1))
+    if neighbours is not None:
+        neighbours = whole("neighbours", neighbours, 0)
+    used = usable_lines(response, weighting, neighbours)
+    f = used.frequency_hz
     if sample_time_s is not None and not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise InputError(f"sample_time_s: expected a positive time, got {sample_time_s}")
     lines(f, sample_time_s)
@@ -258,7 +285,7 @@ def fit_rational(
     domain = Domain(2 * np.pi * float(np.sqrt(max(f[0], f[-1] * 1e-3) * f[-1])), sample_time_s)
     x = domain.points(f)
     extra = _extras(x, integrators, direct)
-    problem = Weighted(x, g.reshape(len(f), -1), weight.reshape(len(f), -1), extra)
+    problem = _weighed(used, x, extra, np.abs(used.values))
     if n == 0:
         sections, steps, settled = Sections(np.zeros((0, 2)), np.zeros(0)), 0, True
     else:
@@ -270,7 +297,26 @@ def fit_rational(
         first, _, steps, _ = min(found, key=lambda item: item[1])
         sections, evaluations, settled = _searched(problem, first, domain, stable, limit)
         steps += evaluations
-    return _packed(response, problem, sections, domain, integrators, weighting, steps, settled)
+        for _ in range(RENEWALS if used.pooled else 0):
+            # Neighbours' variances relative to the model, not to a magnitude with its error.
+            columns = problem.columns(sections)
+            modelled = np.abs(columns @ problem.residues(sections).numerators.T)
+            problem = _weighed(used, x, extra, modelled.reshape(used.values.shape))
+            sections, evaluations, settled = _searched(problem, sections, domain, stable, limit)
+            steps += evaluations
+    return _packed(response, problem, sections, domain, integrators, used, steps, settled)
+
+
+RENEWALS = 2
+"""How often weights from neighbours are renewed with the magnitude of the model."""
+
+
+def _weighed(used: UsableLines, x: Complex, extra: Complex, magnitude: Real) -> Weighted:
+    weight, spread = used.weights(magnitude)
+    shape = (len(x), -1)
+    return Weighted(
+        x, used.values.reshape(shape), weight.reshape(shape), extra, spread.reshape(shape)
+    )
 
 
 def _extras(x: Complex, integrators: int, direct: bool) -> Complex:
@@ -279,51 +325,6 @@ def _extras(x: Complex, integrators: int, direct: bool) -> Complex:
     if direct:
         columns.append(np.ones_like(x))
     return np.stack(columns, axis=1) if columns else np.zeros((len(x), 0), np.complex128)
-
-
-def _weights(response: xr.Dataset, weighting: str, smooth: int) -> tuple[Real, Complex, Real]:
-    """Return lines, values (n_freq, n_out, n_in) and weights, lines that are NaN left out."""
-    found = response.get("response") if isinstance(response, xr.Dataset) else None
-    if found is None or set(found.dims) != set(DIMS):
-        raise InputError(f"response: expected a Dataset with a variable response over {DIMS}")
-    g = np.asarray(found.transpose(*DIMS).values, np.complex128)
-    f = np.asarray(response["frequency_hz"].values, np.float64)
-    good: NDArray[np.bool_] = np.asarray(np.isfinite(g).all(axis=(1, 2)))
-    if weighting == "variance":
-        known = response.get("variance")
-        if known is None:
-            raise InputError("response: expected a variance; or choose weighting='relative'")
-        variance = np.asarray(known.transpose(*DIMS).values, np.float64)
-        good &= np.asarray(np.isfinite(variance).all(axis=(1, 2)) & (variance > 0).all(axis=(1, 2)))
-        if not good.any():
-            raise InputError(
-                "response: expected a positive variance at some line, got none; or choose "
-                "weighting='relative'"
-            )
-        # Real and imaginary parts each carry half the variance.
-        weight = np.sqrt(2 / _smoothed(variance[good], smooth))
-    elif weighting == "relative":
-        good &= np.asarray((g != 0).all(axis=(1, 2)))
-        weight = 1 / np.abs(g[good])
-    elif weighting == "absolute":
-        weight = np.ones(g[good].shape)
-    else:
-        raise InputError(
-            f"weighting: expected 'variance', 'relative' or 'absolute', got {weighting!r}"
-        )
-    if not good.any():
-        raise InputError("response: expected a line with numbers, got NaN or zero at all of them")
-    return f[good], g[good], weight
-
-
-def _smoothed(variance: Real, n: int) -> Real:
-    if n % 2 == 0:
-        raise InputError(f"smooth_lines: expected an odd number, got {n}")
-    if n == 1:
-        return variance
-    padded = np.pad(variance, ((n // 2, n // 2), (0, 0), (0, 0)), mode="edge")
-    sums = np.cumsum(np.concatenate([np.zeros((1, *variance.shape[1:])), padded]), axis=0)
-    return np.asarray((sums[n:] - sums[:-n]) / n)
 
 
 def _starts(
@@ -392,8 +393,11 @@ def projected_jacobian(problem: Weighted, sections: Sections, solved: Solved) ->
     Its normal matrix at the optimum is the Fisher information of the poles, residues free.
     """
     slopes = _slopes(problem, sections, solved)
-    left = slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes)
-    return np.asarray(left.reshape(-1, sections.order))
+    return _projected(slopes, solved).reshape(-1, sections.order)
+
+
+def _projected(slopes: Real, solved: Solved) -> Real:
+    return np.asarray(slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes))
 
 
 def _slopes(problem: Weighted, sections: Sections, solved: Solved) -> Real:
@@ -407,7 +411,7 @@ def _packed(
     sections: Sections,
     domain: Domain,
     integrators: int,
-    weighting: Weighting,
+    used: UsableLines,
     steps: int,
     settled: bool,
 ) -> RationalModel:
@@ -417,14 +421,16 @@ def _packed(
     loss = solved.loss
     n_parameters = sections.order + numerators.size
     freedom = solved.left.size - n_parameters
-    scale = 1.0 if weighting == "variance" else loss / max(freedom, 1)
+    scale = 1.0 if used.variance is not None else loss / max(freedom, 1)
     covariance, warnings = _covariance(problem, sections, scale)
+    warnings += _doubts(used, loss / max(freedom * float(problem.spread.mean()), 1e-300))
     direct = np.zeros(shape)
     if problem.extra.shape[1] > integrators:
         direct = numerators[:, -1].reshape(shape)
     if not settled:
-        warnings.append(
-            "the search reached its limit: allow more iterations, start closer, or lower the order"
+        warnings.insert(
+            0,
+            "the search reached its limit: allow more iterations, start closer, or lower the order",
         )
     return RationalModel(
         poles=domain.natural(sections.poles()),
@@ -436,7 +442,8 @@ def _packed(
         loss=loss,
         degrees_of_freedom=freedom,
         n_parameters=n_parameters,
-        weighting=weighting,
+        weighting=used.weighting,
+        variance_freedom=used.degrees_of_freedom,
         n_out=shape[0],
         n_in=shape[1],
         iterations=steps,
@@ -452,17 +459,52 @@ def _packed(
     )
 
 
+LOSS_EXPLAINED = 1.1
+"""Residuals larger than the variance explains by this factor: the model is incomplete."""
+
+
+def _doubts(used: UsableLines, reduced_loss: float) -> list[str]:
+    """Return what speaks against standard errors from the variance of the response."""
+    out = []
+    if used.variance is not None and reduced_loss > LOSS_EXPLAINED:
+        out.append(
+            f"the residuals are {reduced_loss:.3g} times what the variance explains: raise the "
+            "order, or the variance is too small; standard errors are too small"
+        )
+    if used.uncertain:
+        out.append(
+            f"lines are weighed by their own variance of {used.degrees_of_freedom:.3g} degrees of "
+            "freedom: standard errors are too small; use neighbours=None or more realizations"
+        )
+    return out
+
+
 def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Real, list[str]]:
+    """Return the covariance of the sections by the spread of weighted residuals."""
     if sections.order == 0:
         return np.zeros((0, 0)), []
     jacobian = projected_jacobian(problem, sections, problem.residues(sections))
+    inverse, known = _normal_inverse(jacobian)
+    if not known:
+        text = "the lines do not determine all poles: lower the order; standard errors are NaN"
+        return inverse, [text]
+    scores = jacobian.T @ (scale * problem.row_spread.reshape(-1, 1) * jacobian)
+    return inverse @ scores @ inverse, []
+
+
+def _normal_inverse(jacobian: Real) -> tuple[Real, bool]:
+    """Return (J^T J)^-1 and whether there is one; NaN otherwise."""
     size = np.linalg.norm(jacobian, axis=0)
     _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-    if size.min() == 0 or s[-1] <= 1e-10 * s[0]:
-        text = "the lines do not determine all poles: lower the order; standard errors are NaN"
-        return np.full((sections.order,) * 2, np.nan), [text]
+    if size.min(initial=1.0) == 0 or (s.size and s[-1] <= 1e-10 * s[0]):
+        return np.full((jacobian.shape[1],) * 2, np.nan), False
     root = vt.T / s / size[:, None]
-    return scale * root @ root.T, []
+    return root @ root.T, True
+
+
+def _quadratic(left: Complex, matrix: Real, right: Complex) -> Real:
+    """Real part of left M right^H, row by row."""
+    return np.asarray(np.sum((left @ matrix) * right.conj(), axis=1).real)
 
 
 def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: object) -> xr.Dataset:
@@ -496,11 +538,11 @@ def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: obje
                 column.append(np.nan)
             continue
         count = model.degrees_of_freedom + model.n_parameters
-        level = model.loss
+        level = model.loss / float(model.problem.spread.mean())
         if model.weighting != "variance":
             level = count * float(np.log(max(model.loss, 1e-300) / count))
         d = model.n_parameters
-        values = (model.loss, model.loss / max(model.degrees_of_freedom, 1), d, level + 2 * d)
+        values = (model.loss, model.reduced_loss, d, level + 2 * d)
         for name, value in zip(names, (*values, level + d * np.log(count)), strict=True):
             rows[name].append(value)
         status.append(model.status)

@@ -19,12 +19,12 @@ from axisight.frequency_fit.measured import MeasuredResponse, measured, model_re
 from axisight.frequency_fit.options import FrequencyFitOptions, core_options
 from axisight.frequency_fit.parameters import Spec, specs
 from axisight.frequency_fit.result import (
-    MISFIT_EXPLAINED,
     NORMAL_95,
     FrequencyFit,
     covariances,
     warn,
 )
+from axisight.frequency_fit.trust import trust
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -85,42 +85,63 @@ def fit_responses(
                 )
     model = [*robot.effects, *effects]
     chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
+    nothing: list[Complex | None] = [None] * len(data)
+    weighing = _weighing(data, chosen, nothing)
 
     def search(
-        start: Sequence[Spec], reference: Sequence[Complex | None]
+        start: Sequence[Spec], reference: Sequence[Complex | None], weighing: Sequence[Real | None]
     ) -> _core.FrequencyFitResult:
         return _core.fit_frequency_responses(
             robot.core,
             core_effects(model),
             list(start),
-            [one.core(g) for one, g in zip(data, reference, strict=True)],
+            [one.core(g, w) for one, g, w in zip(data, reference, weighing, strict=True)],
             core_options(chosen),
         )
 
-    results = _from_starts(wanted, chosen, lambda start: search(start, [None] * len(data)))
+    results = _from_starts(wanted, chosen, lambda start: search(start, nothing, weighing))
     result = results[0]
     passes = [result]
-    if chosen.weighted and chosen.logarithmic:
-        for _ in range(chosen.reweightings):
-            fitted = _with_values(robot, wanted, result.values)
-            reference = [
-                model_response(
-                    fitted,
-                    one.frequency_hz,
-                    one.joint_angle_rad,
-                    quantity=one.quantity,
-                    sampling=chosen.sampling,
-                    effects=effects,
-                ).values
-                for one in data
-            ]
-            start = [
-                replace(s, initial=float(np.clip(v, s.lower, s.upper)))
-                for s, v in zip(wanted, result.values, strict=True)
-            ]
-            result = search(start, reference)
-            passes.append(result)
-    return _wrap(robot, wanted, data, chosen, passes, _table(results))
+    pooled = any(weights is not None for weights in weighing)
+    renewed = chosen.weighted and (chosen.logarithmic or pooled)
+    for _ in range(chosen.reweightings if renewed else 0):
+        fitted = _with_values(robot, wanted, result.values)
+        reference = [_modelled(fitted, one, chosen, effects) for one in data]
+        weighing = _weighing(data, chosen, reference)
+        start = [
+            replace(s, initial=float(np.clip(v, s.lower, s.upper)))
+            for s, v in zip(wanted, result.values, strict=True)
+        ]
+        result = search(start, reference if chosen.logarithmic else nothing, weighing)
+        passes.append(result)
+    return _wrap(robot, wanted, data, weighing, chosen, passes, _table(results))
+
+
+def _weighing(
+    data: Sequence[MeasuredResponse],
+    options: FrequencyFitOptions,
+    reference: Sequence[Complex | None],
+) -> list[Real | None]:
+    if not options.weighted:
+        return [None] * len(data)
+    return [one.pooled(options.neighbours, g) for one, g in zip(data, reference, strict=True)]
+
+
+def _modelled(
+    robot: Robot,
+    measured: MeasuredResponse,
+    options: FrequencyFitOptions,
+    effects: Sequence[Effect],
+) -> Complex:
+    found: Complex = model_response(
+        robot,
+        measured.frequency_hz,
+        measured.joint_angle_rad,
+        quantity=measured.quantity,
+        sampling=options.sampling,
+        effects=effects,
+    ).values
+    return found
 
 
 BLOCKS_PER_PARAMETER = 5
@@ -182,6 +203,7 @@ def _wrap(
     robot: Robot,
     wanted: Sequence[Spec],
     data: Sequence[MeasuredResponse],
+    weighing: Sequence[Real | None],
     options: FrequencyFitOptions,
     passes: Sequence[_core.FrequencyFitResult],
     starts: pd.DataFrame,
@@ -191,11 +213,9 @@ def _wrap(
     prior = np.array([_prior_information(spec) for spec in free])
     blocks = sum(-(-len(one.frequency_hz) // options.block_lines) for one in data)
     found = covariances(result, prior, blocks)
-    known = all(one.variance is not None or one.covariance is not None for one in data)
-    excess = found.misfit / _explained(data) if options.weighted and known else None
+    doubt = trust(data, weighing, result.residual, found.misfit, weighted=options.weighted)
     sandwich = options.uncertainty == "sandwich" or (
-        options.uncertainty == "auto"
-        and ((excess is not None and excess > MISFIT_EXPLAINED) or options.loss != "squared")
+        options.uncertainty == "auto" and (not doubt.holds or options.loss != "squared")
     )
     own = found.sandwich if sandwich else found.response
     scale = 1.0 if options.weighted else found.misfit
@@ -229,7 +249,7 @@ def _wrap(
             result,
             identifiable,
             at_bound,
-            excess=excess,
+            doubt=doubt,
             dropped=sum(one.dropped_lines for one in data),
             sandwich=sandwich,
         ),
@@ -244,13 +264,6 @@ def _prior_information(spec: Spec) -> float:
         return 0.0
     mean, std = spec.prior
     return float((mean / std) ** 2 if spec.logarithmic else 1 / std**2)
-
-
-def _explained(data: Sequence[MeasuredResponse]) -> float:
-    """Mean square of residuals whitened by an estimated variance, F distributed: nu / (nu - 1)."""
-    freedom = [one.degrees_of_freedom for one in data]
-    ratios = [1.0 if nu is None or nu <= 1 else nu / (nu - 1) for nu in freedom]
-    return float(np.mean(ratios))
 
 
 def _interval(free: Sequence[Spec], values: Real, spread: Real) -> Real:

@@ -14,6 +14,13 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.frf import Flag
+from axisight.frf.confidence import median_freedom
+from axisight.frf.pooled import (
+    ENOUGH_FREEDOM,
+    FEWEST_NEIGHBOURS,
+    neighbours_wanted,
+    pooled_variance,
+)
 from axisight.frf.quantity import RATES
 from axisight.robot import Robot
 
@@ -21,7 +28,9 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Quantity = Literal["position", "velocity", "acceleration"]
 Sampling = Literal["zero_order_hold", "continuous"]
-PoseTuple = tuple[list[float], Real, Complex, Real | None, Complex | None, Complex | None, int]
+PoseTuple = tuple[
+    list[float], Real, Complex, Real | None, Real | None, Complex | None, Complex | None, int
+]
 
 UNITS: dict[str, Quantity] = {f"rad{rate}/Nm": quantity for quantity, rate in RATES.items()}
 ORDER: dict[Quantity, int] = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -117,7 +126,7 @@ class MeasuredResponse:
             if "variance" in data and covariance is None:
                 known = data["variance"].transpose(*DIMS).values
                 variance = None if np.isnan(known).all() else known[keep]
-            freedom = _freedom(data)
+            freedom = median_freedom(data)
         at = _real("joint_angle_rad", joint_angle_rad, 1)
         return cls(
             tuple(at),
@@ -130,10 +139,41 @@ class MeasuredResponse:
             int(np.sum(~keep)),
         )
 
-    def core(self, reference: Complex | None = None) -> PoseTuple:
+    @property
+    def uncertain_weights(self) -> bool:
+        """Whether the variance of a line alone is too uncertain to weigh it by."""
+        freedom = self.degrees_of_freedom
+        return freedom is not None and freedom < ENOUGH_FREEDOM
+
+    def pooled(self, neighbours: int | None, model: Complex | None) -> Real | None:
+        """Return variances to weigh by from neighbouring lines; None to weigh by each line's own.
+
+        Shaped as ``variance``; ``neighbours`` as `FrequencyFitOptions` has it, ``model`` the
+        response whose magnitude counts, None the measured one. See `pooled_variance`.
+        """
+        freedom = self.degrees_of_freedom
+        if freedom is None or self.variance is None:
+            return None
+        count = neighbours
+        if count is None:
+            count = neighbours_wanted(freedom, len(self.frequency_hz))
+        if count < FEWEST_NEIGHBOURS:
+            return None
+        if count >= len(self.frequency_hz):
+            raise InputError(
+                f"neighbours: expected fewer than the {len(self.frequency_hz)} lines, got {count}"
+            )
+        order = np.argsort(self.frequency_hz)
+        out = np.empty_like(self.variance)
+        magnitude = np.abs(self.response if model is None else model)
+        out[order] = pooled_variance(magnitude[order], self.variance[order], freedom, count)
+        return out
+
+    def core(self, reference: Complex | None = None, weighing: Real | None = None) -> PoseTuple:
         """Return the arrays as the compiled core takes them.
 
-        ``reference`` is what logarithmic weights are relative to, shaped as ``response``.
+        ``reference`` is what logarithmic weights are relative to, ``weighing`` the variance to
+        weigh by if not the own, shaped as ``response``.
         """
         variance = None if self.variance is None else np.ascontiguousarray(self.variance.ravel())
         covariance = None if self.covariance is None else self.covariance.ravel()
@@ -142,6 +182,7 @@ class MeasuredResponse:
             self.frequency_hz,
             self.response.ravel(),
             variance,
+            None if weighing is None else np.ascontiguousarray(weighing.ravel()),
             covariance,
             None if reference is None else np.ascontiguousarray(reference.ravel()),
             ORDER[self.quantity],
@@ -295,12 +336,3 @@ def _covariance(value: ArrayLike, shape: tuple[int, ...]) -> Complex:
     if not np.allclose(array, twin, rtol=1e-9, atol=1e-12 * np.abs(array).max()):
         raise InputError("covariance: expected Hermitian matrices, got others")
     return np.ascontiguousarray(0.5 * (array + twin))
-
-
-def _freedom(data: xr.Dataset) -> float | None:
-    found = data.get("degrees_of_freedom", data.attrs.get("degrees_of_freedom"))
-    if found is None:
-        return None
-    values = np.asarray(found, float)
-    values = values[np.isfinite(values)]
-    return float(np.median(values)) if values.size else None

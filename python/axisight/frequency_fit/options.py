@@ -38,14 +38,21 @@ class FrequencyFitOptions:
         (mean square 2): the robust ones hold back lines, at resonances say, that the model
         misses by more than ``loss_scale``.
     reweightings
-        How often a weighted logarithmic fit is repeated with the magnitude of the fitted
-        response in its weights. With the measured one (first pass) errors that enlarge G
-        count more: a bias of the order of the relative variance.
+        How often a weighted fit whose weights need it is repeated with the magnitude of the
+        fitted response in them: logarithmic, or weighed by neighbouring lines. With the
+        measured one (first pass) errors that enlarge G count more: a bias of the order of the
+        relative variance.
+    neighbours
+        How many neighbouring lines, half of them on either side, say by which variance a line
+        is weighed. ``None``: none where the variance is known (no ``degrees_of_freedom``) or
+        rests on 30, else as many as make 30 together. 0: each line by its own.
     uncertainty
         ``response`` takes standard deviations from the variance of the response, ``sandwich``
         from the scatter of the residuals over blocks of ``block_lines`` lines (fewer where that
-        would leave less than five blocks a parameter), ``auto`` the
-        first, and the second where the residuals are larger than the variance explains.
+        would leave less than five blocks a parameter), ``auto`` the first, and the second where
+        the first does not hold: residuals larger than the variance explains, residuals of
+        neighbouring lines that resemble each other, a robust loss, or lines weighed by their own
+        variance of few realizations.
     starts, start_spread, seed
         Searches from ``starts`` starting points; the first as given, the others with factors
         up to ``1 + start_spread`` up or down, a function of (seed, number of the start).
@@ -59,6 +66,7 @@ class FrequencyFitOptions:
     loss: Literal["squared", "huber", "soft_l1"] = "squared"
     loss_scale: float = 3.0
     reweightings: int = 2
+    neighbours: int | None = None
     uncertainty: Literal["auto", "response", "sandwich"] = "auto"
     block_lines: int = 10
     starts: int = 1
@@ -81,6 +89,10 @@ class FrequencyFitOptions:
             raise InputError(
                 f"uncertainty: expected auto, response or sandwich, got {self.uncertainty!r}"
             )
+        if self.neighbours is not None and not _whole(self.neighbours, 0):
+            raise InputError(
+                f"neighbours: expected None or a whole number from 0, got {self.neighbours!r}"
+            )
         for name, least in (
             ("reweightings", 0),
             ("block_lines", 1),
@@ -89,7 +101,7 @@ class FrequencyFitOptions:
             ("max_iterations", 1),
         ):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            if not _whole(value, least):
                 raise InputError(f"{name}: expected a whole number from {least}, got {value!r}")
         for name in ("loss_scale", "start_spread", "gain_tolerance", "step_tolerance"):
             value = getattr(self, name)
@@ -105,6 +117,10 @@ class FrequencyFitOptions:
     def logarithmic(self) -> bool:
         """Whether logarithms are compared."""
         return "log" in self.criterion
+
+
+def _whole(value: object, least: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= least
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.frequency_fit.identifiability import Identifiability, advice
+from axisight.frequency_fit.trust import Trust
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -152,8 +153,6 @@ def covariances(result: _core.FrequencyFitResult, prior: Real, blocks: int) -> C
     return Covariances(inverse @ (expected + np.diag(prior)) @ inverse, sandwich, misfit)
 
 
-MISFIT_EXPLAINED = 1.1
-"""Residuals larger than the variance explains by this factor: the model is incomplete."""
 POOR_CONDITION = 1e8
 
 
@@ -162,11 +161,11 @@ def warn(
     found: Identifiability,
     at_bound: tuple[str, ...],
     *,
-    excess: float | None,
+    doubt: Trust,
     dropped: int,
     sandwich: bool,
 ) -> tuple[str, ...]:
-    """Return what to mind; ``excess`` is the misfit over what the variance explains."""
+    """Return what to mind; ``doubt`` is what speaks against the variance of the responses."""
     out = []
     if result.status == "max_iterations":
         out.append("stopped at the iteration limit: start closer or allow more iterations")
@@ -177,13 +176,8 @@ def warn(
         )
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}: widen it, or freeze the parameter")
-    if excess is not None and excess > MISFIT_EXPLAINED:
-        source = "taken from their scatter" if sandwich else "too small: use the sandwich"
-        out.append(
-            f"the mean square residual is {excess:.3g} times what the variance of the response "
-            f"explains: the model is incomplete or the variance too small; standard deviations "
-            f"are {source}"
-        )
+    source = "taken from the scatter of residuals" if sandwich else "too small: use the sandwich"
+    out.extend(f"{reason}; standard deviations are {source}" for reason in doubt.reasons())
     out.extend(advice(found.unidentified))
     if not found.unidentified and found.condition > POOR_CONDITION:
         out.append(

@@ -44,3 +44,16 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
 def with_freedom(dataset: xr.Dataset, freedom: NDArray[np.float64]) -> xr.Dataset:
     """Add complex degrees of freedom of ``variance``, shape (n_freq, n_out, n_in)."""
     return dataset.assign(degrees_of_freedom=(DIMS, freedom, {"units": "1"}))
+
+
+def median_freedom(dataset: xr.Dataset) -> float | None:
+    """Return the median over the lines of the complex degrees of freedom of ``variance``.
+
+    None where the Dataset does not tell: the variance then counts as known.
+    """
+    found = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))
+    if found is None:
+        return None
+    values = np.asarray(found, float)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else None

@@ -107,25 +107,7 @@ pub(super) fn check_pose(
             return Err(invalid(&field("reference"), &expected, "others"));
         }
     }
-    let (length, wanted) = match &pose.uncertainty {
-        Uncertainty::Unknown => (0, 0),
-        Uncertainty::Variance(v) => (v.len(), elements),
-        Uncertainty::Covariance(v) => (v.len(), elements * n_axes * n_axes),
-    };
-    if length != wanted {
-        return Err(invalid(
-            &field("variance"),
-            &format!("{wanted} numbers"),
-            length,
-        ));
-    }
-    let mut left_out = vec![false; elements];
-    if let Uncertainty::Variance(v) = &pose.uncertainty {
-        if let Some(bad) = v.iter().find(|v| v.is_nan() || **v <= 0.0) {
-            return Err(invalid(&field("variance"), "positive numbers", bad));
-        }
-        left_out = v.iter().map(|v| v.is_infinite()).collect();
-    }
+    let left_out = check_uncertainty(&pose.uncertainty, elements, n_axes, &field("variance"))?;
     let zero = pose
         .response
         .iter()
@@ -137,4 +119,36 @@ pub(super) fn check_pose(
         return Err(invalid(&field("response"), expected, 0));
     }
     Ok(())
+}
+
+/// Which elements the uncertainty leaves out.
+fn check_uncertainty(
+    uncertainty: &Uncertainty,
+    elements: usize,
+    n_axes: usize,
+    field: &str,
+) -> Result<Vec<bool>, FrequencyFitError> {
+    let sized = |length: usize, wanted: usize| {
+        let expected = format!("{wanted} numbers");
+        (length == wanted)
+            .then_some(())
+            .ok_or_else(|| invalid(field, &expected, length))
+    };
+    let (weighing, stated) = match uncertainty {
+        Uncertainty::Unknown => return Ok(vec![false; elements]),
+        Uncertainty::Covariance(v) => {
+            sized(v.len(), elements * n_axes * n_axes)?;
+            return Ok(vec![false; elements]);
+        }
+        Uncertainty::Variance(v) => (v, v),
+        Uncertainty::Pooled { stated, weighing } => (weighing, stated),
+    };
+    for v in [weighing, stated] {
+        sized(v.len(), elements)?;
+        if let Some(bad) = v.iter().find(|v| v.is_nan() || **v <= 0.0) {
+            return Err(invalid(field, "positive numbers", bad));
+        }
+    }
+    let left_out = |(w, v): (&f64, &f64)| w.is_infinite() || v.is_infinite();
+    Ok(weighing.iter().zip(stated).map(left_out).collect())
 }

@@ -21,6 +21,14 @@ pub enum Uncertainty {
     Unknown,
     /// `E|dG|^2` of every element, in the order of the response; infinite leaves it out.
     Variance(Vec<f64>),
+    /// The same, from so few realizations that each element is weighed by another variance, one
+    /// that does not depend on its own.
+    Pooled {
+        /// `E|dG|^2` as estimated, which the covariance of the parameters is taken from.
+        stated: Vec<f64>,
+        /// Variance to weigh by.
+        weighing: Vec<f64>,
+    },
     /// Covariance of the elements of a line, `(line, elements, elements)`, Hermitian.
     Covariance(Vec<C>),
 }
@@ -87,6 +95,13 @@ pub(super) fn whitening(
             let factors = v.iter().enumerate().map(factor).collect();
             Ok((Whitening::Elements(factors), Some(vec![1.0; v.len()])))
         }
+        Uncertainty::Pooled { stated, weighing } => {
+            let factor = |(k, v): (usize, &f64)| relative(k) * (2.0 / v).sqrt();
+            let factors = weighing.iter().enumerate().map(factor).collect();
+            let left = |(v, w): (&f64, &f64)| if w.is_finite() { v / w } else { 0.0 };
+            let left = stated.iter().zip(weighing).map(left).collect();
+            Ok((Whitening::Elements(factors), Some(left)))
+        }
         Uncertainty::Covariance(all) => {
             let n = pose.response.len() / pose.frequency_hz.len().max(1);
             let line = |line: usize| {
@@ -129,7 +144,7 @@ fn inverse_factor(matrix: DMatrix<C>) -> Option<DMatrix<C>> {
 fn diagonal(pose: &PoseResponse) -> Option<Vec<f64>> {
     match &pose.uncertainty {
         Uncertainty::Unknown => None,
-        Uncertainty::Variance(v) => Some(v.clone()),
+        Uncertainty::Variance(v) | Uncertainty::Pooled { stated: v, .. } => Some(v.clone()),
         Uncertainty::Covariance(all) => {
             let n = pose.response.len() / pose.frequency_hz.len().max(1);
             let entry = |k: usize| all[(k / n) * n * n + (k % n) * (n + 1)].re;

@@ -1,0 +1,111 @@
+"""Which lines of a response a rational fit uses, and how it weighs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.blackbox._data import Complex, Real
+from axisight.errors import InputError
+from axisight.frf.confidence import median_freedom
+from axisight.frf.pooled import (
+    ENOUGH_FREEDOM,
+    FEWEST_NEIGHBOURS,
+    neighbours_wanted,
+    pooled_variance,
+)
+from axisight.frf.response import DIMS
+
+Weighting = Literal["variance", "relative", "absolute"]
+
+
+@dataclass(frozen=True)
+class UsableLines:
+    """Lines that are numbers, (n_freq,) and (n_freq, n_out, n_in), and what their weights rest on.
+
+    ``variance`` is None unless it weighs; ``degrees_of_freedom`` complex, of the variance, None if
+    it is known. ``neighbours``: how many other lines say the weight of one, 0 for its own.
+    """
+
+    frequency_hz: Real
+    values: Complex
+    weighting: Weighting
+    variance: Real | None
+    degrees_of_freedom: float | None
+    neighbours: int
+
+    @property
+    def pooled(self) -> bool:
+        """Whether lines are weighed by their neighbours."""
+        return self.variance is not None and self.neighbours > 0
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether lines are weighed by their own variance of few degrees of freedom."""
+        freedom = self.degrees_of_freedom
+        own = self.variance is not None and not self.pooled
+        return own and freedom is not None and freedom < ENOUGH_FREEDOM
+
+    def weights(self, magnitude: Real) -> tuple[Real, Real]:
+        """Return weights and the variance of weighted residuals (real and imaginary part each).
+
+        ``magnitude`` of the response, as the best model at hand has it.
+        """
+        if self.variance is None:
+            weight = 1 / np.abs(self.values) if self.weighting == "relative" else 1.0
+            return np.broadcast_to(weight, self.values.shape), np.ones(self.values.shape)
+        weighing = self.variance
+        if self.pooled and self.degrees_of_freedom is not None:
+            weighing = pooled_variance(
+                magnitude, self.variance, self.degrees_of_freedom, self.neighbours
+            )
+        # Real and imaginary parts each carry half the variance.
+        return np.sqrt(2 / weighing), self.variance / weighing
+
+
+def usable_lines(response: xr.Dataset, weighting: str, neighbours: int | None) -> UsableLines:
+    """Return the lines of a response that are numbers; raises InputError if there are none."""
+    if weighting not in get_args(Weighting):
+        raise InputError(
+            f"weighting: expected 'variance', 'relative' or 'absolute', got {weighting!r}"
+        )
+    found = response.get("response") if isinstance(response, xr.Dataset) else None
+    if found is None or set(found.dims) != set(DIMS):
+        raise InputError(f"response: expected a Dataset with a variable response over {DIMS}")
+    g = np.asarray(found.transpose(*DIMS).values, np.complex128)
+    f = np.asarray(response["frequency_hz"].values, np.float64)
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(g).all(axis=(1, 2)))
+    lines = UsableLines(f, g, weighting, None, None, 0)  # type: ignore[arg-type]
+    if weighting == "variance":
+        variance = _variance(response)
+        good &= np.asarray(np.isfinite(variance).all(axis=(1, 2)) & (variance > 0).all(axis=(1, 2)))
+        if not good.any():
+            raise InputError(
+                "response: expected a positive variance at some line, got none; or choose "
+                "weighting='relative'"
+            )
+        freedom = median_freedom(response)
+        count = neighbours_wanted(freedom, int(good.sum())) if neighbours is None else neighbours
+        if count < FEWEST_NEIGHBOURS or freedom is None:
+            count = 0
+        elif count >= good.sum():
+            raise InputError(f"neighbours: expected fewer than {good.sum()} lines, got {count}")
+        lines = replace(
+            lines, variance=variance[good], degrees_of_freedom=freedom, neighbours=count
+        )
+    elif weighting == "relative":
+        good &= np.asarray((g != 0).all(axis=(1, 2)))
+    if not good.any():
+        raise InputError("response: expected a line with numbers, got NaN or zero at all of them")
+    return replace(lines, frequency_hz=f[good], values=g[good])
+
+
+def _variance(response: xr.Dataset) -> Real:
+    known = response.get("variance")
+    if known is None:
+        raise InputError("response: expected a variance; or choose weighting='relative'")
+    return np.asarray(known.transpose(*DIMS).values, np.float64)

@@ -1,0 +1,125 @@
+"""Whether the variance of the responses accounts for the residuals of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.frequency_fit.measured import MeasuredResponse
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+MISFIT_EXPLAINED = 1.1
+"""Residuals larger than the variance explains by this factor: the model is incomplete."""
+RELATED = 3.0
+"""Standard deviations; by chance 0.3 % of fits lie beyond."""
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What speaks against standard deviations from the variance of the responses.
+
+    ``excess``: mean square of the whitened residuals over what the variance explains, None if
+    unknown. ``related``: correlation of residuals at neighbouring lines, in standard deviations
+    of chance. ``own_weights``: fewest complex degrees of freedom of a variance that weighs its
+    own line, None where all are known or pooled.
+    """
+
+    excess: float | None
+    related: float
+    own_weights: float | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing does."""
+        return not self.reasons()
+
+    def reasons(self) -> list[str]:
+        """Return in words what does."""
+        out = []
+        if self.excess is not None and self.excess > MISFIT_EXPLAINED:
+            out.append(
+                f"the mean square residual is {self.excess:.3g} times what the variance of the "
+                "response explains: the model is incomplete or the variance too small"
+            )
+        if abs(self.related) > RELATED:
+            out.append(
+                "residuals of neighbouring lines resemble each other "
+                f"({self.related:.1f} standard deviations): the model is incomplete, or the noise "
+                "is correlated over the lines (drift, leakage, smoothing)"
+            )
+        if self.own_weights is not None:
+            out.append(
+                f"lines are weighed by their own variance of {self.own_weights:.3g} degrees of "
+                "freedom: use neighbours=None, more lines or more realizations"
+            )
+        return out
+
+
+def trust(
+    data: Sequence[MeasuredResponse],
+    weighing: Sequence[Real | None],
+    residual: Real,
+    misfit: float,
+    *,
+    weighted: bool,
+) -> Trust:
+    """Compare residuals with the variance of the responses.
+
+    ``weighing`` is what `MeasuredResponse.pooled` returned, ``residual`` (n, 2) the whitened
+    residuals of all responses, ``misfit`` their mean square, degrees of freedom counted.
+    """
+    known = all(one.variance is not None or one.covariance is not None for one in data)
+    uncertain = [
+        one.degrees_of_freedom
+        for one, weights in zip(data, weighing, strict=True)
+        if one.uncertain_weights and weights is None and one.degrees_of_freedom is not None
+    ]
+    values: Complex = residual[:, 0] + 1j * residual[:, 1]
+    return Trust(
+        excess=misfit / _explained(data, weighing) if weighted and known else None,
+        related=_related(data, values),
+        own_weights=min(uncertain) if weighted and uncertain else None,
+    )
+
+
+def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]) -> float:
+    """Mean square of whitened residuals that the variance explains.
+
+    Weighed by other lines, that is the mean ratio of both variances; weighed by the own one the
+    mean of an F distribution, nu / (nu - 1).
+    """
+    out, count = 0.0, 0
+    for one, weights in zip(data, weighing, strict=True):
+        n = one.response.size
+        ratio = 1.0
+        if weights is not None and one.variance is not None:
+            used = np.isfinite(weights)
+            n = int(used.sum())
+            ratio = float(np.mean(one.variance[used] / weights[used])) if n else 1.0
+        elif one.degrees_of_freedom is not None and one.degrees_of_freedom > 1:
+            ratio = one.degrees_of_freedom / (one.degrees_of_freedom - 1)
+        out, count = out + n * ratio, count + n
+    return out / max(count, 1)
+
+
+def _related(data: Sequence[MeasuredResponse], residual: Complex) -> float:
+    """Correlation of residuals one line apart, in standard deviations.
+
+    The products at every line, of all elements together, are their own yardstick, so elements
+    may be correlated with each other and lines unequal.
+    """
+    products, first = [], 0
+    for one in data:
+        n = one.response.size
+        part = residual[first : first + n].reshape(len(one.frequency_hz), -1)
+        part = part[np.argsort(one.frequency_hz)]
+        products.append(np.sum(part[1:] * part[:-1].conj(), axis=1).real)
+        first += n
+    all_products = np.concatenate(products)
+    size = float(np.sqrt(np.sum(all_products**2)))
+    return float(np.sum(all_products)) / size if size > 0 else 0.0
