@@ -195,9 +195,10 @@ def test_uncertainty_is_the_scatter_and_the_loss_a_chi_square() -> None:
 
 
 def of_three(g: np.ndarray, seed: int) -> xr.Dataset:
-    """Mean of three realizations and its sample variance."""
+    """Mean of three realizations and its sample variance; every other line has 9 times more."""
     rng = np.random.default_rng([3, seed])
-    parts = rng.normal(size=(2, 3, *g.shape)) * np.sqrt(1.5) * 0.02
+    jagged = np.where(np.arange(len(g)) % 2, 3.0, 1 / 3)[:, None, None]
+    parts = rng.normal(size=(2, 3, *g.shape)) * np.sqrt(1.5 * jagged) * 0.02
     error = (parts[0] + 1j * parts[1]) * np.abs(g)
     mean = error.mean(axis=0)
     variance = np.mean(np.abs(error - mean) ** 2, axis=0) / 2
@@ -207,8 +208,10 @@ def of_three(g: np.ndarray, seed: int) -> xr.Dataset:
 
 def test_three_realizations_make_honest_uncertainty() -> None:
     """As above, with variances of two degrees of freedom: weighed by their own, lines made the
-    distance 32 and the loss 1.9. 20 runs: 6 +- 3 sqrt(12 / 20) = 2.3; the loss, whose yardstick is
-    uncertain too, 1 +- 3 sqrt((2 + 1) / 1900 / 20) = 0.027."""
+    distance 32 and the loss 1.9. Neighbours resemble each other badly, which costs precision but
+    no honesty: with the pooled variance the distance were 10 and the loss 1.7. 20 runs: 6 +- 3
+    sqrt(12 / 20) = 2.3; the loss, half of whose terms count and whose yardstick is uncertain
+    too, 1 +- 3 sqrt(2 (2 + 1) / 1900 / 20) = 0.04."""
     g = continuous(LINES)
     truth = fit_rational(noisy(g, LINES, 1e-10), 6, integrators=2).modes()
     distances, losses, chances, discs = [], [], [], []
@@ -227,7 +230,7 @@ def test_three_realizations_make_honest_uncertainty() -> None:
         discs.append(np.mean(np.abs(found["response"].values - g) ** 2 / found["variance"].values))
         assert not model.warnings
     assert np.mean(distances) == pytest.approx(6.0, abs=2.3)
-    assert np.mean(losses) == pytest.approx(1.0, abs=0.027)
+    assert np.mean(losses) == pytest.approx(1.0, abs=0.04)
     assert np.mean(chances) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 20))
     assert np.mean(discs) == pytest.approx(1.0, abs=0.2)
     own = fit_rational(of_three(g, 0), 6, integrators=2, neighbours=0)

@@ -135,25 +135,21 @@ class RationalModel:
         )
 
     def _variance(self, x: Complex, columns: Complex) -> Real:
-        """Variance of every element: noise moves the poles, and residues with and without them.
+        """Variance of every element: of the residues at these poles, and of the poles.
 
-        With rows Q r of an element, its noise e and that of all, dp = W J^T e_all are the poles
-        and r^-1 Q^T (e - S dp) the residues, S the slopes by the poles.
+        Rows Q r of an element: noise e makes residues r^-1 Q^T e, poles dp make them follow by
+        -r^-1 Q^T S dp with the slopes S. Both are hardly correlated, dp is orthogonal to Q.
         """
         solved = self.problem.residues(self.sections)
         slopes = _slopes(self.problem, self.sections, solved)
-        jacobian = _projected(slopes, solved)
-        inverse, _ = _normal_inverse(jacobian.reshape(-1, self.order))
         spread = self.noise_scale**2 * self.problem.row_spread
-        out = np.empty((*columns.shape[:1], len(self.numerators)))
+        out = np.empty((len(x), len(self.numerators)))
         for e, theta in enumerate(self.numerators):
-            q, own = solved.q[e], spread[e][:, None]
+            q = solved.q[e]
             direct = columns @ np.linalg.pinv(solved.r[e])
             total = self.sections.slopes(x, theta[: self.order]) - direct @ (q.T @ slopes[e])
-            together = (q.T @ (own * jacobian[e])) @ inverse
-            out[:, e] = _quadratic(direct, q.T @ (own * q), direct)
-            out[:, e] += _quadratic(total, self.pole_covariance, total)
-            out[:, e] += 2 * _quadratic(direct, together, total)
+            out[:, e] = _quadratic(direct, q.T @ (spread[e][:, None] * q))
+            out[:, e] += _quadratic(total, self.pole_covariance)
         return out
 
     @property
@@ -393,11 +389,8 @@ def projected_jacobian(problem: Weighted, sections: Sections, solved: Solved) ->
     Its normal matrix at the optimum is the Fisher information of the poles, residues free.
     """
     slopes = _slopes(problem, sections, solved)
-    return _projected(slopes, solved).reshape(-1, sections.order)
-
-
-def _projected(slopes: Real, solved: Solved) -> Real:
-    return np.asarray(slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes))
+    left = slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes)
+    return np.asarray(left.reshape(-1, sections.order))
 
 
 def _slopes(problem: Weighted, sections: Sections, solved: Solved) -> Real:
@@ -484,27 +477,19 @@ def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Re
     if sections.order == 0:
         return np.zeros((0, 0)), []
     jacobian = projected_jacobian(problem, sections, problem.residues(sections))
-    inverse, known = _normal_inverse(jacobian)
-    if not known:
-        text = "the lines do not determine all poles: lower the order; standard errors are NaN"
-        return inverse, [text]
-    scores = jacobian.T @ (scale * problem.row_spread.reshape(-1, 1) * jacobian)
-    return inverse @ scores @ inverse, []
-
-
-def _normal_inverse(jacobian: Real) -> tuple[Real, bool]:
-    """Return (J^T J)^-1 and whether there is one; NaN otherwise."""
     size = np.linalg.norm(jacobian, axis=0)
     _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-    if size.min(initial=1.0) == 0 or (s.size and s[-1] <= 1e-10 * s[0]):
-        return np.full((jacobian.shape[1],) * 2, np.nan), False
+    if size.min() == 0 or s[-1] <= 1e-10 * s[0]:
+        text = "the lines do not determine all poles: lower the order; standard errors are NaN"
+        return np.full((sections.order,) * 2, np.nan), [text]
     root = vt.T / s / size[:, None]
-    return root @ root.T, True
+    scores = jacobian.T @ (scale * problem.row_spread.reshape(-1, 1) * jacobian)
+    return root @ (root.T @ scores @ root) @ root.T, []
 
 
-def _quadratic(left: Complex, matrix: Real, right: Complex) -> Real:
-    """Real part of left M right^H, row by row."""
-    return np.asarray(np.sum((left @ matrix) * right.conj(), axis=1).real)
+def _quadratic(rows: Complex, matrix: Real) -> Real:
+    """Return a M a^H of every row a."""
+    return np.asarray(np.sum((rows @ matrix) * rows.conj(), axis=1).real)
 
 
 def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: object) -> xr.Dataset:
