@@ -17,8 +17,11 @@ Real = NDArray[np.float64]
 
 ENOUGH_FREEDOM = 30.0
 """Complex degrees of freedom that weights should rest on: they then cost 1/30 of variance."""
-IMPROBABLE = 1e-3
-"""A line so far above its neighbours, by chance, keeps its own variance: it may be disturbed."""
+IMPROBABLE = 1e-6
+"""A line so far above its neighbours, by chance, keeps its own variance: it is disturbed.
+
+Rarer than what counts as chance elsewhere: where neighbours resemble each other badly, choosing
+by the own variance would leave the smaller ones, and too small standard errors."""
 FEWEST_NEIGHBOURS = 4
 """A straight line needs that many."""
 LARGEST_SHARE = 3
@@ -56,7 +59,7 @@ def pooled_variance(
     A straight line goes through the logarithms of the neighbours' variances, relative to the
     magnitude where that makes them smoother. The logarithm of a sample variance is low by
     ln nu - psi(nu), which is put right. A line above its neighbours by more than
-    F(0.999; 2 nu, 2 x 30) keeps its own variance.
+    the 1 - 1e-6 quantile of F(2 nu, 2 x 30) keeps its own variance.
     """
     shape = variance.shape
     own = variance.reshape(shape[0], -1)
