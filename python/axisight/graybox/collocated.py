@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.special import digamma
 
 from axisight.errors import InputError
+from axisight.frf.confidence import median_freedom
+from axisight.frf.pooled import FEWEST_NEIGHBOURS, neighbours_wanted, pooled_variance
 from axisight.frf.quantity import quantity_of
 from axisight.frf.response import Flag
 
@@ -18,8 +19,6 @@ Complex = NDArray[np.complex128]
 
 _DERIVATIVES_MISSING = {"position": 2, "velocity": 1, "acceleration": 0}
 _FEWEST_LINES = 8
-# Degrees of freedom that make a variance a weight: its standard deviation is then a third.
-_ENOUGH_FREEDOM = 10.0
 # Relative error of a response up to which simple models are not told from it.
 _MODEL_FLOOR = 0.05
 _DECIDED = 1e-8
@@ -36,14 +35,13 @@ class Collocated:
     variance
         E|dG|^2 of it, (n,); NaN where unknown.
     degrees_of_freedom
-        Complex, of the variance, (n,); infinite where it is known exactly, as it is taken to be
-        by default.
+        Complex, of the variance; None if it is known exactly.
     """
 
     frequency_hz: Real
     acceleration: Complex
     variance: Real
-    degrees_of_freedom: Real | None = None
+    degrees_of_freedom: float | None = None
 
     @property
     def angular_rad_s(self) -> Real:
@@ -57,27 +55,24 @@ class Collocated:
 
     def lines(self, kept: NDArray[np.bool_]) -> Collocated:
         """Return the lines that ``kept`` (n,) says."""
-        freedom = self.degrees_of_freedom
         return Collocated(
             self.frequency_hz[kept],
             self.acceleration[kept],
             self.variance[kept],
-            None if freedom is None else freedom[kept],
+            self.degrees_of_freedom,
         )
 
     def noise(self, modelled: Complex | Real) -> Real:
         """Return the variance relative to the squared ``modelled`` response (n,), zero if unknown.
 
-        A variance from few periods scatters so much that chance would choose the lines: below
-        ten degrees of freedom its geometric mean with those of neighbouring lines is taken,
-        relative to the model, and corrected for the bias of the logarithm.
+        A variance from few periods scatters so much that chance would choose the lines: that of
+        neighbouring lines is taken (`pooled_variance`).
         """
-        known = np.isfinite(self.variance)
-        noise = np.zeros(len(known))
-        noise[known] = self.variance[known] / np.abs(modelled[known]) ** 2
-        if self.degrees_of_freedom is not None:
-            noise[known] = _smooth(noise[known], self.degrees_of_freedom[known])
-        return noise
+        variance, freedom = self.variance, self.degrees_of_freedom
+        count = neighbours_wanted(freedom, len(variance))
+        if freedom is not None and count >= FEWEST_NEIGHBOURS:
+            variance = pooled_variance(np.abs(modelled), variance, freedom, count)
+        return np.where(np.isfinite(variance), variance, 0.0) / np.abs(modelled) ** 2
 
     def weight(self, modelled: Complex | Real) -> Real:
         """Return what relative errors of each line are worth, (n,).
@@ -139,35 +134,7 @@ def collocated(
         raise InputError(
             f"response: expected at least {_FEWEST_LINES} lines that can be used, got {kept.sum()}"
         )
-    freedom = _freedom(one, len(frequency))
-    return Collocated(
-        frequency[kept], value[kept], variance[kept], None if freedom is None else freedom[kept]
-    )
-
-
-def _freedom(one: xr.Dataset, n: int) -> Real | None:
-    """Degrees of freedom of the variance of each line, infinite where nothing is said."""
-    given = one.get("degrees_of_freedom", one.attrs.get("degrees_of_freedom"))
-    if given is None:
-        return None
-    freedom = np.array(np.broadcast_to(np.asarray(given, np.float64), n))
-    freedom[~(freedom > 0)] = np.inf
-    return freedom
-
-
-def _smooth(variance: Real, freedom: Real) -> Real:
-    """Means over as many neighbours as make up ten degrees of freedom, of the logarithm."""
-    few = freedom < _ENOUGH_FREEDOM
-    if not few.any():
-        return variance
-    half = int(np.ceil((_ENOUGH_FREEDOM / np.median(freedom[few]) - 1) / 2))
-    level = np.log(np.maximum(variance, np.finfo(np.float64).tiny))
-    # E log of a chi-square over its mean, 2 nu degrees of freedom.
-    level[few] -= digamma(freedom[few]) - np.log(freedom[few])
-    window = np.ones(2 * half + 1)
-    inside = np.convolve(np.pad(np.ones(len(level)), half), window, "valid")
-    mean = np.convolve(np.pad(level, half), window, "valid") / inside
-    return np.where(few, np.exp(mean), variance)
+    return Collocated(frequency[kept], value[kept], variance[kept], median_freedom(one))
 
 
 def standard_errors(slope: Real, residual: Real, noise: Real) -> Real:
