@@ -72,8 +72,8 @@ class Collocated:
         count = neighbours_wanted(freedom, len(variance))
         if freedom is not None and count >= FEWEST_NEIGHBOURS:
             variance = pooled_variance(np.abs(modelled), variance, freedom, count)
-        known: Real = np.where(np.isfinite(variance), variance, 0.0)
-        return known / np.abs(modelled) ** 2
+        known = np.where(np.isfinite(variance), variance, 0.0)
+        return np.asarray(known / np.abs(modelled) ** 2)
 
     def weight(self, modelled: Complex | Real) -> Real:
         """Return what relative errors of each line are worth, (n,).
