@@ -75,6 +75,7 @@ class Task:
     free: frozenset[str]
     bounds: Mapping[str, tuple[float, float]]
     settings: FitSettings
+    start: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def free_names(self) -> tuple[str, ...]:
@@ -117,7 +118,9 @@ def first_point(task: Task, values: Mapping[str, float]) -> Point:
         begin = [0.0] * (2 * task.model.n_masses)
         begin[0] = record.start_angle_rad()
         if task.model.initial == "free" and task.model.output != "position":
-            speed = float(record.measured(task.model)[0])
+            # The first backward difference is none.
+            first = int(task.model.output == "velocity_difference")
+            speed = float(record.measured(task.model)[first])
             joint = [values["r"] * speed] * (task.model.n_masses - 1)
             begin[task.model.n_masses :] = [speed, *joint]
         theta += begin

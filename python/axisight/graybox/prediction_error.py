@@ -10,7 +10,7 @@ import numpy as np
 
 from axisight import _core
 from axisight.errors import InputError
-from axisight.graybox.axis_checks import check_data, check_energy, data_warnings
+from axisight.graybox.axis_checks import check_data, check_energy, check_start, data_warnings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
 from axisight.graybox.axis_search import (
@@ -75,7 +75,8 @@ def fit_axis(
 
     Raises InputError for misuse: missing or unknown names, a start outside its bounds, nothing
     left to fit, data of the wrong kind, records in which the axis gives more energy than it
-    got (a sign is wrong), and a start from which the simulation diverges. A search that does
+    got (a sign is wrong) or that begin in motion although the model starts at rest, and a start
+    from which the simulation diverges. A search that does
     not converge is told in ``status`` and ``warnings``.
 
     """
@@ -143,7 +144,8 @@ def prepare(
     if not free:
         raise InputError("fixed: expected at least one parameter left to fit, got all fixed")
     check_energy(model, data)
-    return Task(model, data, model.parameters, free, limits, settings), values
+    check_start(model, data, values)
+    return Task(model, data, model.parameters, free, limits, settings, values), values
 
 
 def _interval(name: str, pair: tuple[float, float]) -> tuple[float, float]:
