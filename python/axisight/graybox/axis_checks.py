@@ -84,7 +84,7 @@ def check_start(
                 f"{label(i, record)}: expected a start at rest, as initial='rest' says, got {text}"
             )
         if all(_beyond(speed, error, size, SAID)):
-            out.append(f"{label(i, record)} seems to start in motion: {text}")
+            out.append(f"{label(i, record)} seems to start in motion, unless its noise is slow: {text}")
     return tuple(out)
 
 

@@ -14,6 +14,12 @@ from scipy import stats
 from axisight import _core
 from axisight.blackbox import fit_percent
 from axisight.errors import InputError
+from axisight.graybox.axis_findings import (
+    covariance_findings,
+    fit_findings,
+    noise_weights,
+    weight_findings,
+)
 from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
 from axisight.graybox.axis_search import Point, Task, free_run
 
@@ -26,6 +32,8 @@ STATUS_ADVICE = {
     "max_iterations": "stopped at the iteration limit: allow more iterations or start closer",
     "stalled": "no step lowers the loss although its slope promises one: the model is not smooth "
     "here; try more substeps, a friction smoothing, or another start",
+    "noise_rounds": "parameters and noise filter did not agree within FitSettings.ar_rounds: allow "
+    "more rounds or fix the order (ar_order). The values are those of the last round",
 }
 
 
@@ -49,10 +57,14 @@ class AxisFit:
     ``parameters`` holds all values, fixed ones too. The arrays run over ``free``, the names of
     the fitted ones; ``covariance`` is that for white errors, ``sandwich`` the one from the
     scatter of blocks of data, which stays valid where errors are correlated or the model is
-    incomplete. ``status`` is ``loss_converged``, ``step_converged``, ``exact`` (residuals are
-    rounding errors), ``max_iterations`` or ``stalled``. ``warnings`` say in words what to mind.
+    incomplete. ``trusted`` names the one that `standard_error`, `interval` and `summary` take:
+    ``"sandwich"`` where the residuals contradict white errors of one variance and there are
+    blocks enough (``blocks`` of them), else ``"white"``. ``status`` is ``loss_converged``, ``step_converged``, ``exact`` (residuals are
+    rounding errors), ``max_iterations``, ``stalled``, or ``noise_rounds`` (parameters and noise
+    filter did not agree). ``warnings`` say in words what to mind.
     ``residuals`` are the prediction errors by record, model minus measurement, whitened by the
-    noise model and not weighted; ``error_std`` is their standard deviation. ``starts`` are the
+    noise model and not weighted; ``error_std`` is their standard deviation, with weights that of
+    the weighted ones. ``weights`` are those of the records, given or estimated. ``starts`` are the
     states (`AxisModel.state_names`) at the first sample of every record.
     """
 
@@ -77,28 +89,53 @@ class AxisFit:
     fit_percent: tuple[float, ...]
     starts: Array
     noise: NoiseModel
+    trusted: Literal["white", "sandwich"] = "white"
+    blocks: int = 0
+    weights: tuple[float, ...] = ()
 
     @property
     def converged(self) -> bool:
         """Whether the search ended by itself."""
         return self.status in ("loss_converged", "step_converged", "exact")
 
+    @property
+    def standard_error(self) -> Array:
+        """Standard errors of the free parameters from the covariance that is ``trusted``."""
+        return np.asarray(np.sqrt(np.diag(self._covariance(self.trusted))))
+
+    def _covariance(self, kind: str) -> Array:
+        return self.covariance if kind == "white" else self.sandwich
+
+    def noise_weights(self) -> tuple[float, ...]:
+        """Return one over the variance of the residuals of each record, the first record's one.
+
+        Weights for `AxisData` where sensor noise differs between records.
+        """
+        return noise_weights(self.residuals)
+
     def interval(
-        self, name: str, level: float = 0.95, kind: Literal["white", "sandwich"] = "white"
+        self,
+        name: str,
+        level: float = 0.95,
+        kind: Literal["trusted", "white", "sandwich"] = "trusted",
     ) -> tuple[float, float]:
         """Return the confidence interval of a free parameter.
 
-        ``"white"`` trusts that the prediction errors are white, ``"sandwich"`` does not.
+        ``"white"`` trusts that the prediction errors are white and of one variance,
+        ``"sandwich"`` does not; ``"trusted"`` is the one of them that ``trusted`` names. The
+        sandwich of few blocks is itself uncertain: its quantiles are those of Student.
         """
         if name not in self.free:
             raise InputError(f"name: expected one of {', '.join(self.free)}, got {name!r}")
         if not 0 < level < 1:
             raise InputError(f"level: expected a number between 0 and 1, got {level}")
-        if kind not in ("white", "sandwich"):
-            raise InputError(f"kind: expected white or sandwich, got {kind!r}")
-        matrix = self.covariance if kind == "white" else self.sandwich
+        if kind not in ("trusted", "white", "sandwich"):
+            raise InputError(f"kind: expected trusted, white or sandwich, got {kind!r}")
+        chosen = self.trusted if kind == "trusted" else kind
+        freedom = np.inf if chosen == "white" else max(self.blocks - len(self.free), 1)
         i = self.free.index(name)
-        half = float(stats.norm.ppf(0.5 + level / 2) * np.sqrt(matrix[i, i]))
+        variance = self._covariance(chosen)[i, i]
+        half = float(stats.t.ppf(0.5 + level / 2, freedom) * np.sqrt(variance))
         return float(self.values[i]) - half, float(self.values[i]) + half
 
     def simulate(self, data: AxisData) -> Array:
@@ -141,17 +178,18 @@ class AxisFit:
                 "loss": self.loss,
                 "condition": self.condition,
                 "noise_model": self.noise.kind,
+                "trusted": self.trusted,
                 "error_std": self.error_std,
                 "error_unit": OUTPUT_UNIT[self.model.output],
             },
         )
 
     def summary(self) -> str:
-        """Return a table of values and standard deviations, status and warnings."""
+        """Return a table of values and standard errors, status and warnings."""
         unit = {p.name: p.unit for p in self.model.parameters}
         rows = [
             f"{n:>8} {v:12.5g} ± {s:8.2g} {unit[n]}"
-            for n, v, s in zip(self.free, self.values, self.std, strict=True)
+            for n, v, s in zip(self.free, self.values, self.standard_error, strict=True)
         ]
         fits = ", ".join(f"{f:.2f} %" for f in self.fit_percent)
         return "\n".join([*rows, f"fit {fits}", f"status {self.status}", *self.warnings])
@@ -181,12 +219,24 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     first = len(model.vector({}))
     starts = np.array(point.theta[first:]).reshape(len(lengths), 2 * model.n_masses)
     texts = [*warnings, *_warnings(point.status, bounded, condition, names, inverse)]
+    residuals = tuple(p / r for p, r in zip(parts, roots, strict=True))
     simulated = not (point.gains or point.whitening)
     fits = []
     for i, (d, part, root) in enumerate(zip(task.data, parts, roots, strict=True)):
         measured = d.measured(model)
         run = measured + part / root if simulated else free_run(task, point, i)
         fits.append(float(fit_percent(measured, run)[0]))
+    texts += fit_findings(task, parameters, fits)
+    blocks = len(point.block_gradients)
+    trusted: Literal["white", "sandwich"] = "white"
+    if point.status != "exact":
+        unequal = weight_findings(task, residuals)
+        words, coloured = covariance_findings(
+            task, names, covariance[:n, :n], sandwich[:n, :n], blocks, residuals
+        )
+        texts += [*unequal, *words]
+        if coloured or (unequal and np.isfinite(sandwich).all()):
+            trusted = "sandwich"
     return AxisFit(
         model=model,
         parameters=parameters,
@@ -205,10 +255,13 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         iterations=point.iterations,
         evaluations=point.evaluations,
         error_std=float(np.sqrt(variance)),
-        residuals=tuple(p / r for p, r in zip(parts, roots, strict=True)),
+        residuals=residuals,
         fit_percent=tuple(fits),
         starts=starts,
         noise=noise,
+        trusted=trusted,
+        blocks=blocks,
+        weights=tuple(d.weight for d in task.data),
     )
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 
 from axisight import _core
 from axisight.errors import InputError
-from axisight.graybox.axis_checks import data_warnings
+from axisight.graybox.axis_checks import check_start, data_warnings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
 from axisight.graybox.axis_search import FitSettings, Point, Task, first_point, search_rounds
@@ -114,7 +114,10 @@ def multistart_axis(
             "start: expected at least one start that can be simulated, got none: the motion "
             "diverges from all of them"
         )
-    warnings = data_warnings(model, task.data, task.free_names)
+    warnings = (
+        *data_warnings(model, task.data, task.free_names),
+        *check_start(model, task.data, values),
+    )
     return AxisMultistart(
         conclude(task, best, NoiseModel("output_error"), warnings), _table(task, starts, ends)
     )

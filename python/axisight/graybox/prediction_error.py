@@ -12,13 +12,14 @@ from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox.axis_checks import check_data, check_energy, check_start, data_warnings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
-from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
+from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude, inverse_normal
 from axisight.graybox.axis_search import (
     FitSettings,
     Point,
     Task,
     disagreement,
     first_point,
+    free_places,
     free_run,
     rigid_gains,
     search,
@@ -30,6 +31,11 @@ NoiseKind = Literal["output_error", "innovations", "ar"]
 
 # Where the search for the innovations gains starts.
 FIRST_GAIN = 0.02
+# Standard errors by which parameters may still move when the noise filter is estimated again.
+AGREED = 0.05
+# Refits with weights from the residuals, and the relative change at which these stay.
+WEIGHT_ROUNDS = 10
+SAME_WEIGHT = 0.01
 
 
 def fit_axis(
@@ -41,6 +47,7 @@ def fit_axis(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     free_gear_ratio: bool = False,
     noise_model: NoiseKind = "output_error",
+    weights: Literal["given", "residuals"] = "given",
     settings: FitSettings | None = None,
 ) -> AxisFit:
     """Fit the parameters of an axis to records, all at once, by their prediction errors.
@@ -67,6 +74,9 @@ def fit_axis(
         with the parameters, so that low-frequency torque errors are followed, not explained.
         ``"ar"``: the residuals of the output error are whitened by an autoregressive filter,
         H = 1/A(q), estimated from them, and the fit is repeated until both agree.
+    weights : ``"given"`` takes those of the records. ``"residuals"`` estimates them, one over the
+        variance of each record's residuals, and refits until they no longer change: right where
+        noise differs between records, wrong where one of them shows an effect the model lacks.
     settings : tolerances and the like.
 
     Returns
@@ -93,15 +103,20 @@ def fit_axis(
         raise InputError(
             f"noise_model: expected output_error, innovations or ar, got {noise_model!r}"
         )
+    if weights not in ("given", "residuals"):
+        raise InputError(f"weights: expected given or residuals, got {weights!r}")
     token = _core.CancelToken()
     point = first_point(task, values)
     point = search_rounds(task, point, values["r"], token)
-    warnings = (*data_warnings(model, task.data, task.free_names), *disagreement(task, point))
-    if noise_model == "innovations":
-        gains = rigid_gains(model, values["r"], FIRST_GAIN)
-        point = search(task, replace(point, gains=gains, predicts=True, free_gains=True), token)
-    elif noise_model == "ar":
-        point = _whitened(task, point, token)
+    warnings = (
+        *data_warnings(model, task.data, task.free_names),
+        *check_start(model, task.data, values),
+        *disagreement(task, point),
+    )
+    point = _with_noise(task, point, noise_model, token)
+    if weights == "residuals":
+        task, point, said = _reweighted(task, point, noise_model, token)
+        warnings += said
     noise = NoiseModel(
         noise_model,
         gains=point.gains,
@@ -158,16 +173,57 @@ def _interval(name: str, pair: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
+def _with_noise(task: Task, point: Point, kind: NoiseKind, token: _core.CancelToken) -> Point:
+    """Refit with the noise model, from the end of an output-error fit."""
+    if kind == "innovations":
+        gains = point.gains or rigid_gains(task.model, task.start["r"], FIRST_GAIN)
+        return search(task, replace(point, gains=gains, predicts=True, free_gains=True), token)
+    return _whitened(task, point, token) if kind == "ar" else point
+
+
+def _reweighted(
+    task: Task, point: Point, kind: NoiseKind, token: _core.CancelToken
+) -> tuple[Task, Point, tuple[str, ...]]:
+    """Refit with weights one over the variance of the residuals until they stay."""
+    lengths = np.cumsum([len(d) for d in task.data])[:-1]
+    for _ in range(WEIGHT_ROUNDS):
+        old = np.array([d.weight for d in task.data])
+        power = [np.mean(e**2) for e in np.split(point.errors, lengths)] / old
+        if np.min(power) <= 0:
+            return task, point, ("a record without residuals has no weight: weights as given",)
+        new = power[0] / power
+        if np.all(np.abs(new / (old / old[0]) - 1) < SAME_WEIGHT):
+            return task, point, ()
+        records = zip(task.data, new.tolist(), strict=True)
+        task = replace(task, data=tuple(replace(d, weight=w) for d, w in records))
+        point = search(task, replace(point, whitening=()), token) if kind == "ar" else point
+        point = search(task, point, token) if kind == "output_error" else point
+        point = _with_noise(task, point, kind, token)
+    return task, point, (f"weights still change after {WEIGHT_ROUNDS} rounds: give them instead",)
+
+
 def _whitened(task: Task, point: Point, token: _core.CancelToken) -> Point:
-    """Refit with the residuals whitened until the filter no longer changes."""
+    """Refit with the residuals whitened until neither parameters nor filter change.
+
+    What did not agree after all rounds has the status ``noise_rounds``.
+    """
+    places = free_places(task, point)
     for _ in range(task.settings.ar_rounds):
         parts = [
             np.sqrt(d.weight) * (free_run(task, point, i) - d.measured(task.model))
             for i, d in enumerate(task.data)
         ]
         found = estimate_filter(parts, task.settings.ar_order, task.settings.most_ar_order)
-        before = point.loss
-        point = search(task, replace(point, whitening=tuple(found.tolist())), token)
-        if point.whitening and abs(before - point.loss) <= 1e-4 * before:
-            break
-    return point
+        whitening = tuple(found.tolist())
+        before = np.array(point.theta)[places]
+        same_order = len(whitening) == len(point.whitening)
+        if not (whitening or point.whitening):
+            return point  # white already
+        point = search(task, replace(point, whitening=whitening), token)
+        inverse, _ = inverse_normal(point.matrix)
+        variance = float(point.errors @ point.errors) / max(point.errors.size - len(places), 1)
+        moved = np.abs(np.array(point.theta)[places] - before)
+        if same_order and np.all(moved <= AGREED * np.sqrt(variance * np.diag(inverse))):
+            return point
+    ended = point.status in ("loss_converged", "step_converged", "exact")
+    return replace(point, status="noise_rounds") if ended else point

@@ -1,0 +1,233 @@
+"""What the residuals of an axis fit say against it, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, stats
+
+from axisight.graybox.axis_checks import label, motion, noise_std
+from axisight.graybox.axis_model import AxisData, AxisModel
+from axisight.graybox.axis_search import Task
+
+Array = NDArray[np.float64]
+
+# Fit (3.54) [%] below which the residuals have more than a quarter of the power of the motion.
+LOW_FIT = 50.0
+# Total inertias of start and end further apart than this are no matter of a poor start.
+FAR = 5.0
+# Factors by which a motion is off when its unit is not rad and rad/s.
+UNITS = {
+    180 / np.pi: "degrees instead of radians",
+    30 / np.pi: "revolutions per minute instead of rad/s",
+    1 / (2 * np.pi): "revolutions instead of radians",
+}
+# A start knows the inertia this well, or says nothing about units.
+NEAR = 1.6
+# Standard errors of the two kinds further apart than this are told.
+DISAGREE = 2.0
+# Variances of records further apart than this cost more than 6 % of the standard errors.
+UNEQUAL = 2.0
+# Probability of a word by chance.
+CHANCE = 1e-3
+_LAG_S = 0.25
+
+
+def total_inertia(model: AxisModel, values: Mapping[str, float]) -> float:
+    """Inertia of all masses on the motor side [kg m^2]."""
+    arms = sum(v for n, v in values.items() if n.startswith("J_a"))
+    return values["J_m"] + values["r"] ** 2 * arms
+
+
+def rigid_inertia(
+    model: AxisModel, data: Sequence[AxisData], values: Mapping[str, float]
+) -> float | None:
+    """Return the inertia by which the torque explains the motion of a rigid axis, if it does.
+
+    Momentum over windows of one period of the first resonance of ``values``: J times the change
+    of speed, friction times the way and the time of either direction, against the impulse.
+    """
+    motor, arm = values["J_m"], values["r"] ** 2 * values["J_a"]
+    resonance = values["r"] * np.sqrt(values["k1"] * (1 / motor + 1 / arm))
+    blocks, sides = [], []
+    for record in data:
+        step, speed = record.sample_time_s, motion(model, record)
+        window = int(np.clip(round(2 * np.pi / resonance / step), 1, max(len(record) // 16, 1)))
+        sums = np.array([speed, np.sign(speed), np.asarray(record.torque_nm)])[:, :-1]
+        at = np.arange(0, len(record) - 1, window)[:-1]
+        ways = np.add.reduceat(sums[:, : at[-1] + window], at, axis=1) * step
+        blocks.append(np.stack([speed[at + window] - speed[at], ways[0], ways[1]], axis=1))
+        sides.append(ways[2])
+    columns, impulse = np.concatenate(blocks), np.concatenate(sides)
+    size = np.linalg.norm(columns, axis=0)
+    if not size.all():
+        return None
+    found, *_ = np.linalg.lstsq(columns / size, impulse, rcond=None)
+    rest = impulse - columns / size @ found
+    # Nine tenths of the impulses explained: beyond doubt, whatever correlates them.
+    explained = float(rest @ rest) < 0.1 * float(impulse @ impulse)
+    return float(found[0] / size[0]) if explained and found[0] > 0 else None
+
+
+def scale_words(task: Task, inertia: float | None, reason: str) -> str:
+    """Return what a common factor of the motion of all records may be; empty if there is none."""
+    if inertia is None:
+        return ""
+    begin = total_inertia(task.model, task.start)
+    factor = begin / inertia
+    if 1 / FAR < factor < FAR:
+        return ""
+    ratio = task.start["r"]
+    named = {**UNITS, ratio: "the joint's side of the gear instead of the motor's"}
+    named |= {180 / np.pi * ratio: "degrees on the joint's side of the gear"}
+    likely = [
+        f"{text} (factor {value:.4g})"
+        for value, text in named.items()
+        if ratio != 1 or value in UNITS
+        if 1 / NEAR < factor / value < NEAR
+    ]
+    return (
+        f"{reason}: total inertia {inertia:.3g} kg m^2 on the motor's side, the start says "
+        f"{begin:.3g}. As if the motion were measured {factor:.3g} times as large as it is"
+        + (f", which would be {' or '.join(likely)}" if likely else "")
+        + ". Look at the units and the side of the gear of motion and torque, or at the start"
+    )
+
+
+def fit_findings(
+    task: Task,
+    parameters: Mapping[str, float],
+    fits: Sequence[float],
+) -> list[str]:
+    """Return words about records that the simulation does not fit, and about factors of motion."""
+    low = []
+    for i, (record, fit) in enumerate(zip(task.data, fits, strict=True)):
+        measured = record.measured(task.model)
+        rest = (1 - fit / 100) * float(np.std(measured))
+        # Noise of this size may hide a model that is right.
+        if fit < LOW_FIT and rest > 2 * noise_std(measured):
+            low.append(f"{label(i, record)} {fit:.1f} %")
+    if not low:
+        found = total_inertia(task.model, parameters)
+        words = scale_words(task, found, "the inertia is far from that of the start")
+        return [words] if words else []
+    out = [
+        f"the simulation does not fit: {', '.join(low)} (3.54), {LOW_FIT:g} % is half of the "
+        "motion left over, below 0 a constant would do better. The values mean nothing before "
+        "the reason is found. Look at the units (rad, rad/s, Nm), the side of the gear (motor), "
+        "signs, the state at the start (initial='free'), the start of the search "
+        "(multistart_axis), and effects that the model lacks"
+    ]
+    inertia = rigid_inertia(task.model, task.data, task.start)
+    return [*out, *filter(None, [scale_words(task, inertia, "as a rigid body the axis differs")])]
+
+
+def _autocovariance(parts: Sequence[Array], lags: int) -> Array:
+    """Mean autocovariance of all parts about zero, normalized to one at lag zero."""
+    total = np.zeros(lags + 1)
+    for x in parts:
+        full = signal.correlate(x, x, method="fft")[len(x) - 1 :]
+        total[: min(lags + 1, len(x))] += full[: lags + 1]
+    return np.asarray(total / total[0] if total[0] > 0 else total)
+
+
+def _lags(record: AxisData) -> int:
+    """Lags up to a quarter of a second, at most a fiftieth of the record, so that sums are known."""
+    return max(1, min(round(_LAG_S / record.sample_time_s), len(record) // 50))
+
+
+def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
+    """Return the power of the residuals at low frequency over that of white ones.
+
+    1 + 2 sum (1 - k / L) rho(k): what it is for errors that slow derivatives average.
+    """
+    lags = min(_lags(d) for d in data)
+    rho = _autocovariance(residuals, lags)
+    weights = 1 - np.arange(1, lags + 1) / (lags + 1)
+    return float(1 + 2 * weights @ rho[1:])
+
+
+def covariance_findings(
+    task: Task,
+    names: Sequence[str],
+    covariance: Array,
+    sandwich: Array,
+    blocks: int,
+    residuals: Sequence[Array],
+) -> tuple[list[str], bool]:
+    """Return words where errors are not white, and whether to trust the sandwich instead."""
+    n = len(names)
+    differenced = ""
+    if task.model.output == "velocity_difference":
+        first = _autocovariance(residuals, 1)[1]
+        if first < -1 / 3:
+            differenced = (
+                ". They look like differences of position noise (correlation "
+                f"{first:.2f} from sample to sample, -0.5 if nothing else): fit "
+                "AxisModel(output='position'), whose errors are then white, and narrower"
+            )
+    if np.isfinite(sandwich).all():
+        size = np.diag(covariance)
+        seen = np.isfinite(size) & (size > 0)
+        ratio = np.where(seen, np.sqrt(np.diag(sandwich) / np.where(seen, size, 1.0)), 1.0)
+        # Scatter of so many blocks, were the errors white.
+        freedom = max(blocks - n, 1)
+        chance = stats.chi2.ppf([CHANCE / 2 / n, 1 - CHANCE / 2 / n], freedom) / freedom
+        low, high = np.sqrt(chance)
+        off = (ratio > max(high, DISAGREE)) | (ratio < min(low, 1 / DISAGREE))
+        if not off.any():
+            return [], False
+        worst = int(np.argmax(np.where(off, np.abs(np.log(ratio)), 0.0)))
+        return [
+            "the prediction errors are not white: standard errors that trust it (std) are "
+            f"{1 / ratio[worst]:.2g} times those from the scatter of blocks for {names[worst]}. "
+            "The summary and interval() take the latter (kind='sandwich')" + differenced
+        ], True
+    share = slow_share(task.data, residuals)
+    if 1 / DISAGREE**2 < share < DISAGREE**2:
+        return [], False
+    size_words = "small" if share > 1 else "large"
+    return [
+        "the prediction errors are not white: at low frequency they have "
+        f"{share:.2g} times the power of white ones, so that standard errors (std) may be too "
+        f"{size_words} by up to {np.sqrt(max(share, 1 / share)):.2g}, and the records are too "
+        "short for the sandwich covariance. Shorten FitSettings.block_s (but not below the "
+        "correlation), add records, or give a noise model" + differenced
+    ], False
+
+
+def noise_weights(residuals: Sequence[Array]) -> tuple[float, ...]:
+    """Return weights one over the variance of the residuals, that of the first record one."""
+    power = np.array([float(np.mean(r**2)) for r in residuals])
+    floor = np.finfo(np.float64).tiny
+    return tuple((max(power[0], floor) / np.maximum(power, floor)).tolist())
+
+
+def weight_findings(task: Task, residuals: Sequence[Array]) -> list[str]:
+    """Return words where weighted residuals of records differ by more than chance and cost."""
+    if len(residuals) < 2:
+        return []
+    power, freedom = [], []
+    for record, x in zip(task.data, residuals, strict=True):
+        power.append(record.weight * float(np.mean(x**2)))
+        rho = _autocovariance([x], _lags(record))
+        # Squares of correlated errors count less.
+        freedom.append(max(len(x) / (1 + 2 * float(rho[1:] @ rho[1:])), 2.0))
+    small, large = int(np.argmin(power)), int(np.argmax(power))
+    if power[small] <= 0:
+        return []
+    ratio = power[large] / power[small]
+    pairs = len(power) * (len(power) - 1)
+    limit = stats.f.isf(CHANCE / pairs, freedom[large], freedom[small])
+    if ratio < max(limit, UNEQUAL):
+        return []
+    advice = ", ".join(f"{w:.3g}" for w in noise_weights(residuals))
+    return [
+        f"the residuals of {label(large, task.data[large])} have {ratio:.3g} times the variance "
+        f"of those of {label(small, task.data[small])} with the weights given: standard errors "
+        "that take them for equal (std) are wrong, and the noisy records count too much. Unless "
+        "an effect is missing there, fit with weights='residuals', or give the records the "
+        f"weights {advice}"
+    ]
