@@ -15,11 +15,12 @@ Array = NDArray[np.float64]
 
 # Samples after the first from which the speed at the start is found.
 START_SAMPLES = 8
-# Standard errors and share of the root mean square speed beyond which a start is in motion:
-# said, and refused. With white noise 5 standard errors are passed by chance in one record out of
-# two million; the shares hold against noise that the differences of samples do not show.
-SAID = (5.0, 0.01)
-REFUSED = (8.0, 0.1)
+# Standard errors and share of the root mean square speed beyond which a start is doubted, and
+# refused. White noise passes 5 standard errors in one record out of two million. Slow noise does
+# not show in differences of samples: against it a start is refused only at a share that noise
+# of a tenth of the motion reaches in three out of a thousand.
+DOUBTED = (5.0, 0.01)
+REFUSED = (8.0, 0.3)
 
 
 def check_data(model: AxisModel, data_sets: Sequence[AxisData] | AxisData) -> tuple[AxisData, ...]:
@@ -68,7 +69,7 @@ def check_start(
 ) -> tuple[str, ...]:
     """Refuse records clearly in motion at their first sample that the model starts at rest.
 
-    Returns words for those that probably are. ``values`` are all parameters, roughly right.
+    Returns words for those that may be, if their noise is not slow. ``values`` are all parameters, roughly right.
     """
     out = []
     for i, record in enumerate(data if model.initial == "rest" else ()):
@@ -83,8 +84,8 @@ def check_start(
             raise InputError(
                 f"{label(i, record)}: expected a start at rest, as initial='rest' says, got {text}"
             )
-        if all(_beyond(speed, error, size, SAID)):
-            out.append(f"{label(i, record)} seems to start in motion, unless its noise is slow: {text}")
+        if all(_beyond(speed, error, size, DOUBTED)):
+            out.append(f"{label(i, record)} seems to start in motion: {text}")
     return tuple(out)
 
 

@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal, stats
 
-from axisight.graybox.axis_checks import label, motion, noise_std
-from axisight.graybox.axis_model import AxisData, AxisModel
-from axisight.graybox.axis_search import Task
+from axisight import _core
+from axisight.errors import InputError
+from axisight.graybox.axis_checks import check_start, label, motion, noise_std
+from axisight.graybox.axis_model import AxisData
+from axisight.graybox.axis_search import Point, Task, search
 
 Array = NDArray[np.float64]
 
 # Fit (3.54) [%] below which the residuals have more than a quarter of the power of the motion.
 LOW_FIT = 50.0
 # Total inertias of start and end further apart than this are no matter of a poor start.
-FAR = 5.0
+FAR = 4.0
 # Factors by which a motion is off when its unit is not rad and rad/s.
 UNITS = {
     180 / np.pi: "degrees instead of radians",
     30 / np.pi: "revolutions per minute instead of rad/s",
+    np.pi / 180: "a conversion from degrees where there were radians",
     1 / (2 * np.pi): "revolutions instead of radians",
 }
-# A start knows the inertia this well, or says nothing about units.
-NEAR = 1.6
+# A start knows inertia and motion within this factor, or it says nothing about units.
+NEAR = 2.0
 # Standard errors of the two kinds further apart than this are told.
 DISAGREE = 2.0
 # Variances of records further apart than this cost more than 6 % of the standard errors.
@@ -35,64 +39,42 @@ CHANCE = 1e-3
 _LAG_S = 0.25
 
 
-def total_inertia(model: AxisModel, values: Mapping[str, float]) -> float:
+def total_inertia(values: Mapping[str, float]) -> float:
     """Inertia of all masses on the motor side [kg m^2]."""
     arms = sum(v for n, v in values.items() if n.startswith("J_a"))
     return values["J_m"] + values["r"] ** 2 * arms
 
 
-def rigid_inertia(
-    model: AxisModel, data: Sequence[AxisData], values: Mapping[str, float]
-) -> float | None:
-    """Return the inertia by which the torque explains the motion of a rigid axis, if it does.
+def motion_ratio(task: Task) -> float:
+    """Return how large the measured motion is against that simulated from the start.
 
-    Momentum over windows of one period of the first resonance of ``values``: J times the change
-    of speed, friction times the way and the time of either direction, against the impulse.
+    By root mean square speeds, which do not ask for equal phase.
     """
-    motor, arm = values["J_m"], values["r"] ** 2 * values["J_a"]
-    resonance = values["r"] * np.sqrt(values["k1"] * (1 / motor + 1 / arm))
-    blocks, sides = [], []
-    for record in data:
-        step, speed = record.sample_time_s, motion(model, record)
-        window = int(np.clip(round(2 * np.pi / resonance / step), 1, max(len(record) // 16, 1)))
-        sums = np.array([speed, np.sign(speed), np.asarray(record.torque_nm)])[:, :-1]
-        at = np.arange(0, len(record) - 1, window)[:-1]
-        ways = np.add.reduceat(sums[:, : at[-1] + window], at, axis=1) * step
-        blocks.append(np.stack([speed[at + window] - speed[at], ways[0], ways[1]], axis=1))
-        sides.append(ways[2])
-    columns, impulse = np.concatenate(blocks), np.concatenate(sides)
-    size = np.linalg.norm(columns, axis=0)
-    if not size.all():
-        return None
-    found, *_ = np.linalg.lstsq(columns / size, impulse, rcond=None)
-    rest = impulse - columns / size @ found
-    # Nine tenths of the impulses explained: beyond doubt, whatever correlates them.
-    explained = float(rest @ rest) < 0.1 * float(impulse @ impulse)
-    return float(found[0] / size[0]) if explained and found[0] > 0 else None
+    measured, simulated = 0.0, 0.0
+    for record in task.data:
+        run = task.model.simulate(task.start, record.torque_nm, record.sample_time_s).output.values
+        key = "position_rad" if task.model.output == "position" else "velocity_rad_s"
+        measured += float(np.sum(motion(task.model, record) ** 2))
+        simulated += float(np.sum(motion(task.model, replace(record, **{key: run})) ** 2))
+    return float(np.sqrt(measured / simulated)) if simulated > 0 else 1.0
 
 
-def scale_words(task: Task, inertia: float | None, reason: str) -> str:
-    """Return what a common factor of the motion of all records may be; empty if there is none."""
-    if inertia is None:
-        return ""
-    begin = total_inertia(task.model, task.start)
-    factor = begin / inertia
-    if 1 / FAR < factor < FAR:
-        return ""
-    ratio = task.start["r"]
-    named = {**UNITS, ratio: "the joint's side of the gear instead of the motor's"}
-    named |= {180 / np.pi * ratio: "degrees on the joint's side of the gear"}
+def scale_words(factor: float, ratio: float) -> str:
+    """Return what a motion too large by this common factor may be, in the words of units."""
+    named = dict(UNITS)
+    if ratio != 1:
+        named[ratio] = "the joint's side of the gear instead of the motor's"
+        named[180 / np.pi * ratio] = "degrees on the joint's side of the gear"
     likely = [
         f"{text} (factor {value:.4g})"
         for value, text in named.items()
-        if ratio != 1 or value in UNITS
         if 1 / NEAR < factor / value < NEAR
     ]
     return (
-        f"{reason}: total inertia {inertia:.3g} kg m^2 on the motor's side, the start says "
-        f"{begin:.3g}. As if the motion were measured {factor:.3g} times as large as it is"
-        + (f", which would be {' or '.join(likely)}" if likely else "")
-        + ". Look at the units and the side of the gear of motion and torque, or at the start"
+        f"As if the motion were measured about {factor:.2g} times as large as it is"
+        + (f": {', or '.join(likely)}?" if likely else "")
+        + (" " if likely else ". ")
+        + "Look at the units and the side of the gear of motion and torque, or at the start"
     )
 
 
@@ -109,19 +91,25 @@ def fit_findings(
         # Noise of this size may hide a model that is right.
         if fit < LOW_FIT and rest > 2 * noise_std(measured):
             low.append(f"{label(i, record)} {fit:.1f} %")
-    if not low:
-        found = total_inertia(task.model, parameters)
-        words = scale_words(task, found, "the inertia is far from that of the start")
-        return [words] if words else []
-    out = [
-        f"the simulation does not fit: {', '.join(low)} (3.54), {LOW_FIT:g} % is half of the "
-        "motion left over, below 0 a constant would do better. The values mean nothing before "
-        "the reason is found. Look at the units (rad, rad/s, Nm), the side of the gear (motor), "
-        "signs, the state at the start (initial='free'), the start of the search "
-        "(multistart_axis), and effects that the model lacks"
-    ]
-    inertia = rigid_inertia(task.model, task.data, task.start)
-    return [*out, *filter(None, [scale_words(task, inertia, "as a rigid body the axis differs")])]
+    if low:
+        factor = motion_ratio(task)
+        words = (
+            f"the simulation does not fit: {', '.join(low)} by (3.54); at {LOW_FIT:g} % half of "
+            "the motion is left over, below 0 a constant does better. The values mean nothing "
+            "until the reason is found. Look at units (rad, rad/s, Nm), side of the gear (motor), "
+            "signs, state at the start (initial='free'), start of the search (multistart_axis), "
+            "and effects that the model lacks"
+        )
+    else:
+        begin, end = total_inertia(task.start), total_inertia(parameters)
+        factor = begin / end
+        words = (
+            f"the total inertia, {end:.3g} kg m^2 on the motor's side, is far from that of the "
+            f"start, {begin:.3g}"
+        )
+    if not 1 / FAR < factor < FAR:
+        return [f"{words}. {scale_words(factor, task.start['r'])}"]
+    return [words] if low else []
 
 
 def _autocovariance(parts: Sequence[Array], lags: int) -> Array:
@@ -147,6 +135,32 @@ def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
     rho = _autocovariance(residuals, lags)
     weights = 1 - np.arange(1, lags + 1) / (lags + 1)
     return float(1 + 2 * weights @ rho[1:])
+
+
+def start_findings(
+    task: Task, point: Point, values: Mapping[str, float], token: _core.CancelToken
+) -> tuple[str, ...]:
+    """Return words about records that start in motion, if a free start fits better than by chance.
+
+    ``point`` is the end of an output-error fit from rest. Its loss and that with free starts are
+    compared as a likelihood ratio, samples counted by the power of the residuals at low frequency.
+    """
+    doubted = check_start(task.model, task.data, values)
+    if not doubted:
+        return ()
+    free = replace(task, model=replace(task.model, initial="free"))
+    try:
+        other = search(free, point, token)
+    except InputError:  # diverges: no better
+        return ()
+    lengths = np.cumsum([len(d) for d in task.data])[:-1]
+    share = max(slow_share(task.data, np.split(other.errors, lengths)), 1.0)
+    more = len(task.data) * (2 * task.model.n_masses - 1)
+    if other.loss > 0:
+        fall = point.errors.size / share * np.log(point.loss / other.loss)
+        if fall < stats.chi2.isf(CHANCE, more):
+            return ()
+    return tuple(f"{text}; it lowers the loss to {other.loss / point.loss:.2g}" for text in doubted)
 
 
 def covariance_findings(

@@ -12,7 +12,8 @@ import xarray as xr
 
 from axisight import _core
 from axisight.errors import InputError
-from axisight.graybox.axis_checks import check_start, data_warnings
+from axisight.graybox.axis_checks import data_warnings
+from axisight.graybox.axis_findings import start_findings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
 from axisight.graybox.axis_search import FitSettings, Point, Task, first_point, search_rounds
@@ -116,7 +117,7 @@ def multistart_axis(
         )
     warnings = (
         *data_warnings(model, task.data, task.free_names),
-        *check_start(model, task.data, values),
+        *start_findings(task, best, values, token),
     )
     return AxisMultistart(
         conclude(task, best, NoiseModel("output_error"), warnings), _table(task, starts, ends)

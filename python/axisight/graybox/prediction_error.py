@@ -11,6 +11,7 @@ import numpy as np
 from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox.axis_checks import check_data, check_energy, check_start, data_warnings
+from axisight.graybox.axis_findings import start_findings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude, inverse_normal
 from axisight.graybox.axis_search import (
@@ -110,7 +111,7 @@ def fit_axis(
     point = search_rounds(task, point, values["r"], token)
     warnings = (
         *data_warnings(model, task.data, task.free_names),
-        *check_start(model, task.data, values),
+        *start_findings(task, point, values, token),
         *disagreement(task, point),
     )
     point = _with_noise(task, point, noise_model, token)

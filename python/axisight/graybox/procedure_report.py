@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from axisight.graybox.flexibilities import CubicSpring, Flexibility
     from axisight.graybox.procedure import AxisIdentification
@@ -22,7 +20,7 @@ def report(found: AxisIdentification) -> str:
         lines += _spring(found.initial.spring)
     lines += ["", "Step 3: prediction-error fit"]
     units = {p.name: p.unit for p in found.model.parameters}
-    deviation = np.sqrt(np.diag(found.fit.sandwich))
+    deviation = found.fit.standard_error
     for name, value, own in zip(found.fit.free, found.fit.values, deviation, strict=True):
         start = found.initial.start.get(name)
         was = "" if start is None else f"   start {start:.4g}"
