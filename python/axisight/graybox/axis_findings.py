@@ -13,7 +13,7 @@ from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox.axis_checks import check_start, label, motion, noise_std
 from axisight.graybox.axis_model import AxisData
-from axisight.graybox.axis_search import Point, Task, search
+from axisight.graybox.axis_search import Point, Task, free_places, search
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,8 @@ UNEQUAL = 2.0
 # Probability of a word by chance.
 CHANCE = 1e-3
 _LAG_S = 0.25
+# Departure of the rise of the loss from that of a parabola: an eighth of a standard error.
+BENT = 0.25
 
 
 def total_inertia(values: Mapping[str, float]) -> float:
@@ -210,6 +212,58 @@ def covariance_findings(
         "short for the sandwich covariance. Shorten FitSettings.block_s (but not below the "
         "correlation), add records, or give a noise model" + differenced
     ], False
+
+
+def rise_of_loss(task: Task, point: Point, covariance: Array, n: int) -> Array:
+    """Return by how much the loss rises one standard error away, over the variance: 1 if linear.
+
+    Along the principal axes of the first ``n`` parameters (scaled to unit variance), the mean of
+    both ways; all others move as the linear model says. NaN where the motion diverges.
+    """
+    std = np.sqrt(np.diag(covariance)[:n])
+    scaled = covariance[:n, :n] / np.outer(std, std)
+    sizes, axes = np.linalg.eigh(scaled)
+    steps = (axes / np.sqrt(sizes) / std[:, None]).T @ covariance[:n]
+    places = free_places(task, point)
+    model, shared, states = task.model, len(task.model.vector({})), 2 * task.model.n_masses
+
+    def loss(step: Array) -> float:
+        theta = np.array(point.vector(task))
+        theta[places] += step
+        total = 0.0
+        for i, record in enumerate(task.data):
+            begin = shared + i * states
+            own = [*theta[:shared], *theta[begin : begin + states]]
+            try:
+                run = _core.axis_simulate(
+                    model.core(), record.core(model), own, predicts=point.predicts
+                )[0]
+            except InputError:
+                return np.nan
+            error = signal.lfilter([1.0, *point.whitening], [1.0], run - record.measured(model))
+            total += record.weight * float(np.sum(error[len(point.whitening) :] ** 2))
+        return total
+
+    here = loss(np.zeros(len(places)))
+    return np.array([(loss(s) + loss(-s)) / 2 - here for s in steps])
+
+
+def curvature_findings(task: Task, point: Point, covariance: Array, variance: float) -> list[str]:
+    """Return words where the loss is no parabola within one standard error."""
+    n = len(task.free_names)
+    if not (np.isfinite(covariance).all() and variance > 0):
+        return []
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rise = rise_of_loss(task, point, covariance, n) / variance
+    rise = rise[np.isfinite(rise)]
+    worst = float(rise[np.argmax(np.abs(rise - 1))]) if rise.size else 1.0
+    if abs(worst - 1) <= BENT:
+        return []
+    return [
+        f"one standard error away the loss rises {worst:.2g} times as much as the linear model "
+        "says: the intervals, which trust it, are approximate and may be too narrow. More data or "
+        "less noise helps, and with noise_model='ar' output_error and the sandwich may be better"
+    ]
 
 
 def noise_weights(residuals: Sequence[Array]) -> tuple[float, ...]:

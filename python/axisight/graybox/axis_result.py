@@ -16,6 +16,7 @@ from axisight.blackbox import fit_percent
 from axisight.errors import InputError
 from axisight.graybox.axis_findings import (
     covariance_findings,
+    curvature_findings,
     fit_findings,
     noise_weights,
     weight_findings,
@@ -236,6 +237,8 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
             task, names, covariance[:n, :n], sandwich[:n, :n], blocks, residuals
         )
         texts += [*unequal, *words]
+        if not bounded and point.status not in STATUS_ADVICE:
+            texts += curvature_findings(task, point, covariance, variance)
         if coloured or (unequal and np.isfinite(sandwich).all()):
             trusted = "sandwich"
     return AxisFit(
