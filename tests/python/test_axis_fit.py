@@ -77,8 +77,9 @@ def test_estimates_the_state_at_the_start():
     states = TWO.simulate(TRUTH, long.torque_nm, SAMPLE_S).states.values[777]
     assert errors(fit, TRUTH) < 1e-6
     assert np.abs(fit.starts[0, 1:] / states[1:] - 1).max() < 1e-5
-    # At rest it does not fit.
-    assert fit_axis(TWO, cut, START).fit_percent[0] < 99
+    # At rest it does not fit, and is refused before.
+    with pytest.raises(InputError, match=r"data set 1: expected a start at rest, .* got -15\..*free"):
+        fit_axis(TWO, cut, START)
 
 
 def test_fixed_parameters_and_bounds():
