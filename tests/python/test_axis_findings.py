@@ -171,7 +171,7 @@ def test_power_at_low_frequency_is_that_of_the_closed_form():
 
 
 def test_coloured_errors_move_the_trust_to_the_sandwich():
-    settings = FitSettings(gradual=(), block_s=0.1)
+    settings = replace(NEAR, block_s=0.1)
     inside, white = [], []
     u, y = clean(8000, 3, TWO)
     for seed in range(25):
@@ -191,8 +191,10 @@ def test_coloured_errors_move_the_trust_to_the_sandwich():
     # Student's quantile of 40 blocks less 7 parameters.
     low, high = fit.interval("k1")
     assert (high - low) / 2 == pytest.approx(stats.t.ppf(0.975, 33) * fit.standard_error[2])
-    short = fit_axis(TWO, data, TRUTH, settings=NEAR)
-    assert short.trusted == "white" and said(short, "too short for the sandwich")
+    # Too few blocks, or blocks shorter than the correlation, tell nothing.
+    for block_s in (0.5, 0.01):
+        short = fit_axis(TWO, data, TRUTH, settings=replace(NEAR, block_s=block_s))
+        assert short.trusted == "white" and said(short, "too short for blocks that tell")
 
 
 def test_white_errors_are_trusted():
@@ -212,8 +214,10 @@ def test_unequal_noise_is_told_and_weighted():
     fit = fit_axis(TWO, records, TRUTH, settings=NEAR)
     words = said(fit, "the residuals of data set 2 have")
     assert words and "weights='residuals'" in words[0]
-    # 16 blocks are too few for seven parameters.
-    assert fit.trusted == "white" and np.isnan(fit.sandwich).all()
+    # Four blocks for each parameter by themselves; 8 are too few.
+    assert fit.trusted == "sandwich" and 21 <= fit.blocks <= 28
+    few = fit_axis(TWO, records, TRUTH, settings=replace(NEAR, block_s=0.5))
+    assert few.trusted == "white" and np.isnan(few.sandwich).all()
     one, small = fit.noise_weights()
     # A variance from 4000 samples is known to 2.2 %, twice.
     assert one == 1 and small == pytest.approx(0.01, rel=4 * 0.032)

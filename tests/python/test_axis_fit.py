@@ -78,7 +78,9 @@ def test_estimates_the_state_at_the_start():
     assert errors(fit, TRUTH) < 1e-6
     assert np.abs(fit.starts[0, 1:] / states[1:] - 1).max() < 1e-5
     # At rest it does not fit, and is refused before.
-    with pytest.raises(InputError, match=r"data set 1: expected a start at rest, .* got -15\..*free"):
+    with pytest.raises(
+        InputError, match=r"data set 1: expected a start at rest, .* got -15\..*free"
+    ):
         fit_axis(TWO, cut, START)
 
 

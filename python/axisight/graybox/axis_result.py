@@ -22,7 +22,7 @@ from axisight.graybox.axis_findings import (
     weight_findings,
 )
 from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
-from axisight.graybox.axis_search import Point, Task, free_run
+from axisight.graybox.axis_search import LEAST_BLOCKS, Point, Task, free_run
 
 Array = NDArray[np.float64]
 
@@ -267,10 +267,6 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         blocks=blocks,
         weights=tuple(d.weight for d in task.data),
     )
-
-
-# Blocks for each parameter below which their scatter says nothing.
-LEAST_BLOCKS = 3
 
 
 def _sandwich(inverse: Array, gradients: Array) -> Array:

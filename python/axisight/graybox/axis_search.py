@@ -35,7 +35,8 @@ class FitSettings:
     after the rough ones, and the lower loss is kept; a warning tells where they disagree.
     ``()`` leaves the second way out, two thirds of the work saved. ``block_s`` is the length
     of the blocks of the sandwich covariance; it should exceed the correlation time of the
-    residuals. ``ar_order`` fixes the order of the noise filter, otherwise chosen up to
+    residuals. Without one it is 0.25 s, or less where the records have to give four blocks for
+    each parameter. ``ar_order`` fixes the order of the noise filter, otherwise chosen up to
     ``most_ar_order``; ``ar_rounds`` bounds the refits.
     """
 
@@ -43,7 +44,7 @@ class FitSettings:
     loss_tolerance: float = 1e-12
     step_tolerance: float = 1e-11
     gradual: tuple[float, ...] = GRADUAL
-    block_s: float = 0.25
+    block_s: float | None = None
     ar_order: int | None = None
     most_ar_order: int = 30
     ar_rounds: int = 5
@@ -51,8 +52,9 @@ class FitSettings:
     def __post_init__(self) -> None:
         """Check all numbers."""
         for name in ("loss_tolerance", "step_tolerance", "block_s"):
-            if number(name, getattr(self, name)) <= 0:
-                raise InputError(f"{name}: expected a positive number, got {getattr(self, name)}")
+            value = getattr(self, name)
+            if (name != "block_s" or value is not None) and number(name, value) <= 0:
+                raise InputError(f"{name}: expected a positive number, got {value}")
         for name in ("max_iterations", "most_ar_order", "ar_rounds"):
             value = getattr(self, name)
             if not isinstance(value, (int, np.integer)) or value < 1:
@@ -76,11 +78,26 @@ class Task:
     bounds: Mapping[str, tuple[float, float]]
     settings: FitSettings
     start: Mapping[str, float] = field(default_factory=dict)
+    # Words about records that may start in motion although the model starts at rest.
+    doubts: tuple[str, ...] = ()
 
     @property
     def free_names(self) -> tuple[str, ...]:
         """Free parameters in the order of the model."""
         return tuple(p.name for p in self.table if p.name in self.free)
+
+
+# Blocks for each parameter below which their scatter says nothing, and as many as are sought.
+LEAST_BLOCKS, ENOUGH_BLOCKS = 3, 4
+LONGEST_BLOCK_S = 0.25
+
+
+def block_length_s(task: Task, n: int) -> float:
+    """Return the length of the blocks of the sandwich covariance of ``n`` parameters [s]."""
+    if task.settings.block_s is not None:
+        return task.settings.block_s
+    total = sum(len(d) * d.sample_time_s for d in task.data)
+    return min(LONGEST_BLOCK_S, total / (ENOUGH_BLOCKS * max(n, 1)))
 
 
 @dataclass(frozen=True)
@@ -166,7 +183,7 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
     ]
     found = _core.axis_fit(
         model.core(),
-        [d.core(model, task.settings.block_s) for d in task.data],
+        [d.core(model, block_length_s(task, len(free))) for d in task.data],
         specs,
         whitening=list(point.whitening),
         predicts=point.predicts,

@@ -117,7 +117,7 @@ def multistart_axis(
         )
     warnings = (
         *data_warnings(model, task.data, task.free_names),
-        *start_findings(task, best, values, token),
+        *start_findings(task, best, token),
     )
     return AxisMultistart(
         conclude(task, best, NoiseModel("output_error"), warnings), _table(task, starts, ends)

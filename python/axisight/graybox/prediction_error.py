@@ -111,7 +111,7 @@ def fit_axis(
     point = search_rounds(task, point, values["r"], token)
     warnings = (
         *data_warnings(model, task.data, task.free_names),
-        *start_findings(task, point, values, token),
+        *start_findings(task, point, token),
         *disagreement(task, point),
     )
     point = _with_noise(task, point, noise_model, token)
@@ -160,8 +160,8 @@ def prepare(
     if not free:
         raise InputError("fixed: expected at least one parameter left to fit, got all fixed")
     check_energy(model, data)
-    check_start(model, data, values)
-    return Task(model, data, model.parameters, free, limits, settings, values), values
+    doubts = check_start(model, data, values)
+    return Task(model, data, model.parameters, free, limits, settings, values, doubts), values
 
 
 def _interval(name: str, pair: tuple[float, float]) -> tuple[float, float]:
