@@ -231,7 +231,7 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     texts += fit_findings(task, parameters, fits)
     blocks = len(point.block_gradients)
     trusted: Literal["white", "sandwich"] = "white"
-    if point.status != "exact":
+    if point.status != "exact" and min(fits) < ROUNDING:
         unequal = weight_findings(task, residuals)
         words, coloured = covariance_findings(
             task, names, covariance[:n, :n], sandwich[:n, :n], blocks, residuals
@@ -267,6 +267,10 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         blocks=blocks,
         weights=tuple(d.weight for d in task.data),
     )
+
+
+# Fit (3.54) [%] from which residuals are no noise but what rounding left of the search.
+ROUNDING = 100 - 1e-7
 
 
 def _sandwich(inverse: Array, gradients: Array) -> Array:

@@ -100,12 +100,7 @@ def fit_axis(
         free_gear_ratio=free_gear_ratio,
         settings=settings or FitSettings(),
     )
-    if noise_model not in ("output_error", "innovations", "ar"):
-        raise InputError(
-            f"noise_model: expected output_error, innovations or ar, got {noise_model!r}"
-        )
-    if weights not in ("given", "residuals"):
-        raise InputError(f"weights: expected given or residuals, got {weights!r}")
+    _check_choices(noise_model, weights)
     token = _core.CancelToken()
     point = first_point(task, values)
     point = search_rounds(task, point, values["r"], token)
@@ -118,12 +113,17 @@ def fit_axis(
     if weights == "residuals":
         task, point, said = _reweighted(task, point, noise_model, token)
         warnings += said
-    noise = NoiseModel(
-        noise_model,
-        gains=point.gains,
-        whitening=point.whitening,
-    )
+    noise = NoiseModel(noise_model, gains=point.gains, whitening=point.whitening)
     return conclude(task, point, noise, warnings)
+
+
+def _check_choices(noise_model: str, weights: str) -> None:
+    if noise_model not in ("output_error", "innovations", "ar"):
+        raise InputError(
+            f"noise_model: expected output_error, innovations or ar, got {noise_model!r}"
+        )
+    if weights not in ("given", "residuals"):
+        raise InputError(f"weights: expected given or residuals, got {weights!r}")
 
 
 def prepare(
