@@ -52,6 +52,8 @@ Key = tuple[str | int, ...]
 
 INERTIA = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
 _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
+    **{f"origin_{x}": (("origin", k), "m") for k, x in enumerate("xyz")},
+    **{f"axis_{x}": (("axis", k), "1") for k, x in enumerate("xyz")},
     "mass": (("link", "mass"), "kg"),
     **{f"com_{x}": (("link", "com", k), "m") for k, x in enumerate("xyz")},
     **{name: (("link", "inertia", k), "kg m^2") for k, name in enumerate(INERTIA)},
@@ -85,7 +87,8 @@ class Identified:
     """Identified values with their uncertainty and provenance.
 
     ``names`` are those of `axisight.robot_parameters` (``axis1.stiffness``), with
-    ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes; and for
+    ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes,
+    ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are; and for
     effects ``<effect label>.<parameter>``, which are uncertain too but stand in ``effects``.
     ``values`` in SI units; ``standard_errors`` NaN where unknown; ``covariance`` over ``names``
     or None. ``effects`` are what was found that the robot format has no place for.
@@ -338,7 +341,10 @@ def _place(robot: Robot, document: dict[str, Any], name: str) -> tuple[int, str]
         except (KeyError, TypeError):
             pass
     known = ", ".join([n for n, _ in robot.core.parameters()])
-    raise InputError(f"found: expected parameters among {known} and inertia_xx.., got {name!r}")
+    raise InputError(
+        f"found: expected parameters among {known}, inertia_xx.., "
+        f"origin_x.. and axis_x.., got {name!r}"
+    )
 
 
 def _refuse(name: str, quantity: str, value: float, *, rigid: bool) -> None:

@@ -11,6 +11,7 @@ from axisight.calibration.measurements import (
     SamePoint,
     load_torque,
 )
+from axisight.calibration.robot_values import identified_geometry
 
 __all__ = [
     "Calibration",
@@ -23,6 +24,7 @@ __all__ = [
     "Positions",
     "SamePoint",
     "calibrate",
+    "identified_geometry",
     "load_torque",
     "nominal_geometry",
 ]

@@ -69,6 +69,9 @@ class Calibration:
     table
         Over ``parameter``: ``deviation``, ``standard_error`` (infinite where only a combination
         is determined) and ``identifiable``; units in the coordinate ``unit``.
+    covariance
+        (n_parameters, n_parameters), of the deviations in the order of ``table``; infinite variance
+        and NaN beside it where ``table`` has an infinite standard error.
     combinations
         The identifiable combinations, as many as ``rank``.
     status, advice, iterations
@@ -92,6 +95,7 @@ class Calibration:
     geometry: Geometry
     nominal: Geometry
     table: xr.Dataset
+    covariance: Array
     combinations: tuple[Combination, ...]
     status: Status
     advice: str
@@ -169,11 +173,12 @@ def calibrate(
             "identify fewer groups"
         )
     scale = float(np.sqrt(found.loss / dof))
-    table, combinations = _report(problem, found, scale)
+    table, covariance, combinations = _report(problem, found, scale)
     return Calibration(
         geometry=errors.geometry(found.theta),
         nominal=start,
         table=table,
+        covariance=covariance,
         combinations=combinations,
         status=found.status,
         advice=_ADVICE[found.status],
@@ -302,14 +307,17 @@ def _scales(errors: Errors, data: Sequence[Checked]) -> Array:
 
 def _report(
     problem: _Problem, found: _Found, scatter: float
-) -> tuple[xr.Dataset, tuple[Combination, ...]]:
+) -> tuple[xr.Dataset, Array, tuple[Combination, ...]]:
     errors, scale = problem.errors, problem.scale
     # Over the directions seen, in scaled units; anything else has a zero column.
     r = np.linalg.qr((found.jacobian * scale) @ problem.seen, mode="r")
     spread = np.linalg.solve(r, np.eye(len(r))) * scatter
     seen = (problem.seen**2).sum(axis=1)
     alone = seen > 1.0 - 1e-9
-    deviation = np.sqrt(((problem.seen @ spread) ** 2).sum(axis=1)) * scale
+    root = (problem.seen @ spread) * scale[:, None]
+    deviation = np.sqrt((root**2).sum(axis=1))
+    covariance = np.where(alone[:, None] & alone, root @ root.T, np.nan)
+    np.fill_diagonal(covariance, np.where(alone, deviation**2, np.inf))
     table = xr.Dataset(
         {
             "deviation": ("parameter", found.theta),
@@ -339,7 +347,7 @@ def _report(
                 {errors.names[k]: float(real[k]) for k in members},
             )
         )
-    return table, tuple(combinations)
+    return table, covariance, tuple(combinations)
 
 
 def _combinations(seen: Array) -> list[tuple[int, Array]]:

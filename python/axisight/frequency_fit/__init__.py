@@ -5,6 +5,7 @@ from axisight.frequency_fit.identifiability import Combination, Identifiability,
 from axisight.frequency_fit.measured import MeasuredResponse, model_response
 from axisight.frequency_fit.poses import PoseChoice, choose_poses
 from axisight.frequency_fit.result import FrequencyFit
+from axisight.frequency_fit.robot_values import identified_responses
 
 __all__ = [
     "Combination",
@@ -16,5 +17,6 @@ __all__ = [
     "choose_poses",
     "fit_responses",
     "identifiability",
+    "identified_responses",
     "model_response",
 ]

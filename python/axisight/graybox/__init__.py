@@ -28,6 +28,7 @@ from axisight.graybox.procedure import (
     identify_axis,
     initial_model,
 )
+from axisight.graybox.robot_values import identified_axis
 from axisight.graybox.sensitivity import sensitivity_table
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 from axisight.graybox.step_one import RigidBodyFriction, rigid_body_friction
@@ -69,6 +70,7 @@ __all__ = [
     "fit_percent",
     "fit_table",
     "high_frequency_gain",
+    "identified_axis",
     "identify_axis",
     "initial_flexibility",
     "initial_model",

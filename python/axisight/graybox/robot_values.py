@@ -1,0 +1,270 @@
+"""The fit of one axis as values of a robot file, and as effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.fitting import robot_parameters
+from axisight.graybox.axis_result import AxisFit
+from axisight.robot import Robot
+from axisight.robot_file import Identified, Provenance
+from axisight.robot_sidecar import known
+from axisight.robot_values import noted, values_of
+
+Array = NDArray[np.float64]
+Covariance = Literal["sandwich", "white"]
+
+# Thesis name: quantity of the robot file.
+QUANTITIES = {
+    "J_m": "motor_inertia",
+    "F_v": "viscous_friction",
+    "k1": "stiffness",
+    "d": "damping",
+}
+EXACT_SIGN_SMOOTHING_RAD_S = 0.01
+"""What effects take for a sign that the fit followed exactly, as the preset of the thesis has it."""
+MOST_RIPPLES = 3
+"""Harmonics that the effect torque_ripple holds."""
+# A fitted axis has its own of these; on top of it they would count twice.
+REPLACED = (
+    "viscous_friction",
+    "coulomb_friction",
+    "asymmetric_friction",
+    "stribeck_friction",
+    "presliding_friction",
+    "joint_stiffness",
+    "nonlinear_stiffness",
+    "joint_damping",
+    "motor_inertia",
+)
+
+
+def identified_axis(
+    fit: AxisFit,
+    robot: Robot,
+    provenance: Provenance,
+    *,
+    axis: int = 1,
+    covariance: Covariance = "sandwich",
+    smoothing_rad_s: float | None = None,
+) -> Identified:
+    """Return the fit of one axis in the terms of a robot file, for `write_identified`.
+
+    ========================= ==================================================================
+    thesis                    robot file, joint of the axis
+    ========================= ==================================================================
+    ``J_m``, ``F_v``          ``motor_inertia``, ``viscous_friction`` (motor side)
+    ``k1``, ``d``             ``stiffness``, ``damping`` (joint side)
+    ``k3``                    effect ``nonlinear_stiffness``
+    ``F_c``; ``F_s``, ``v_s`` effect ``coulomb_friction``, or with ``F_s`` ``stribeck_friction``
+    ``b``, ``u_0``            effects ``backlash``, ``torque_offset``
+    ``a_n``, ``b_n``          effect ``torque_ripple``, up to three orders
+    ``J_a``, ``J_a2`` ...     none: a chain holds the inertia of an arm in all links beyond
+    ``k1_2``, ``d_2`` ...     none: which elastic joint they mean cannot be told from one axis
+    ``F_a``, ``r``            none
+    ========================= ==================================================================
+
+    What has no place stands with unit and standard error under ``"no_place"`` of the provenance's
+    settings, and the notes say so; for the inertia of the arm they give what the robot has
+    about the joint at its operating point. Warnings of the fit and its status are notes too.
+
+    fit
+        Two to four masses. Motor-side data determine an axis up to the gear ratio: if its own is
+        another than the robot's (1, or a fitted ``r``), joint-side values are converted to
+        the robot's, k1, d, J_a by (r_fit / r_robot)^2, k3 by the fourth power, b by the inverse:
+        the motor moves alike.
+    robot
+        Where they will be written. Friction and gear effects of the axis that it has already and
+        that the fit has not are set to neutral: the fitted values stand in their place.
+    provenance
+        Where they come from.
+    axis
+        Number of the axis, from 1.
+    covariance
+        ``"sandwich"`` or ``"white"``, of the fit, carried to first order through the conversion. The
+        sandwich of records with few blocks is unknown, and standard errors are then too.
+        Values that were held are written if the robot has others, standard error zero, and noted.
+    smoothing_rad_s
+        Width [rad/s] over which friction effects smooth the sign; by default that of the model,
+        0.01 rad/s where the model follows the sign exactly.
+
+    Raises InputError for another type, an axis that is not there or has a rigid transmission, and
+    a width that is not positive.
+    """
+    if not isinstance(fit, AxisFit):
+        raise InputError(f"fit: expected an AxisFit, got {type(fit).__name__}")
+    joint, ratio = _joint(robot, axis)
+    if covariance not in ("sandwich", "white"):
+        raise InputError(f"covariance: expected sandwich or white, got {covariance!r}")
+    width = _width(fit, smoothing_rad_s)
+    values, slopes = _converted(fit, ratio)
+    spread = fit.sandwich if covariance == "sandwich" else fit.covariance
+    effects, owner = _effects(fit, values, axis, width)
+    present = robot_parameters(robot)
+    names: dict[str, str] = {}
+    held = []
+    for name in values:
+        place = f"{joint}.{QUANTITIES[name]}" if name in QUANTITIES else owner.get(name)
+        if place is None:
+            continue
+        if name not in fit.free:
+            if present.get(place) == values[name] and not slopes[name].any():
+                continue
+            held.append(name)
+        names[name] = place
+    unplaced = _unplaced(fit, values, slopes, spread, {*QUANTITIES, *owner})
+    labels = [effect.label for effect in effects]
+    replaced = [
+        Effect(e.name, axis, {})
+        for e in robot.effects
+        if e.axis == axis and e.name in REPLACED and e.label not in labels
+    ]
+    notes = _notes(fit, robot, joint, ratio, unplaced)
+    if held:
+        notes.append(f"held in the fit: {', '.join(held)}")
+    if replaced:
+        what = ", ".join(effect.label for effect in replaced)
+        notes.append(f"set to neutral, the fit stands in their place: {what}")
+    if not fit.model.friction_smoothing_rad_s and any("F_" in n for n in owner):
+        notes.append(f"the exact sign of the fit's friction is smoothed over {width:g} rad/s")
+    return values_of(
+        {place: values[name] for name, place in names.items()},
+        np.array([slopes[name] for name in names]).reshape(len(names), len(fit.free)),
+        spread,
+        noted(provenance, [*notes, f"search: {fit.status}", *fit.warnings], unplaced),
+        effects=[*effects, *replaced],
+    )
+
+
+def _joint(robot: Robot, axis: int) -> tuple[str, float]:
+    """Name of the joint of an axis and the size of its gear ratio."""
+    if isinstance(axis, bool) or axis not in range(1, robot.n_axes + 1):
+        raise InputError(f"axis: expected 1 to {robot.n_axes}, got {axis!r}")
+    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
+    if f"{joint}.stiffness" not in robot_parameters(robot):
+        raise InputError(
+            f"axis: expected one with a gear spring, got {axis}: {joint} has a rigid transmission; "
+            "give it a stiffness and a damping in the robot file"
+        )
+    return joint, abs(float(robot.core.gear_ratio[axis - 1]))
+
+
+def _width(fit: AxisFit, given: float | None) -> float:
+    own = fit.model.friction_smoothing_rad_s or EXACT_SIGN_SMOOTHING_RAD_S
+    width = own if given is None else given
+    if isinstance(width, bool) or not (np.isfinite(width) and width > 0):
+        raise InputError(f"smoothing_rad_s: expected a positive number, got {given!r}")
+    return float(width)
+
+
+def _power(name: str) -> int:
+    """Power of the gear ratio that leaves the motor's motion as it is."""
+    if name == "b":
+        return -1
+    if name.startswith("k3"):
+        return 4
+    return 2 if name.startswith(("k1", "d", "J_a")) else 0
+
+
+def _converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, Array]]:
+    """All values for the gear ratio of the robot, and derivatives (n_free,) by the free ones."""
+    own = fit.parameters["r"]
+    values, slopes = {}, {}
+    for name, value in fit.parameters.items():
+        power = _power(name)
+        # Ratios that differ by rounding are the same.
+        factor = 1.0 if np.isclose(own, ratio, rtol=1e-12) else (own / ratio) ** power
+        values[name] = value * factor
+        slope = np.zeros(len(fit.free))
+        if name in fit.free:
+            slope[fit.free.index(name)] = factor
+        if power and "r" in fit.free:
+            slope[fit.free.index("r")] = power * value * factor / own
+        slopes[name] = slope
+    return values, slopes
+
+
+def _effects(
+    fit: AxisFit, values: Mapping[str, float], axis: int, width: float
+) -> tuple[list[Effect], dict[str, str]]:
+    """Effects of the fit, and the full name of the effect parameter by its thesis name."""
+    table: list[tuple[str, dict[str, str], dict[str, float]]] = [
+        ("nonlinear_stiffness", {"k3": "cubic_nm_rad3"}, {}),
+        ("backlash", {"b": "half_width_rad"}, {}),
+        ("torque_offset", {"u_0": "offset_nm"}, {}),
+    ]
+    friction = {"F_c": "coulomb_nm"}
+    if fit.model.stribeck:
+        friction |= {"F_s": "excess_nm", "v_s": "stribeck_speed_rad_s"}
+    kind = "stribeck_friction" if fit.model.stribeck else "coulomb_friction"
+    table.append((kind, friction, {"smoothing_rad_s": width}))
+    orders = fit.model.ripple_orders[:MOST_RIPPLES]
+    ripple = {f"a_{n:g}": f"cosine_{i}_nm" for i, n in enumerate(orders, 1)}
+    ripple |= {f"b_{n:g}": f"sine_{i}_nm" for i, n in enumerate(orders, 1)}
+    table.append(("torque_ripple", ripple, {f"order_{i}": n for i, n in enumerate(orders, 1)}))
+    effects, owner = [], {}
+    for name, places, shape in table:
+        used = {n: p for n, p in places.items() if n in values}
+        if not any(n in fit.free or values[n] for n in used if n != "v_s"):
+            continue
+        effect = Effect(name, axis, shape | {p: values[n] for n, p in used.items()})
+        effects.append(effect)
+        owner |= {n: f"{effect.label}.{p}" for n, p in used.items()}
+    return effects, owner
+
+
+def _unplaced(
+    fit: AxisFit,
+    values: Mapping[str, float],
+    slopes: Mapping[str, Array],
+    spread: Array,
+    placed: set[str],
+) -> dict[str, Any]:
+    """What has no place: value for the gear ratio of the robot, standard error, unit, meaning."""
+    out: dict[str, Any] = {}
+    for p in fit.model.parameters:
+        free = p.name in fit.free
+        if p.name in placed or not (free or (values[p.name] and p.name not in ("r", "v_s"))):
+            continue
+        used = np.flatnonzero(slopes[p.name])
+        variance = slopes[p.name][used] @ spread[np.ix_(used, used)] @ slopes[p.name][used]
+        out[p.name] = {
+            "value": float(values[p.name]),
+            "standard_error": known(np.sqrt(variance)) if used.size else None,
+            "unit": p.unit,
+            "meaning": p.meaning,
+        }
+    return out
+
+
+def _notes(
+    fit: AxisFit, robot: Robot, joint: str, ratio: float, unplaced: Mapping[str, Any]
+) -> list[str]:
+    notes = []
+    arm = {n: v["value"] for n, v in unplaced.items() if n.startswith("J_a")}
+    if arm:
+        listed = " + ".join(f"{n} {v:.6g}" for n, v in arm.items())
+        notes.append(
+            f"not written: {listed} kg m^2, which a chain holds in the links beyond {joint}; the "
+            f"robot has {_inertia_about(robot, joint):.6g} there at its operating point"
+        )
+    others = [n for n in unplaced if n not in arm]
+    if others:
+        notes.append(f"not written, no place in a robot file: {', '.join(others)}")
+    own = fit.parameters["r"]
+    if not np.isclose(own, ratio, rtol=1e-12):
+        notes.append(f"converted from the gear ratio {own:.9g} of the fit to {ratio:.9g}")
+    return notes
+
+
+def _inertia_about(robot: Robot, joint: str) -> float:
+    q = np.zeros(robot.n_joints)
+    q[robot.core.axis_joints] = robot.core.operating_point
+    place = robot.joint_names.index(joint)
+    return float(robot.inertia_matrix(q)[place, place])
