@@ -20,7 +20,7 @@ from axisight import (
 from axisight.calibration import Positions, calibrate, identified_geometry, load_torque
 from axisight.calibration.geometry import errors_about, nominal_geometry
 from axisight.frequency_fit import FrequencyFitOptions, fit_responses, identified_responses
-from axisight.graybox import AxisModel, fit_axis, identified_axis
+from axisight.graybox import AxisModel, FitSettings, fit_axis, identified_axis
 from axisight.robot_file import Provenance, identified, load_identified, write_identified
 from calibration_data import LOADS, arm, configurations, nominal
 from frequency_fit_data import ROBOT, responses
@@ -61,7 +61,7 @@ def test_a_frequency_fit_written_is_its_robot(frequency_fit, tmp_path: Path) -> 
     links = _core.inertial_parameters(back.robot.core)[1]
     exact = _core.inertial_parameters(frequency_fit.robot.core)[1]
     np.testing.assert_allclose(links, exact, rtol=1e-12, atol=1e-12)
-    assert np.abs(exact / _core.inertial_parameters(ROBOT.core)[1] - 1).max() > 1e-3
+    assert np.abs(exact - _core.inertial_parameters(ROBOT.core)[1]).max() > 1
     n = len(frequency_fit.names)
     np.testing.assert_allclose(back.covariance[:n, :n], frequency_fit.covariance, rtol=1e-12)
     np.testing.assert_allclose(back.standard_errors[:n], frequency_fit.std, rtol=1e-9)
@@ -110,7 +110,9 @@ def test_effects_of_a_frequency_fit_go_along(tmp_path: Path) -> None:
 def axis_fit(model: AxisModel, truth: dict[str, float], **options):
     """A fit that starts at the truth and stays near it."""
     data = record(model, truth, n=3000, noise=1e-4 * np.random.default_rng(0).normal(size=3000))
-    return fit_axis(model, [data], truth, **options)
+    # Short blocks: records of 1.5 s have enough of them for a sandwich.
+    settings = FitSettings(block_s=0.03)
+    return fit_axis(model, [data], truth, settings=settings, **options)
 
 
 RICH = {"b": 2e-4, "F_s": 0.3, "v_s": 3.0, "u_0": 0.2, "a_1": 0.1, "b_1": -0.2, "a_4": 0.05}
@@ -190,7 +192,9 @@ def test_values_of_an_axis_fit_stand_where_they_belong(tmp_path: Path) -> None:
 def test_covariance_goes_through_the_gear_ratio() -> None:
     """Against finite differences of the written values, ratio fitted."""
     model = AxisModel(gear_ratio=1 / 200.0, backlash=True)
-    fit = axis_fit(model, TRUTH | {"b": 2e-4}, fixed=["J_a", "F_v"])
+    fit = axis_fit(
+        model, TRUTH | {"b": 2e-4, "F_v": 0.02}, fixed=["J_a", "F_v"], free_gear_ratio=True
+    )
     assert "r" in fit.free
     robot = load_robot("two_mass_axis")
     found = identified_axis(fit, robot, SOURCE, covariance="white")

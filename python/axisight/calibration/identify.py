@@ -32,6 +32,8 @@ _LOOKS = 3
 """How often the directions that are seen are decided again at the solution."""
 _NAMED = 0.01
 """Share of a typical error from which on a parameter is named in a combination."""
+_ROUNDING = 1e-9
+"""A joint torque below this share of the largest is rounding: the load lies on the axis."""
 _ADVICE: dict[str, str] = {
     "converged": "",
     "max_iterations": "still moving: allow more iterations, or start from a better nominal geometry",
@@ -300,8 +302,9 @@ def _scales(errors: Errors, data: Sequence[Checked]) -> Array:
     torque = np.max([np.abs(d.torque).max(axis=0) for d in data], axis=0)
     for k, (group, joint, _) in enumerate(errors.kinds):
         if group == "compliance":
-            # A joint that never holds anything has no column, whatever its scale.
-            out[k] = _TYPICAL / torque[joint] if torque[joint] > 0 else 1.0
+            # A joint that never holds anything but rounding errors is not seen, whatever its scale.
+            holds = torque[joint] > _ROUNDING * torque.max()
+            out[k] = _TYPICAL / torque[joint] if holds else 1.0
     return out
 
 

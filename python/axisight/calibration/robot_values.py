@@ -53,45 +53,24 @@ def identified_geometry(calibration: Calibration, provenance: Provenance) -> Ide
     """
     if not isinstance(calibration, Calibration):
         raise InputError(f"calibration: expected a Calibration, got {type(calibration).__name__}")
-    geometry, nominal = calibration.geometry, calibration.nominal
     names = [str(name) for name in calibration.table["parameter"].values]
     groups = _groups(names)
     rows: dict[str, tuple[float, Array]] = {}
-    unplaced: dict[str, Any] = {}
-    unit = np.eye(len(names))
-    for j, joint in enumerate(geometry.joint_names):
-        for k, x in enumerate("xyz"):
-            own = f"{joint}.origin_{x}"
-            if own in names:
-                rows[own] = float(geometry.origin_m[j, k]), unit[names.index(own)]
+    for j, joint in enumerate(calibration.geometry.joint_names):
+        if "origin" in groups:
+            for k, x in enumerate("xyz"):
+                own = f"{joint}.origin_{x}"
+                rows[own] = float(calibration.geometry.origin_m[j, k]), _unit(names, own)
         if "tilt" in groups:
             slopes = _axis_slopes(calibration, names, j)
             for k, x in enumerate("xyz"):
-                rows[f"{joint}.axis_{x}"] = float(geometry.axis[j, k]), slopes[k]
-        own = f"{joint}.compliance"
-        if own in names:
-            at = names.index(own)
-            value, before = float(geometry.compliance_rad_nm[j]), nominal.compliance_rad_nm[j]
-            if before == 0.0:
-                if value:
-                    unplaced.setdefault("compliance_rad_nm", {})[joint] = value
-            elif not np.isclose(value, before, rtol=UNCHANGED, atol=0.0):
-                if value < 0.0:
-                    raise InputError(
-                        f"calibration: expected a positive compliance of {joint}, got {value:.3g}: "
-                        "measure under two payloads, or identify without compliance"
-                    )
-                rows[f"{joint}.stiffness"] = 1.0 / value, -unit[at] / value**2
-    if "offset" in groups:
-        unplaced["offset_rad"] = {
-            joint: float(geometry.offset_rad[j])
-            for j, joint in enumerate(geometry.joint_names)
-            if f"{joint}.offset" in names
-        }
-    for frame in FRAMES:
-        if frame in groups:
-            unplaced[f"{frame}_position_m"] = getattr(geometry, f"{frame}_position_m").tolist()
-            unplaced[f"{frame}_rotation"] = getattr(geometry, f"{frame}_rotation").tolist()
+                rows[f"{joint}.axis_{x}"] = float(calibration.geometry.axis[j, k]), slopes[k]
+        if "compliance" in groups:
+            stiffness = _stiffness(calibration, j)
+            if stiffness is not None:
+                slope = -(stiffness**2) * _unit(names, f"{joint}.compliance")
+                rows[f"{joint}.stiffness"] = stiffness, slope
+    unplaced = _unplaced(calibration, groups)
     notes = [f"search: {calibration.status}", *([calibration.advice] if calibration.advice else [])]
     if unplaced:
         notes.insert(0, f"not written, no place in a robot file: {', '.join(unplaced)}")
@@ -101,6 +80,56 @@ def identified_geometry(calibration: Calibration, provenance: Provenance) -> Ide
         calibration.covariance,
         noted(provenance, notes, unplaced),
     )
+
+
+def _unit(names: list[str], name: str) -> Array:
+    return np.array([float(other == name) for other in names])
+
+
+def _stiffness(calibration: Calibration, joint: int) -> float | None:
+    """Stiffness of a joint, None for a joint without spring or one that was not seen."""
+    value = float(calibration.geometry.compliance_rad_nm[joint])
+    before = float(calibration.nominal.compliance_rad_nm[joint])
+    if before == 0.0 or np.isclose(value, before, rtol=UNCHANGED, atol=0.0):
+        return None
+    if value <= 0.0:
+        raise InputError(
+            "calibration: expected a positive compliance of "
+            f"{calibration.geometry.joint_names[joint]}, got {value:.3g}: measure under two "
+            "payloads, or identify without compliance"
+        )
+    return 1.0 / value
+
+
+def _unplaced(calibration: Calibration, groups: set[str]) -> dict[str, Any]:
+    """What was identified and has no place in a robot file."""
+    geometry = calibration.geometry
+    out: dict[str, Any] = {}
+    if "compliance" in groups:
+        stiff = {
+            name: float(value)
+            for name, value, before in zip(
+                geometry.joint_names,
+                geometry.compliance_rad_nm,
+                calibration.nominal.compliance_rad_nm,
+                strict=True,
+            )
+            if value and not before
+        }
+        out |= {"compliance_rad_nm": stiff} if stiff else {}
+    if "offset" in groups:
+        out["offset_rad"] = {
+            name: float(value)
+            for name, value, driven in zip(
+                geometry.joint_names, geometry.offset_rad, geometry.driven, strict=True
+            )
+            if driven
+        }
+    for frame in FRAMES:
+        if frame in groups:
+            out[f"{frame}_position_m"] = getattr(geometry, f"{frame}_position_m").tolist()
+            out[f"{frame}_rotation"] = getattr(geometry, f"{frame}_rotation").tolist()
+    return out
 
 
 def _groups(names: list[str]) -> set[str]:
