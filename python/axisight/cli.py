@@ -1,4 +1,4 @@
-"""The command line: diagnose, check, simulate, effects, excite, montecarlo, reproduce, demo."""
+"""The command line: diagnose, check, simulate, effects, excite, identify, montecarlo, reproduce, demo."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from axisight.cli_common import ERR as _err
 from axisight.cli_common import OUT as _out
 from axisight.cli_common import errors as _errors
 from axisight.cli_excite import excite_command
+from axisight.cli_identify import identify_app
 from axisight.cli_montecarlo import montecarlo_command
 from axisight.cli_reproduce import reproduce_command
 from axisight.cli_simulate import simulate_command
@@ -35,6 +36,7 @@ app = typer.Typer(
     add_completion=False,
 )
 app.command("excite")(excite_command)
+app.add_typer(identify_app, name="identify")
 app.command("montecarlo")(montecarlo_command)
 app.command("reproduce")(reproduce_command)
 app.command("simulate")(simulate_command)

@@ -20,6 +20,7 @@ from axisight.rigid_body.estimate import identify_rigid_body
 from axisight.rigid_body.findings import FindingKind, IdentificationFinding
 from axisight.rigid_body.fourier import FourierTrajectory
 from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
+from axisight.rigid_body.from_logs import LogIdentification, identify_logs
 from axisight.rigid_body.motion import MotionEstimate, estimate_motion
 from axisight.rigid_body.regressor import TorqueModel, torque_regressor
 from axisight.rigid_body.result import RigidBodyEstimate
@@ -36,6 +37,7 @@ __all__ = [
     "FindingKind",
     "FourierTrajectory",
     "IdentificationFinding",
+    "LogIdentification",
     "MotionEstimate",
     "MotionLimits",
     "MotorCoupling",
@@ -51,6 +53,7 @@ __all__ = [
     "identified_bodies",
     "identify_by_energy",
     "identify_consistent",
+    "identify_logs",
     "identify_rigid_body",
     "optimize_trajectory",
     "prior_spread",

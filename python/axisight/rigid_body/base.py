@@ -131,6 +131,7 @@ def base_parameters(
     side: Side | None = None,
     coupling: MotorCoupling | None = None,
     known: Iterable[str] = (),
+    locked: bool = False,
     seed: int = 0,
 ) -> BaseParameters:
     """Find the base parameters of a robot.
@@ -145,6 +146,8 @@ def base_parameters(
         :class:`TorqueModel` that holds them.
     terms, side, coupling : see :func:`torque_regressor`.
     known : names of parameters that need no estimate and are left out.
+    locked : elastic joints stand still at zero, as in motions from motor angles. Their links then
+        move as one with the link before, and fewer parameters show.
     seed : of the random motions.
 
     Raises InputError for unknown names, and AxisightError if singular values and pivoted QR
@@ -155,7 +158,7 @@ def base_parameters(
     model = as_model(robot, terms, side, coupling)
     known = tuple(known)
     free = free_columns(model, known)
-    factor = random_factor(model, free, seed)
+    factor = random_factor(model, free, seed, locked)
     silent = without_effect(model, factor, free)
     found = group(factor, TOLERANCE, skip=silent)
     pivots = np.abs(np.diag(scipy.linalg.qr(found.scaled, mode="r", pivoting=True)[0]))
@@ -211,7 +214,9 @@ def free_columns(model: TorqueModel, known: Iterable[str]) -> NDArray[np.intp]:
     return free
 
 
-def random_factor(model: TorqueModel, columns: NDArray[np.intp], seed: int) -> Array:
+def random_factor(
+    model: TorqueModel, columns: NDArray[np.intp], seed: int, locked: bool = False
+) -> Array:
     """Return the triangular factor of the regressor at random motions, k columns."""
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise InputError(f"seed: expected an integer not below zero, got {seed!r}")
@@ -221,6 +226,9 @@ def random_factor(model: TorqueModel, columns: NDArray[np.intp], seed: int) -> A
     # Prismatic joints get the same numbers in metres, within a metre or so of their zero.
     q = rng.uniform(-np.pi, np.pi, shape)
     v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
+    if locked:
+        elastic = np.delete(np.arange(model.robot.n_joints), model.robot.core.axis_joints)
+        q[:, elastic] = v[:, elastic] = a[:, elastic] = 0.0
     factors, _ = _core.regression_factors(
         model.robot.core,
         q,

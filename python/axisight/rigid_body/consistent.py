@@ -18,6 +18,7 @@ from scipy import sparse
 
 from axisight import _core
 from axisight.errors import InputError
+from axisight.rigid_body.estimate import row_weights
 from axisight.rigid_body.regressor import TorqueModel, rows
 
 Array = NDArray[np.float64]
@@ -176,6 +177,7 @@ def identify_consistent(
     torque_nm: ArrayLike,
     *,
     torque_std_nm: ArrayLike = 1.0,
+    sample_weight: ArrayLike | None = None,
     prior: ArrayLike | None = None,
     prior_std: ArrayLike | None = None,
     margin: float = 1e-6,
@@ -190,6 +192,7 @@ def identify_consistent(
     q, v, a, torque_nm : as for :func:`identify_rigid_body`.
     torque_std_nm : standard deviation of the residual of each row, one number or (n_rows,) [Nm],
         as ``residual_std_nm`` of an unconstrained estimate gives it.
+    sample_weight : as for :func:`identify_rigid_body`.
     prior : (n_parameters,) what to stay close to; by default the values in the robot file.
     prior_std, margin, max_iterations : as for :func:`consistent_parameters`.
     threads : threads to use, 0 for all.
@@ -217,7 +220,7 @@ def identify_consistent(
         extras=model.extras,
         columns=list(range(p)),
         known=[0.0] * p,
-        weight=None,
+        weight=row_weights(sample_weight, (len(torque), model.n_rows)),
         blocks=1,
         threads=threads,
     )

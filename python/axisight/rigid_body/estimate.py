@@ -107,7 +107,7 @@ def identify_rigid_body(
     base = known_base(model, base, known)
     motion = model.motion(q, v, a)
     torque = rows("torque_nm", torque_nm, model.n_rows)
-    weight = _weights(sample_weight, (len(motion[0]), model.n_rows))
+    weight = row_weights(sample_weight, (len(motion[0]), model.n_rows))
     if len(torque) != len(motion[0]):
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
     if not torque.any():
@@ -298,7 +298,8 @@ def numbers(field: str, values: Mapping[str, float] | None) -> dict[str, float]:
     return out
 
 
-def _weights(value: ArrayLike | None, shape: tuple[int, int]) -> Array | None:
+def row_weights(value: ArrayLike | None, shape: tuple[int, int]) -> Array | None:
+    """Return checked weights of residuals, (n, n_rows), or None."""
     if value is None:
         return None
     x = np.asarray(value, dtype=np.float64)

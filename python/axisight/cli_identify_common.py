@@ -1,0 +1,91 @@
+"""What the commands ``axisight identify`` share: writing the robot, options with names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from axisight.cli_common import OUT
+from axisight.errors import InputError
+from axisight.robot import Robot
+from axisight.robot_file import Identified, Provenance, hash_file, sidecar_path, write_identified
+
+Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        "-o",
+        help="Robot file to write; NAME.identified.json beside it has standard errors, data "
+        "and settings.",
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+
+
+def refuse_in_the_way(out: Path | None, force: bool) -> None:
+    """Refuse files in the way before any work; raises InputError."""
+    for path in [] if out is None or force else [out, sidecar_path(out)]:
+        if path.exists():
+            raise InputError(f"--out: {path} exists; --force replaces it")
+
+
+def provenance(method: str, files: Sequence[Path], settings: Mapping[str, Any]) -> Provenance:
+    """Return where values come from: hashes of files, and the options that were given."""
+    count = Counter(path.name for path in files)
+    names = [path.name if count[path.name] == 1 else str(path) for path in files]
+    return Provenance(
+        f"axisight identify {method}",
+        {name: hash_file(path) for name, path in zip(names, files, strict=True)},
+        {name: value for name, value in settings.items() if value is not None},
+    )
+
+
+def write_robot(source: Robot, out: Path, found: Identified, *, force: bool) -> None:
+    """Write robot and sidecar and say so; raises InputError if they cannot be written."""
+    try:
+        sidecar = write_identified(source, out, found, overwrite=force)
+    except OSError as error:
+        raise InputError(f"--out: {out} cannot be written: {error}") from None
+    for path in (out, sidecar):
+        OUT.print(f"written: {path}", soft_wrap=True, highlight=False)
+
+
+def say(text: str) -> None:
+    """Print a text as it is."""
+    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
+    """Return the numbers in NAME=VALUE texts; raises InputError naming the option."""
+    out: dict[str, float] = {}
+    for text in given or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise InputError(f"{option}: expected NAME=VALUE, got {text!r}")
+        if name in out:
+            raise InputError(f"{option}: expected {name} once, got it twice")
+        (out[name],) = numbers(f"{option} {name}", value)
+    return out
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Return numbers with commas between; raises InputError naming the option."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
+
+
+def band(option: str, text: str | None) -> tuple[float, float] | None:
+    """Return two numbers; raises InputError naming the option."""
+    if text is None:
+        return None
+    found = numbers(option, text)
+    if len(found) != 2:
+        raise InputError(f"{option}: expected LOW,HIGH, got {text!r}")
+    return found[0], found[1]

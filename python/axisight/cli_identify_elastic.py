@@ -1,0 +1,174 @@
+"""The command ``axisight identify elastic``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, cast
+
+import numpy as np
+import typer
+import xarray as xr
+from rich.table import Table
+
+from axisight.cli_common import OUT, errors
+from axisight.cli_identify_common import (
+    Force,
+    Out,
+    numbers,
+    pairs,
+    provenance,
+    refuse_in_the_way,
+    say,
+    write_robot,
+)
+from axisight.errors import InputError
+from axisight.fitting import robot_parameters
+from axisight.frequency_fit import (
+    FrequencyFit,
+    FrequencyFitOptions,
+    fit_responses,
+    identified_responses,
+)
+from axisight.frequency_fit.measured import Sampling
+from axisight.frequency_fit.options import CRITERIA, Criterion
+from axisight.frf.interop import load_netcdf
+from axisight.robot import Robot, load_robot
+
+_USUAL = ("*.stiffness", "*.damping")
+_CONVERGED = ("loss_converged", "step_converged")
+POSE = "joint_angle_rad"
+"""Attribute of a response that holds its operating point."""
+
+
+def elastic_command(
+    robot: Annotated[str, typer.Argument(help="robot.toml or a preset: where the search starts.")],
+    responses: Annotated[
+        list[Path],
+        typer.Argument(help="Frequency responses, one per operating point (NetCDF, save_netcdf)."),
+    ],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Parameter to fit, by name or with wildcards (repeatable), e.g. "
+            "'axis*.stiffness'. Default: all stiffnesses and dampings."
+        ),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ANGLE,...",
+            help="Operating point of each response in turn: angles of the driven joints (rad). "
+            f"Default: the attribute {POSE} of the files.",
+        ),
+    ] = None,
+    out: Out = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE", help="Start of a parameter (repeatable). Default: the robot's."
+        ),
+    ] = None,
+    criterion: Annotated[
+        str, typer.Option(help=f"{', '.join(CRITERIA)}.")
+    ] = "weighted_log_least_squares",
+    sampling: Annotated[
+        str, typer.Option(help="zero_order_hold, as a sampled loop shows, or continuous.")
+    ] = "zero_order_hold",
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Hold back lines that the model misses (Huber).")
+    ] = False,
+    starts: Annotated[int, typer.Option(help="Searches, from random starts but the first.")] = 1,
+    seed: Annotated[int, typer.Option(help="Rules the random starts.")] = 0,
+    force: Force = False,
+) -> None:
+    """Stiffness and damping of gears and links from frequency responses at several poses.
+
+    Prints values with standard errors and 95 % intervals, and warnings. The exit status is 1 if the
+    search did not converge.
+    """
+    with errors():
+        refuse_in_the_way(out, force)
+        machine = load_robot(robot)
+        data = _responses(responses, at)
+        begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
+        options = FrequencyFitOptions(
+            criterion=cast(Criterion, criterion),
+            sampling=cast(Sampling, sampling),
+            loss="huber" if robust else "squared",
+            starts=starts,
+            seed=seed,
+        )
+        fit = fit_responses(machine, data, begin, options=options)
+        _show(fit)
+        if out is not None:
+            settings = {
+                "parameters": list(begin),
+                "start": begin,
+                "operating_points_rad": [list(angles) for angles, _ in data],
+                "criterion": criterion,
+                "sampling": sampling,
+                "robust": robust,
+                "starts": starts,
+                "seed": seed,
+            }
+            found = identified_responses(fit, provenance("elastic", responses, settings))
+            write_robot(machine, out, found, force=force)
+        if fit.status not in _CONVERGED:
+            raise typer.Exit(1)
+
+
+def _responses(
+    paths: Sequence[Path], at: Sequence[str] | None
+) -> list[tuple[list[float], xr.Dataset]]:
+    poses = [numbers("--at", text) for text in at or []]
+    if poses and len(poses) != len(paths):
+        raise InputError(f"--at: expected one for each of {len(paths)} responses, got {len(poses)}")
+    out = []
+    for i, path in enumerate(paths):
+        response = load_netcdf(path)
+        if not poses and POSE not in response.attrs:
+            raise InputError(
+                f"{path}: expected its operating point, in --at (once per response) or as the "
+                f"attribute {POSE}, got none"
+            )
+        pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
+        out.append((pose, response))
+    return out
+
+
+def _starts(robot: Robot, patterns: Sequence[str], given: dict[str, float]) -> dict[str, float]:
+    """Return the parameters that patterns name, in the order of the robot, with their starts."""
+    known = robot_parameters(robot)
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in known):
+            raise InputError(
+                f"--parameters: expected names or patterns of {', '.join(known)}, got {pattern!r}"
+            )
+    names = [name for name in known if any(fnmatchcase(name, p) for p in patterns)]
+    for name in given:
+        if name not in names:
+            raise InputError(f"--start: expected one of {', '.join(names)}, got {name!r}")
+    return {name: given.get(name, known[name]) for name in names}
+
+
+def _show(fit: FrequencyFit) -> None:
+    table = Table()
+    for title in ("parameter", "value", "std. error", "rel.", "95 % interval"):
+        table.add_column(title, justify="left" if title == "parameter" else "right")
+    for row in fit.table().itertuples():
+        table.add_row(
+            str(row.parameter),
+            f"{row.value:.6g}",
+            f"{row.std:.2g}",
+            f"{100 * cast(float, row.relative_std):.2g} %",
+            f"{row.lower:.5g} .. {row.upper:.5g}",
+        )
+    OUT.print(table)
+    say(
+        f"status {fit.status} after {fit.iterations} iterations, misfit {fit.misfit:.3g} (1 if "
+        f"model and uncertainty are right), standard errors from the {fit.std_from}"
+    )
+    for text in fit.warnings:
+        say(f"warning: {text}")

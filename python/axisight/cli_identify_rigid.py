@@ -1,0 +1,195 @@
+"""The command ``axisight identify rigid-body``."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+import xarray as xr
+from rich.table import Table
+
+from axisight.cli_common import OUT, errors
+from axisight.cli_identify_common import (
+    Columns,
+    Force,
+    Out,
+    pairs,
+    provenance,
+    refuse_in_the_way,
+    say,
+    write_robot,
+)
+from axisight.errors import IdentificationWarning, InputError, RobotError
+from axisight.logs import read_log
+from axisight.rigid_body import DriveTerms, LogIdentification, identify_logs
+from axisight.rigid_body.estimate import Method
+from axisight.robot import load_robot
+
+_FRICTION = ("viscous", "coulomb", "offset")
+_PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
+
+
+def rigid_body_command(
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="robot.toml or a preset: chain, gears, and the values of what motions do not show."
+        ),
+    ],
+    logs: Annotated[list[Path], typer.Argument(help="Motor logs to fit to.")],
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log that takes no part, for the torque errors (repeatable)."),
+    ] = None,
+    out: Out = None,
+    columns: Columns = None,
+    cutoff_hz: Annotated[
+        float,
+        typer.Option(help="Filter (Hz): well above the motion, well below the first resonance."),
+    ] = 10.0,
+    friction: Annotated[
+        str,
+        typer.Option(
+            metavar="TERM,...", help="Out of viscous, coulomb, offset, on every motor; or none."
+        ),
+    ] = "viscous,coulomb,offset",
+    rotors: Annotated[
+        bool, typer.Option("--rotors/--no-rotors", help="Estimate motor inertias.")
+    ] = True,
+    dead_band_rad_s: Annotated[
+        float, typer.Option(help="Motor speed below which Coulomb friction counts as zero.")
+    ] = 0.0,
+    reversal_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Time (s) around each turn of a motor that is left out: the filter smears "
+            "Coulomb friction there. Default: half a period of the cutoff."
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="ls, wls (axes weighted by their residuals) or tls.")
+    ] = "wls",
+    known: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Parameter held at a value (repeatable)."),
+    ] = None,
+    eliminate: Annotated[
+        float | None,
+        typer.Option(help="Set to zero what has a larger relative standard error, e.g. 0.3."),
+    ] = None,
+    group: Annotated[
+        bool,
+        typer.Option(
+            "--group", help="Go on with fewer combinations if motions do not separate all."
+        ),
+    ] = False,
+    consistent: Annotated[
+        bool,
+        typer.Option(
+            "--consistent", help="Only bodies that can exist, near those in the robot file."
+        ),
+    ] = False,
+    prior_share: Annotated[
+        float,
+        typer.Option(help="How near, with --consistent: share of each link's own size."),
+    ] = 1.0,
+    force: Force = False,
+) -> None:
+    """Masses, inertias and friction from logs of motor angles and torques, by regression.
+
+    Prints base parameters with standard errors, and torque errors on every log. --out writes a
+    robot file; most often it takes --consistent, since a fit alone may have bodies that cannot exist.
+    """
+    with errors():
+        refuse_in_the_way(out, force)
+        machine = load_robot(robot)
+        paths = [*logs, *(held_out or [])]
+        read = [read_log(path, columns, n_axes=machine.n_axes) for path in paths]
+        held = pairs("--known", known)
+        with warnings.catch_warnings():
+            # They are among the notes that are printed.
+            warnings.simplefilter("ignore", IdentificationWarning)
+            found = identify_logs(
+                machine,
+                read[: len(logs)],
+                held_out=read[len(logs) :],
+                cutoff_hz=cutoff_hz,
+                reversal_s=reversal_s,
+                terms=_terms(friction, rotors, dead_band_rad_s),
+                method=cast(Method, method),
+                known=held,
+                eliminate=eliminate,
+                deficient="group" if group else "raise",
+                consistent=consistent,
+                prior_share=prior_share,
+            )
+        _show(found)
+        failed = found.consistent is not None and found.consistent.status == "failed"
+        if out is not None and not failed:
+            settings = {
+                "cutoff_hz": cutoff_hz,
+                "reversal_s": reversal_s,
+                "friction": friction,
+                "rotors": rotors,
+                "dead_band_rad_s": dead_band_rad_s,
+                "method": method,
+                "known": held,
+                "eliminate": eliminate,
+                "group": group,
+                "consistent": consistent,
+                "prior_share": prior_share if consistent else None,
+                "held_out": [path.name for path in held_out or []],
+            }
+            try:
+                values = found.identified(provenance("rigid-body", paths, settings))
+                write_robot(machine, out, values, force=force)
+            except RobotError as error:
+                if consistent:
+                    raise
+                raise InputError(f"{error}; --consistent finds bodies that can exist") from None
+        if failed:
+            raise typer.Exit(1)
+
+
+def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
+    chosen = [] if friction == "none" else friction.split(",")
+    for term in chosen:
+        if term not in _FRICTION:
+            raise InputError(
+                f"--friction: expected some of {', '.join(_FRICTION)}, or none, got {term!r}"
+            )
+    return DriveTerms(
+        inertia="motor" if rotors else None,
+        viscous="motor" if "viscous" in chosen else None,
+        coulomb="motor" if "coulomb" in chosen else None,
+        offset="motor" if "offset" in chosen else None,
+        dead_band_rad_s=dead_band_rad_s,
+    )
+
+
+def _show(found: LogIdentification) -> None:
+    fitted = found.errors["log"].values[~found.errors["held_out"].values]
+    for name, motion in zip(fitted, found.motions, strict=True):
+        say(f"{name}: {motion}")
+    say(str(found.estimate))
+    if found.consistent is not None:
+        say(f"bodies that can exist: {found.consistent.status} {found.consistent.advice}".rstrip())
+    for which in found.errors["parameters"].values:
+        OUT.print(_error_table(found.errors.sel(parameters=which), _PARAMETERS[str(which)]))
+
+
+def _error_table(of: xr.Dataset, title: str) -> Table:
+    table = Table("log", title=f"torque error, {title}")
+    for axis in of["axis"].values:
+        table.add_column(f"axis {axis}", justify="right")
+    for i in range(of.sizes["log"]):
+        one = of.isel(log=i)
+        name = str(one["log"].item()) + (" (held out)" if one["held_out"].item() else "")
+        cells = [
+            f"{rms:.3g} Nm, {100 * share:.3g} %"
+            for rms, share in zip(one["rms_nm"].values, one["relative_error"].values, strict=True)
+        ]
+        table.add_row(name, *cells)
+    return table

@@ -1,0 +1,286 @@
+"""Rigid-body identification from motor logs to a robot file, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.logs import Log
+from axisight.rigid_body.base import base_parameters
+from axisight.rigid_body.consistent import (
+    ConsistentParameters,
+    identify_consistent,
+    prior_spread,
+)
+from axisight.rigid_body.coupling import MotorCoupling
+from axisight.rigid_body.estimate import Method, identify_rigid_body
+from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
+from axisight.rigid_body.motion import MotionEstimate, estimate_motion
+from axisight.rigid_body.regressor import TorqueModel
+from axisight.rigid_body.result import RigidBodyEstimate
+from axisight.rigid_body.robot_values import identified_bodies
+from axisight.robot import Robot
+from axisight.robot_file import Identified, Provenance, identified
+from axisight.robot_sidecar import known as known_number
+from axisight.robot_values import noted
+
+Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class LogIdentification:
+    """What :func:`identify_logs` found.
+
+    estimate
+        Base parameters with standard errors.
+    consistent
+        Parameters of bodies that can exist; None if they were not asked for.
+    motions
+        Of the logs fitted: band, decimation, dropped samples.
+    errors
+        ``rms_nm`` [Nm] and ``relative_error`` (rms over that of the torque) over
+        (parameters: ``estimate`` and, where asked for, ``consistent``; log; axis, from 1). The
+        coordinate ``held_out`` (log) tells which logs took no part.
+    """
+
+    estimate: RigidBodyEstimate
+    consistent: ConsistentParameters | None
+    motions: tuple[MotionEstimate, ...]
+    errors: xr.Dataset
+
+    def identified(self, provenance: Provenance) -> Identified:
+        """Return the values for a robot file, those of bodies that can exist where there are.
+
+        What the motions do not show keeps the value it has in the file and is left out. Motor-side
+        parameters that stand for themselves have standard errors (not with ``consistent``, which
+        mixes in a prior); of links only combinations have: the table of base parameters is in
+        the settings of ``provenance``, torque errors with it, findings in the notes. Raises InputError as
+        `identified_bodies` does: the estimate alone may have masses no body has.
+        """
+        model = self.estimate.model
+        theta = self.estimate.standard() if self.consistent is None else self.consistent.theta
+        notes = [str(finding) for finding in self.estimate.findings]
+        if self.consistent is not None:
+            notes.insert(0, f"bodies that can exist: {self.consistent.status}")
+            notes += [self.consistent.advice] if self.consistent.advice else []
+        settings = {**provenance.settings, "base_parameters": self._base_table()}
+        settings["torque_error"] = self._error_table()
+        source = noted(replace(provenance, settings=settings), notes)
+        found = identified_bodies(model, theta, source)
+        before = identified_bodies(model, model.nominal, source).values
+        size = np.abs(before).max(initial=1e-300)
+        same = np.isclose(found.values, before, rtol=1e-9, atol=1e-12 * size)
+        errors = self._lone_errors()
+        kept = [
+            (name, float(value), float(error))
+            for name, value, error, unchanged in zip(
+                found.names, found.values, errors, same, strict=True
+            )
+            if "@" in name or np.isfinite(error) or not unchanged
+        ]
+        return identified(
+            {name: value for name, value, _ in kept},
+            source,
+            standard_errors={name: error for name, _, error in kept if np.isfinite(error)},
+            effects=found.effects,
+        )
+
+    def _lone_errors(self) -> Array:
+        """Standard errors (n_parameters,) of drive parameters that stand for themselves, else NaN."""
+        estimate, model = self.estimate, self.estimate.model
+        out = np.full(model.n_parameters, np.nan)
+        if self.consistent is not None:
+            return out
+        for name, column, row, error in zip(
+            estimate.names,
+            estimate.base.columns,
+            estimate.base.matrix,
+            estimate.standard_error,
+            strict=True,
+        ):
+            drive = model.columns[column].extra is not None
+            if drive and np.count_nonzero(row) == 1 and name not in estimate.eliminated:
+                out[column] = error
+        return out
+
+    def _base_table(self) -> list[dict[str, Any]]:
+        found = self.estimate
+        return [
+            {"combination": text, "value": value, "standard_error": error, "unit": unit}
+            for text, value, error, unit in zip(
+                found.base.combinations,
+                found.values.tolist(),
+                found.standard_error.tolist(),
+                found.base.units,
+                strict=True,
+            )
+        ]
+
+    def _error_table(self) -> list[dict[str, Any]]:
+        last = self.errors.isel(parameters=-1)
+        return [
+            {
+                "log": str(one["log"].item()),
+                "held_out": bool(one["held_out"].item()),
+                "rms_nm": one["rms_nm"].values.tolist(),
+                "relative_error": [known_number(x) for x in one["relative_error"].values],
+            }
+            for one in (last.isel(log=i) for i in range(last.sizes["log"]))
+        ]
+
+
+def identify_logs(
+    robot: Robot,
+    logs: Sequence[Log] | Log,
+    *,
+    held_out: Sequence[Log] = (),
+    cutoff_hz: float = 10.0,
+    reversal_s: float | None = None,
+    terms: DriveTerms = USUAL_TERMS,
+    coupling: MotorCoupling | None = None,
+    method: Method = "wls",
+    known: Mapping[str, float] | None = None,
+    eliminate: float | None = None,
+    deficient: Literal["raise", "group"] = "raise",
+    consistent: bool = False,
+    prior_share: float = 1.0,
+) -> LogIdentification:
+    """Identify masses, inertias and friction from motor logs; gears count as rigid.
+
+    Every log goes through :func:`estimate_motion`, motor angles become joint angles by the gears,
+    :func:`identify_rigid_body` regresses all logs together, on the motor side.
+
+    Parameters
+    ----------
+    robot : chain and gears; its masses and inertias where the motions do not tell.
+        Elastic joints are taken at angle zero.
+    logs, held_out : to fit to, and to judge by only.
+    cutoff_hz : of the filter [Hz], well above the motion and well below the first resonance.
+    reversal_s : how long before and after a motor turns back its torque is left out of the fit [s].
+        The filter smears the step of Coulomb friction there, and the regressor has it sharp; default
+        half a period of the cutoff, 0 for none.
+    terms : of the drives, see :class:`DriveTerms`.
+    coupling : of the motors; default the gear ratios of the robot.
+    method, known, eliminate, deficient : as for :func:`identify_rigid_body`.
+    consistent : also find bodies that can exist (:func:`identify_consistent`), with the values
+        of the robot as a prior.
+    prior_share : standard deviation of that prior as a share of each link's size, see
+        :func:`prior_spread`.
+
+    Warns with IdentificationWarning of what makes the estimate doubtful. Raises InputError
+    naming the log or option, IdentifiabilityError for motions that do not determine the parameters.
+
+    """
+    given = [logs] if isinstance(logs, Log) else list(logs)
+    if not given:
+        raise InputError("logs: expected at least one, got none")
+    model = TorqueModel(robot, terms=terms, side="motor", coupling=coupling)
+    motions = [_estimate(log, robot, cutoff_hz) for log in given]
+    margin = 0.5 / cutoff_hz if reversal_s is None else reversal_s
+    if isinstance(margin, bool) or not (np.isfinite(margin) and margin >= 0):
+        raise InputError(f"reversal_s: expected a number not below zero, got {reversal_s!r}")
+    weight = np.concatenate([_away_from_reversals(motion, margin) for motion in motions])
+    joint = [_joint_motion(model, motion) for motion in motions]
+    q, v, a, torque = (np.concatenate(parts) for parts in zip(*joint, strict=True))
+    estimate = identify_rigid_body(
+        model,
+        q,
+        v,
+        a,
+        torque,
+        sample_weight=weight,
+        base=base_parameters(model, known=known or (), locked=True),
+        method=method,
+        known=known,
+        eliminate=eliminate,
+        deficient=deficient,
+    )
+    possible = None
+    if consistent:
+        possible = identify_consistent(
+            model,
+            q,
+            v,
+            a,
+            torque,
+            sample_weight=weight,
+            torque_std_nm=estimate.residual_std_nm,
+            prior_std=prior_spread(model, prior_share),
+        )
+    joint += [_joint_motion(model, _estimate(log, robot, cutoff_hz)) for log in held_out]
+    thetas = {"estimate": estimate.standard()}
+    if possible is not None:
+        thetas["consistent"] = possible.theta
+    names = [log.name for log in (*given, *held_out)]
+    return LogIdentification(
+        estimate, possible, tuple(motions), _errors(model, thetas, joint, names, len(given))
+    )
+
+
+def _estimate(log: Log, robot: Robot, cutoff_hz: float) -> MotionEstimate:
+    if not isinstance(log, Log):
+        raise InputError(f"logs: expected Logs, got {type(log).__name__}")
+    if log.n_axes != robot.n_axes:
+        raise InputError(f"{log.name}: expected {robot.n_axes} axes, got {log.n_axes}")
+    try:
+        return estimate_motion(
+            log.position_rad, log.torque_nm, sample_time_s=log.sample_time_s, cutoff_hz=cutoff_hz
+        )
+    except InputError as error:
+        raise InputError(f"{log.name}: {error}") from None
+
+
+def _joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
+    """Motion of all joints and motor torques; elastic joints stand still at zero."""
+    parts = []
+    for motor in (motion.position_rad, motion.velocity_rad_s, motion.acceleration_rad_s2):
+        full = np.zeros((motion.n_samples, model.robot.n_joints))
+        full[:, model.robot.core.axis_joints] = model.coupling.joint_motion(motor)
+        parts.append(full)
+    torque = np.zeros((0, 0)) if motion.torque_nm is None else motion.torque_nm
+    return parts[0], parts[1], parts[2], torque
+
+
+def _away_from_reversals(motion: MotionEstimate, margin_s: float) -> Array:
+    """One, and zero within ``margin_s`` of a change of sign of the motor velocity, (n, n_axes)."""
+    out = np.ones_like(motion.velocity_rad_s)
+    if margin_s > 0:
+        reach = int(np.ceil(margin_s / motion.sample_time_s))
+        turns = np.diff(np.sign(motion.velocity_rad_s), axis=0) != 0
+        for row, axis in zip(*np.nonzero(turns), strict=True):
+            out[max(row + 1 - reach, 0) : row + 1 + reach, axis] = 0.0
+    return out
+
+
+def _errors(
+    model: TorqueModel,
+    thetas: Mapping[str, Array],
+    motions: Sequence[Motion],
+    names: Sequence[str],
+    fitted: int,
+) -> xr.Dataset:
+    shape = (len(thetas), len(motions), model.n_rows)
+    rms, relative = np.empty(shape), np.full(shape, np.nan)
+    for i, (q, v, a, torque) in enumerate(motions):
+        matrix = model.matrix(q, v, a)
+        size = np.sqrt((torque**2).mean(axis=0))
+        for k, theta in enumerate(thetas.values()):
+            rms[k, i] = np.sqrt(((matrix @ theta - torque) ** 2).mean(axis=0))
+            np.divide(rms[k, i], size, out=relative[k, i], where=size > 0)
+    dims = ("parameters", "log", "axis")
+    return xr.Dataset(
+        {"rms_nm": (dims, rms, {"units": "Nm"}), "relative_error": (dims, relative)},
+        coords={
+            "parameters": list(thetas),
+            "log": list(names),
+            "axis": model.row_labels,
+            "held_out": ("log", np.arange(len(motions)) >= fitted),
+        },
+    )
