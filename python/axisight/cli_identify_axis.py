@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+import axisight
 from axisight.cli_common import errors
 from axisight.cli_identify_common import (
     Columns,
@@ -21,10 +22,11 @@ from axisight.cli_identify_common import (
     write_robot,
 )
 from axisight.errors import InputError
-from axisight.graybox import AxisModel, identified_axis, identify_axis
-from axisight.graybox.prediction_error import NoiseKind
 from axisight.logs import read_log
 from axisight.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    from axisight.graybox.prediction_error import NoiseKind
 
 
 def axis_command(
@@ -103,12 +105,12 @@ def axis_command(
         n_axes = None if machine is None else machine.n_axes
         files = [slow, *broadband]
         logs = [read_log(path, columns, n_axes=n_axes) for path in files]
-        found = identify_axis(
+        found = axisight.graybox.identify_axis(
             logs[0],
             logs[1:],
             gear_ratio=ratio,
             axis=axis,
-            model=AxisModel(
+            model=axisight.graybox.AxisModel(
                 n_masses=masses,
                 gear_ratio=ratio,
                 stribeck=stribeck,
@@ -118,7 +120,7 @@ def axis_command(
                 output="velocity_difference",
             ),
             fixed=fixed or [],
-            noise_model=cast(NoiseKind, noise_model),
+            noise_model=cast("NoiseKind", noise_model),
             closed_loop=not open_loop,
             period_s=period_s,
             lines=_lines(band_hz, period_s),
@@ -138,13 +140,16 @@ def axis_command(
                 "notch_band_hz": notch_band_hz,
                 "plateau_from_hz": plateau_from_hz,
                 "masses": masses,
+                "stribeck": stribeck,
+                "backlash": backlash,
+                "offset": offset,
                 "smoothing_rad_s": smoothing_rad_s,
                 "fixed": fixed,
                 "noise_model": noise_model,
                 "closed_loop": not open_loop,
             }
             source = provenance("axis", files, settings)
-            values = identified_axis(found.fit, machine, source, axis=axis)
+            values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
             write_robot(machine, out, values, force=force)
             say(values.provenance.notes)
         if not found.fit.converged:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import numpy as np
 import typer
 import xarray as xr
 from rich.table import Table
 
+import axisight
 from axisight.cli_common import OUT, errors
 from axisight.cli_identify_common import (
     Force,
@@ -25,16 +26,13 @@ from axisight.cli_identify_common import (
 )
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
-from axisight.frequency_fit import (
-    FrequencyFit,
-    FrequencyFitOptions,
-    fit_responses,
-    identified_responses,
-)
-from axisight.frequency_fit.measured import Sampling
-from axisight.frequency_fit.options import CRITERIA, Criterion
 from axisight.frf.interop import load_netcdf
 from axisight.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    from axisight.frequency_fit import FrequencyFit
+    from axisight.frequency_fit.measured import Sampling
+    from axisight.frequency_fit.options import Criterion
 
 _USUAL = ("*.stiffness", "*.damping")
 _CONVERGED = ("loss_converged", "step_converged")
@@ -71,7 +69,10 @@ def elastic_command(
         ),
     ] = None,
     criterion: Annotated[
-        str, typer.Option(help=f"{', '.join(CRITERIA)}.")
+        str,
+        typer.Option(
+            help="(weighted_)log_least_squares compares logarithms, (weighted_)least_squares values."
+        ),
     ] = "weighted_log_least_squares",
     sampling: Annotated[
         str, typer.Option(help="zero_order_hold, as a sampled loop shows, or continuous.")
@@ -93,14 +94,14 @@ def elastic_command(
         machine = load_robot(robot)
         data = _responses(responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
-        options = FrequencyFitOptions(
-            criterion=cast(Criterion, criterion),
-            sampling=cast(Sampling, sampling),
+        options = axisight.frequency_fit.FrequencyFitOptions(
+            criterion=cast("Criterion", criterion),
+            sampling=cast("Sampling", sampling),
             loss="huber" if robust else "squared",
             starts=starts,
             seed=seed,
         )
-        fit = fit_responses(machine, data, begin, options=options)
+        fit = axisight.frequency_fit.fit_responses(machine, data, begin, options=options)
         _show(fit)
         if out is not None:
             settings = {
@@ -113,7 +114,8 @@ def elastic_command(
                 "starts": starts,
                 "seed": seed,
             }
-            found = identified_responses(fit, provenance("elastic", responses, settings))
+            source = provenance("elastic", responses, settings)
+            found = axisight.frequency_fit.identified_responses(fit, source)
             write_robot(machine, out, found, force=force)
         if fit.status not in _CONVERGED:
             raise typer.Exit(1)

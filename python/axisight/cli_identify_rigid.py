@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Annotated, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 import xarray as xr
 from rich.table import Table
 
+import axisight
 from axisight.cli_common import OUT, errors
 from axisight.cli_identify_common import (
     Columns,
@@ -23,9 +24,11 @@ from axisight.cli_identify_common import (
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.logs import read_log
-from axisight.rigid_body import DriveTerms, LogIdentification, identify_logs
-from axisight.rigid_body.estimate import Method
 from axisight.robot import load_robot
+
+if TYPE_CHECKING:
+    from axisight.rigid_body import DriveTerms, LogIdentification
+    from axisight.rigid_body.estimate import Method
 
 _FRICTION = ("viscous", "coulomb", "offset")
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
@@ -91,6 +94,9 @@ def rigid_body_command(
             "--consistent", help="Only bodies that can exist, near those in the robot file."
         ),
     ] = False,
+    combinations: Annotated[
+        bool, typer.Option("--combinations", help="Say what each base parameter is made of.")
+    ] = False,
     prior_share: Annotated[
         float,
         typer.Option(help="How near, with --consistent: share of each link's own size."),
@@ -111,20 +117,22 @@ def rigid_body_command(
         with warnings.catch_warnings():
             # They are among the notes that are printed.
             warnings.simplefilter("ignore", IdentificationWarning)
-            found = identify_logs(
+            found = axisight.rigid_body.identify_logs(
                 machine,
                 read[: len(logs)],
                 held_out=read[len(logs) :],
                 cutoff_hz=cutoff_hz,
                 reversal_s=reversal_s,
                 terms=_terms(friction, rotors, dead_band_rad_s),
-                method=cast(Method, method),
+                method=cast("Method", method),
                 known=held,
                 eliminate=eliminate,
                 deficient="group" if group else "raise",
                 consistent=consistent,
                 prior_share=prior_share,
             )
+        if combinations:
+            say(str(found.estimate.base))
         _show(found)
         failed = found.consistent is not None and found.consistent.status == "failed"
         if out is not None and not failed:
@@ -160,7 +168,7 @@ def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
             raise InputError(
                 f"--friction: expected some of {', '.join(_FRICTION)}, or none, got {term!r}"
             )
-    return DriveTerms(
+    return axisight.rigid_body.DriveTerms(
         inertia="motor" if rotors else None,
         viscous="motor" if "viscous" in chosen else None,
         coulomb="motor" if "coulomb" in chosen else None,

@@ -208,7 +208,8 @@ def _effects(
     ripple = {f"a_{n:g}": f"cosine_{i}_nm" for i, n in enumerate(orders, 1)}
     ripple |= {f"b_{n:g}": f"sine_{i}_nm" for i, n in enumerate(orders, 1)}
     table.append(("torque_ripple", ripple, {f"order_{i}": n for i, n in enumerate(orders, 1)}))
-    effects, owner = [], {}
+    effects: list[Effect] = []
+    owner: dict[str, str] = {}
     for name, places, shape in table:
         used = {n: p for n, p in places.items() if n in values}
         if not any(n in fit.free or values[n] for n in used if n != "v_s"):
@@ -236,7 +237,7 @@ def _unplaced(
         variance = slopes[p.name][used] @ spread[np.ix_(used, used)] @ slopes[p.name][used]
         out[p.name] = {
             "value": float(values[p.name]),
-            "standard_error": known(np.sqrt(variance)) if used.size else None,
+            "standard_error": known(float(np.sqrt(variance))) if used.size else None,
             "unit": p.unit,
             "meaning": p.meaning,
         }

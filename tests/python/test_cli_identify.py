@@ -1,0 +1,312 @@
+"""``axisight identify``: each command from files to a robot file, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from frequency_fit_data import LINES_HZ, POSES
+from frequency_fit_data import ROBOT as ELASTIC
+from rigid_body_data import robot_of, three_axes
+from test_identify_logs import motor_log
+from typer.testing import CliRunner
+
+from axisight import excitation, load_robot, robot_parameters, simulate
+from axisight.cli import app
+from axisight.frequency_fit import model_response
+from axisight.frf import frequency_response
+from axisight.frf.interop import save_netcdf
+from axisight.robot_file import hash_file, load_identified
+
+
+def run(*arguments: object, code: int = 0) -> str:
+    result = CliRunner().invoke(app, ["identify", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    return " ".join(result.output.split())
+
+
+def write_log(path: Path, position, torque, step_s, reference=None) -> Path:
+    data = {"time_s": step_s * np.arange(len(position))}
+    for i in range(position.shape[1]):
+        if reference is not None:
+            data[f"velocity_ref_{i + 1}"] = reference[:, i]
+        data[f"torque_cmd_{i + 1}"] = torque[:, i]
+        data[f"position_{i + 1}"] = position[:, i]
+    pd.DataFrame(data).to_parquet(path, index=False)
+    return path
+
+
+def test_help_names_the_commands() -> None:
+    text = run("--help")
+    for name in ("rigid-body", "axis", "elastic"):
+        assert name in text
+        assert "robot" in run(name, "--help")
+
+
+# Rigid bodies.
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("rigid")
+    (folder / "robot.toml").write_text(three_axes())
+    for seed in (1, 2, 3):
+        log = motor_log(robot_of(three_axes()), seed, n=6000, noise=0.01)
+        write_log(folder / f"run{seed}.parquet", log.position_rad, log.torque_nm, 1e-3)
+    return folder
+
+
+def test_rigid_body_prints_and_writes(rigid, tmp_path: Path) -> None:
+    out = tmp_path / "found.toml"
+    first, second, third = (rigid / f"run{i}.parquet" for i in (1, 2, 3))
+    options = ("--held-out", third, "--consistent", "--prior-share", 0.5, "--combinations")
+    text = run("rigid-body", rigid / "robot.toml", first, second, *options, "-o", out)
+    for words in (
+        "run1: ", "samples every", "axis2.coulomb_friction", "axis1.inertia_zz +", "std. error",
+        "run3 (held out)", "torque error, least squares", "torque error, bodies that can exist",
+        "written:",
+    ):  # fmt: skip
+        assert words in text
+    back = load_identified(out)
+    assert back.provenance.method == "axisight identify rigid-body"
+    assert back.provenance.data == {p.name: hash_file(p) for p in (first, second, third)}
+    settings = back.provenance.settings
+    assert settings["prior_share"] == 0.5 and settings["held_out"] == ["run3.parquet"]
+    assert "reversal_s" not in settings
+    frictions = [e for e in back.effects if e.name == "coulomb_friction"]
+    np.testing.assert_allclose([e.parameters["coulomb_nm"] for e in frictions], 0.4, rtol=0.05)
+    held_out = settings["torque_error"][2]
+    assert held_out["held_out"] and max(held_out["relative_error"]) < 0.05
+    # Files in the way are told before any work, and kept.
+    before = out.read_text()
+    assert "--force replaces it" in run("rigid-body", "none", first, "-o", out, code=2)
+    assert out.read_text() == before
+    run("rigid-body", rigid / "robot.toml", first, second, "--consistent", "-o", out, "--force")
+    assert load_identified(out).provenance.settings["torque_error"][1]["log"] == "run2"
+
+
+def test_rigid_body_options_reach_the_regression(rigid) -> None:
+    first = rigid / "run1.parquet"
+    text = run(
+        "rigid-body", rigid / "robot.toml", first, "--friction", "viscous", "--no-rotors",
+        "--method", "ls", "--known", "axis3.mass_x=1.5", "--cutoff-hz", 8,
+    )  # fmt: skip
+    assert "axis1.viscous_friction" in text
+    for name in ("coulomb", "offset", "motor_inertia", "axis3.mass_x"):
+        assert name not in text
+    assert "set to zero" in run("rigid-body", rigid / "robot.toml", first, "--eliminate", 0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--friction", "sticky"], ["--friction", "viscous, coulomb, offset", "sticky"]),
+        (["--known", "axis1.mass"], ["--known", "NAME=VALUE"]),
+        (["--known", "axis1.mass=heavy"], ["--known axis1.mass", "numbers", "heavy"]),
+        (["--known", "a=1", "--known", "a=2"], ["--known", "a once"]),
+        (["--known", "axis9.mass=1"], ["known", "axis9.mass"]),
+        (["--method", "guess"], ["method", "ls, wls, tls", "guess"]),
+        (["--cutoff-hz", "1e4"], ["run1", "cutoff_hz", "Nyquist"]),
+        (["--held-out", "none.parquet"], ["none.parquet"]),
+        (["--reversal-s", "-1"], ["reversal_s"]),
+        (["--eliminate", "0"], ["eliminate", "positive"]),
+        (["-o", "no_folder_can/\0be.toml"], ["--out"]),
+    ],
+)
+def test_rigid_body_refuses_by_name(rigid, arguments, words, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    first = rigid / "run1.parquet"
+    text = run("rigid-body", rigid / "robot.toml", first, *arguments, code=2)
+    for word in words:
+        assert word in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_impossible_bodies_point_to_consistent(rigid, tmp_path: Path) -> None:
+    frame = pd.read_parquet(rigid / "run1.parquet")
+    frame["torque_cmd_2"] *= -1
+    frame.to_parquet(tmp_path / "wrong.parquet", index=False)
+    out = tmp_path / "out.toml"
+    wrong = tmp_path / "wrong.parquet"
+    text = run("rigid-body", rigid / "robot.toml", wrong, "-o", out, code=2)
+    assert "--consistent finds bodies that can exist" in text
+    assert not out.exists()
+
+
+# One axis.
+
+
+@pytest.fixture(scope="module")
+def axis_logs(tmp_path_factory) -> list[Path]:
+    """A triangle and two multisines on a square wave, two periods of 2.5 s each."""
+    folder = tmp_path_factory.mktemp("axis")
+    robot = load_robot("two_mass_axis")
+    step = robot.sample_time_s
+    references = [np.tile(excitation.triangle(2.5, step, amplitude=40.0).period, 2)]
+    for seed, (peak, level) in enumerate([(5.0, 8.0), (10.0, 12.0)]):
+        tones = excitation.multisine(2.5, step, band_hz=(1, 40), run=seed).scaled(peak=peak)
+        references.append(
+            np.tile(tones.period + excitation.square(2.5, step, amplitude=level).period, 2)
+        )
+    out = []
+    for i, reference in enumerate(references):
+        given = np.reshape(reference, (-1, 1))
+        sim = simulate(robot, given, noise_seed=0, run=i)
+        position, torque = sim["position_rad"].values, sim["torque_cmd_nm"].values
+        out.append(write_log(folder / f"axis{i}.parquet", position, torque, step, given))
+    return out
+
+
+LINES = ("--period-s", 2.5, "--band-hz", "2,40", "--drop-periods", 1)
+
+
+def test_axis_reports_and_writes(axis_logs, tmp_path: Path) -> None:
+    out = tmp_path / "axis.toml"
+    text = run("axis", *axis_logs, "--robot", "two_mass_axis", *LINES, "-o", out)
+    for words in ("Step 1", "Step 2, axis1", "Step 3", "J_m", "residual", "not written: J_a"):
+        assert words in text
+    back = load_identified(out)
+    want, got = robot_parameters(load_robot("two_mass_axis")), robot_parameters(back.robot)
+    # The preset rounds the sign that the fit has sharp; that is all that differs.
+    for quantity in ("stiffness", "damping", "motor_inertia", "viscous_friction"):
+        name = f"axis1.{quantity}"
+        assert got[name] != want[name] and got[name] == pytest.approx(want[name], rel=0.02)
+    assert {e.label for e in back.effects} == {"nonlinear_stiffness@1", "coulomb_friction@1"}
+    assert list(back.provenance.data) == [path.name for path in axis_logs]
+    assert back.provenance.settings["band_hz"] == "2,40"
+
+
+def test_axis_options_reach_the_fit(axis_logs) -> None:
+    text = run(
+        "axis", *axis_logs, "--gear-ratio", 1 / 224.3, *LINES, "--offset", "--fixed", "k3",
+        "--smoothing-rad-s", 0.01,
+    )  # fmt: skip
+    third = text[text.index("Step 3") :]
+    assert "u_0" in third and "k3" not in third[: third.index("status")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], ["--gear-ratio", "--robot"]),
+        (["--gear-ratio", "-2"], ["gear_ratio", "positive"]),
+        (["--gear-ratio", "0.004", "-o", "x.toml"], ["--out", "--robot"]),
+        (["--robot", "two_mass_axis", "--axis", "2"], ["--axis", "1 to 1", "2"]),
+        (["--robot", "irb6600_like"], ["axis0.parquet", "3 axes"]),
+        (["--robot", "two_mass_axis", "--band-hz", "1,40"], ["--band-hz", "--period-s"]),
+        (["--robot", "two_mass_axis", "--period-s", "2.5", "--band-hz", "1"], ["LOW,HIGH"]),
+        (["--robot", "two_mass_axis", "--period-s", "2.5", "--band-hz", "9,1"], ["LOW <= HIGH"]),
+        (["--robot", "two_mass_axis", "--notch-band-hz", "a,b"], ["--notch-band-hz", "numbers"]),
+        (["--robot", "two_mass_axis", "--masses", "9"], ["n_masses", "2 to 4"]),
+    ],
+)
+def test_axis_refuses_by_name(axis_logs, arguments, words, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = run("axis", *axis_logs, *arguments, code=2)
+    for word in words:
+        assert word in text
+    assert not list(tmp_path.iterdir())
+
+
+# Elastic joints.
+
+
+@pytest.fixture(scope="module")
+def responses(tmp_path_factory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("responses")
+    rng = np.random.default_rng(0)
+    out = []
+    for i, pose in enumerate(POSES):
+        g = model_response(ELASTIC, LINES_HZ, pose, quantity="acceleration").values
+        std = 0.05 * np.abs(g)
+        error = rng.normal(size=(2, *g.shape)) / np.sqrt(2)
+        response = frequency_response(
+            LINES_HZ,
+            g + std * (error[0] + 1j * error[1]),
+            estimator="test",
+            variance=std**2,
+            output_unit="rad/s^2",
+            attrs={"joint_angle_rad": list(pose)},
+        )
+        out.append(folder / f"pose{i}.nc")
+        save_netcdf(response, out[-1])
+    return out
+
+
+def test_elastic_fits_and_writes(responses, tmp_path: Path) -> None:
+    out = tmp_path / "elastic.toml"
+    start = ("--start", "axis1.stiffness=1e6")
+    text = run(
+        "elastic", "irb6600_like", *responses, "--parameters", "axis?.stiffness",
+        "--parameters", "axis2_yaw.damping", *start, "-o", out,
+    )  # fmt: skip
+    assert "axis1.stiffness" in text and "misfit" in text and "converged" in text
+    back = load_identified(out)
+    names = ("axis1.stiffness", "axis2.stiffness", "axis2_yaw.damping", "axis3.stiffness")
+    assert back.names == names
+    want = robot_parameters(ELASTIC)
+    score = (back.values - [want[n] for n in names]) / back.standard_errors
+    assert np.abs(score).max() < 4
+    given = back.provenance.settings
+    assert given["start"]["axis1.stiffness"] == 1e6
+    np.testing.assert_array_equal(given["operating_points_rad"], POSES)
+    again = run("elastic", "irb6600_like", *responses, *start, "--parameters", names[0])
+    assert "axis2" not in again
+
+
+def test_elastic_takes_poses_from_options(responses, tmp_path: Path) -> None:
+    at = [x for pose in POSES for x in ("--at", ",".join(map(str, pose)))]
+    out = tmp_path / "r.toml"
+    swapped = at[2:] + at[:2]
+    one = ("--parameters", "axis1.stiffness", "--criterion", "log_least_squares", "--robust")
+    right = run("elastic", "irb6600_like", *responses, *one, *at, "-o", out)
+    assert json.loads((tmp_path / "r.identified.json").read_text())["provenance"]["settings"][
+        "robust"
+    ]
+    assert right != run("elastic", "irb6600_like", *responses, *one, *swapped)
+
+
+def test_elastic_that_does_not_converge_says_so(responses, monkeypatch) -> None:
+    import axisight  # noqa: PLC0415
+
+    real = axisight.frequency_fit.FrequencyFitOptions
+    monkeypatch.setattr(
+        axisight.frequency_fit,
+        "FrequencyFitOptions",
+        lambda **options: real(**options, max_iterations=1),
+    )
+    text = run("elastic", "irb6600_like", *responses, "--start", "axis1.stiffness=4e5", code=1)
+    assert "max_iterations" in text and "warning: stopped at the iteration limit" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--parameters", "axis9.*"], ["--parameters", "axis1.stiffness", "axis9.*"]),
+        (["--start", "axis1.mass=3"], ["--start", "axis1.stiffness", "axis1.mass"]),
+        (["--start", "axis1.stiffness=soft"], ["--start axis1.stiffness", "numbers", "soft"]),
+        (["--at", "0,0,0"], ["--at", "2 responses", "got 1"]),
+        (["--at", "0,0", "--at", "0,0"], ["joint_angle_rad", "3 angles", "2"]),
+        (["--at", "0,x,0", "--at", "0,0,0"], ["--at", "numbers", "0,x,0"]),
+        (["--criterion", "best"], ["criterion", "best"]),
+        (["--sampling", "none"], ["sampling", "continuous"]),
+        (["--starts", "0"], ["starts", "0"]),
+    ],
+)
+def test_elastic_refuses_by_name(responses, arguments, words) -> None:
+    text = run("elastic", "irb6600_like", *responses, *arguments, code=2)
+    for word in words:
+        assert word in text
+
+
+def test_elastic_needs_responses_with_a_place(responses, tmp_path: Path) -> None:
+    assert "expected a NetCDF file" in run("elastic", "irb6600_like", tmp_path / "no.nc", code=2)
+    g = model_response(ELASTIC, LINES_HZ, POSES[0], quantity="acceleration").values
+    bare = frequency_response(LINES_HZ, g, estimator="test", output_unit="rad/s^2")
+    save_netcdf(bare, tmp_path / "bare.nc")
+    text = run("elastic", "irb6600_like", tmp_path / "bare.nc", code=2)
+    assert "--at" in text and "joint_angle_rad" in text
+    text = run("elastic", "irb6600_like", tmp_path / "bare.nc", "--at", "0,0.3,-0.4", code=2)
+    assert "expected a variance" in text
