@@ -92,7 +92,7 @@ def elastic_command(
     with errors():
         refuse_in_the_way(out, force)
         machine = load_robot(robot)
-        data = _responses(responses, at)
+        data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
         options = axisight.frequency_fit.FrequencyFitOptions(
             criterion=cast("Criterion", criterion),
@@ -122,7 +122,7 @@ def elastic_command(
 
 
 def _responses(
-    paths: Sequence[Path], at: Sequence[str] | None
+    robot: Robot, paths: Sequence[Path], at: Sequence[str] | None
 ) -> list[tuple[list[float], xr.Dataset]]:
     poses = [numbers("--at", text) for text in at or []]
     if poses and len(poses) != len(paths):
@@ -136,6 +136,11 @@ def _responses(
                 f"attribute {POSE}, got none"
             )
         pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
+        if len(pose) != robot.n_axes:
+            raise InputError(
+                f"{path}: operating point: expected {robot.n_axes} angles of driven joints, got "
+                f"{len(pose)}"
+            )
         out.append((pose, response))
     return out
 

@@ -150,9 +150,9 @@ def rigid_body_command(
                 "prior_share": prior_share if consistent else None,
                 "held_out": [path.name for path in held_out or []],
             }
+            source = provenance("rigid-body", paths, settings)
             try:
-                values = found.identified(provenance("rigid-body", paths, settings))
-                write_robot(machine, out, values, force=force)
+                write_robot(machine, out, found.identified(source), force=force)
             except RobotError as error:
                 if consistent:
                     raise

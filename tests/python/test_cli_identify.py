@@ -6,10 +6,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from frequency_fit_data import LINES_HZ, POSES
-from frequency_fit_data import ROBOT as ELASTIC
-from rigid_body_data import robot_of, three_axes
-from test_identify_logs import motor_log
 from typer.testing import CliRunner
 
 from axisight import excitation, load_robot, robot_parameters, simulate
@@ -18,6 +14,10 @@ from axisight.frequency_fit import model_response
 from axisight.frf import frequency_response
 from axisight.frf.interop import save_netcdf
 from axisight.robot_file import hash_file, load_identified
+from frequency_fit_data import LINES_HZ, POSES
+from frequency_fit_data import ROBOT as ELASTIC
+from rigid_body_data import robot_of, three_axes
+from test_identify_logs import motor_log
 
 
 def run(*arguments: object, code: int = 0) -> str:

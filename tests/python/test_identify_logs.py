@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigid_body_data import description, drive_values, parse, robot_of, smooth_motion, three_axes
 
 from axisight import InputError, Log, Robot, load_robot
 from axisight.errors import IdentifiabilityError, RobotError
@@ -19,6 +18,7 @@ from axisight.rigid_body import (
     identify_rigid_body,
 )
 from axisight.robot_file import Provenance, load_identified, write_identified
+from rigid_body_data import description, drive_values, parse, robot_of, smooth_motion, three_axes
 
 STEP = 1e-3
 SOURCE = Provenance("test", settings={"a": 1})
@@ -26,6 +26,16 @@ SOURCE = Provenance("test", settings={"a": 1})
 
 def truth_of(model: TorqueModel) -> np.ndarray:
     return drive_values(model.names, model.nominal)
+
+
+def believed() -> Robot:
+    """The arm as its file has it: a tenth heavier, with rotors a fifth smaller, than it is."""
+    data = parse(three_axes())
+    for joint in data["joint"]:
+        joint["link"]["mass"] *= 1.1
+        joint["link"]["inertia"] = [1.1 * x for x in joint["link"]["inertia"]]
+        joint["drive"]["motor_inertia"] *= 0.8
+    return robot_of(description(data["joint"], data["gravity"]))
 
 
 def motor_log(robot: Robot, seed: int, n: int = 8000, noise: float = 0.0) -> Log:
@@ -79,18 +89,26 @@ def test_it_is_the_steps_by_hand(robot, logs) -> None:
 
 
 def test_parameters_put_in_come_out(robot, logs) -> None:
-    found = identify_logs(robot, logs[:2], held_out=logs[2:], cutoff_hz=10.0)
+    found = identify_logs(robot, logs[:2], held_out=logs[2:], cutoff_hz=20.0, reversal_s=0.075)
     estimate = found.estimate
     want = estimate.base.from_standard(truth_of(estimate.model))
     score = (estimate.values - want) / estimate.standard_error
-    # Beside the noise the filter takes (0.8 / 10)^8 of the motion: nothing.
-    assert np.abs(score).max() < 4.5 and np.sqrt(np.mean(score**2)) < 1.6
+    # Some 30 parameters: 4.5 standard errors of one are passed in one case of 5000.
+    assert np.sqrt(np.mean(score**2)) < 1.6 and np.abs(score).max() < 4.5
     assert found.errors["relative_error"].isel(log=2).max() < 0.02
-    # What the filter smears of the sign is what is left out.
-    smeared = identify_logs(robot, logs[:2], cutoff_hz=10.0, reversal_s=0.0).estimate
-    friction = ["coulomb" in name for name in estimate.names]
-    off = np.abs(estimate.values - want)[friction].max()
-    assert np.abs(smeared.values - want)[friction].max() > 5 * off
+
+
+def test_samples_around_reversals_are_left_out(robot, logs) -> None:
+    """What the filter smears of the sign would be taken for viscous friction."""
+    friction = {}
+    for reversal_s in (None, 0.05, 0.0):
+        found = identify_logs(robot, logs[:2], reversal_s=reversal_s).estimate
+        chosen = [i for i, name in enumerate(found.names) if "coulomb" in name]
+        friction[reversal_s] = found.values[chosen]
+    # Half a period of 10 Hz.
+    np.testing.assert_array_equal(friction[None], friction[0.05])
+    assert np.abs(friction[None] / 0.4 - 1).max() < 0.02
+    assert np.abs(friction[0.0] / 0.4 - 1).max() > 0.06
 
 
 def test_elastic_joints_count_as_locked() -> None:
@@ -117,6 +135,7 @@ def test_elastic_joints_count_as_locked() -> None:
 
 
 def test_values_written_give_the_torques_of_the_fit(robot, logs, tmp_path: Path) -> None:
+    robot = believed()
     found = identify_logs(robot, logs[:2], consistent=True)
     assert found.consistent is not None
     values = found.identified(SOURCE)
@@ -143,8 +162,8 @@ def test_values_written_give_the_torques_of_the_fit(robot, logs, tmp_path: Path)
     assert settings["torque_error"][1]["log"] == "run2" and np.isnan(back.standard_errors).all()
 
 
-def test_drive_parameters_that_stand_alone_have_their_errors(robot, logs) -> None:
-    found = identify_logs(robot, logs[:2])
+def test_drive_parameters_that_stand_alone_have_their_errors(logs) -> None:
+    found = identify_logs(believed(), logs[:2])
     values = found.identified(SOURCE)
     errors = dict(zip(values.names, values.standard_errors, strict=True))
     own = dict(zip(found.estimate.names, found.estimate.standard_error, strict=True))
@@ -165,6 +184,7 @@ def test_misuse_is_named(robot, logs) -> None:
         (lambda: identify_logs(robot, logs, cutoff_hz=600.0), "run1: cutoff_hz: expected between"),
         (lambda: identify_logs(robot, logs, reversal_s=-1.0), "reversal_s: expected a number not"),
         (lambda: identify_logs(robot, logs, reversal_s=np.nan), "reversal_s: expected a number"),
+        (lambda: identify_logs(robot, logs, reversal_s=5.0), "reversal_s: expected less, got 5"),
         (lambda: identify_logs(robot, logs, held_out=[1]), "logs: expected Logs, got int"),
         (lambda: identify_logs(robot, logs, known={"axis1.colour": 1.0}), "known: expected names"),
         (lambda: identify_logs(robot, logs, prior_share=0.0, consistent=True), "share: expected"),
@@ -193,6 +213,6 @@ def test_impossible_bodies_are_refused_when_written(robot, tmp_path: Path) -> No
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = identify_logs(robot, bad, terms=DriveTerms(viscous="motor", coulomb="motor"))
-    with pytest.raises((RobotError, InputError), match="axis"):
+    with pytest.raises(RobotError, match="axis"):
         write_identified(robot, tmp_path / "r.toml", found.identified(SOURCE))
     assert not list(tmp_path.iterdir())

@@ -33,6 +33,9 @@ from axisight.robot_values import noted
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
 
+LEAST_KEPT = 0.05
+"""Share of an axis's samples that reversals have to leave."""
+
 
 @dataclass(frozen=True, eq=False)
 class LogIdentification:
@@ -61,8 +64,8 @@ class LogIdentification:
         What the motions do not show keeps the value it has in the file and is left out. Motor-side
         parameters that stand for themselves have standard errors (not with ``consistent``, which
         mixes in a prior); of links only combinations have: the table of base parameters is in
-        the settings of ``provenance``, torque errors with it, findings in the notes. Raises InputError as
-        `identified_bodies` does: the estimate alone may have masses no body has.
+        the settings of ``provenance``, torque errors with it, findings in the notes. Raises RobotError
+        for masses no body has, which the estimate alone may lead to.
         """
         model = self.estimate.model
         theta = self.estimate.standard() if self.consistent is None else self.consistent.theta
@@ -187,6 +190,7 @@ def identify_logs(
     if isinstance(margin, bool) or not (np.isfinite(margin) and margin >= 0):
         raise InputError(f"reversal_s: expected a number not below zero, got {reversal_s!r}")
     weight = np.concatenate([_away_from_reversals(motion, margin) for motion in motions])
+    _refuse_little(weight, margin)
     joint = [_joint_motion(model, motion) for motion in motions]
     q, v, a, torque = (np.concatenate(parts) for parts in zip(*joint, strict=True))
     estimate = identify_rigid_body(
@@ -257,6 +261,16 @@ def _away_from_reversals(motion: MotionEstimate, margin_s: float) -> Array:
         for row, axis in zip(*np.nonzero(turns), strict=True):
             out[max(row + 1 - reach, 0) : row + 1 + reach, axis] = 0.0
     return out
+
+
+def _refuse_little(weight: Array, margin_s: float) -> None:
+    kept = weight.mean(axis=0)
+    if kept.min() < LEAST_KEPT:
+        raise InputError(
+            f"reversal_s: expected less, got {margin_s:g} s: axis {int(kept.argmin()) + 1} turns back "
+            f"so often, or stands still, that {100 * kept.min():.2g} % of its samples are left; take a "
+            "longer log or a higher cutoff, or keep all with 0"
+        )
 
 
 def _errors(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.effects import Effect
-from axisight.errors import InputError
+from axisight.errors import InputError, RobotError
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.robot_file import INERTIA, Identified, Provenance, identified
 
@@ -45,8 +45,8 @@ def identified_bodies(
     covariance
         (p, p) of theta, carried through to first order; without it standard errors are unknown.
 
-    Raises InputError for a model on the joint side, numbers that do not fit the model or are
-    not finite, and masses that are not positive.
+    Raises InputError for a model on the joint side and numbers that do not fit the model or are
+    not finite, RobotError for masses that are not positive.
     """
     if model.side != "motor":
         raise InputError(f"model: expected side 'motor', got {model.side!r}")
@@ -64,7 +64,7 @@ def identified_bodies(
             break
         link = slice(first, first + LINK)
         if values[first] <= 0:
-            raise InputError(
+            raise RobotError(
                 f"theta: expected a positive {names[first]}, got {values[first]}: "
                 "identify_consistent finds bodies that can exist"
             )
