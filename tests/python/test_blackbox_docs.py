@@ -50,7 +50,9 @@ def test_robot_files_page(repository: Path, tmp_path: Path) -> None:
     page = (repository / "docs" / "robot_files.md").read_text(encoding="utf-8")
     quoted = re.search(r"`(# identified: axis1\.stiffness[^`]*)`", page)
     assert quoted and quoted.group(1) in (tmp_path / "axis1.toml").read_text()
-    assert {p.name for p in tmp_path.iterdir()} == {"axis1.toml", "axis1.identified.json"}
+    files = {"axis1.toml", "axis1.identified.json", "axis.toml", "axis.identified.json"}
+    assert {p.name for p in tmp_path.iterdir()} == files
+    assert "not written: J_a" in shown["values"].provenance.notes
 
 
 @pytest.mark.parametrize("module", [blackbox, identifiability, robot_file])

@@ -1,6 +1,9 @@
 """``axisight identify``: each command from files to a robot file, and what it refuses."""
 
 import json
+import re
+import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -288,7 +291,7 @@ def test_elastic_that_does_not_converge_says_so(responses, monkeypatch) -> None:
         (["--start", "axis1.mass=3"], ["--start", "axis1.stiffness", "axis1.mass"]),
         (["--start", "axis1.stiffness=soft"], ["--start axis1.stiffness", "numbers", "soft"]),
         (["--at", "0,0,0"], ["--at", "2 responses", "got 1"]),
-        (["--at", "0,0", "--at", "0,0"], ["joint_angle_rad", "3 angles", "2"]),
+        (["--at", "0,0", "--at", "0,0"], ["pose0.nc", "3 angles", "got 2"]),
         (["--at", "0,x,0", "--at", "0,0,0"], ["--at", "numbers", "0,x,0"]),
         (["--criterion", "best"], ["criterion", "best"]),
         (["--sampling", "none"], ["sampling", "continuous"]),
@@ -310,3 +313,26 @@ def test_elastic_needs_responses_with_a_place(responses, tmp_path: Path) -> None
     assert "--at" in text and "joint_angle_rad" in text
     text = run("elastic", "irb6600_like", tmp_path / "bare.nc", "--at", "0,0.3,-0.4", code=2)
     assert "expected a variance" in text
+
+
+def test_the_page_runs_as_it_stands(
+    repository: Path, rigid, axis_logs, responses, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (repository / "docs" / "identify_cli.md").read_text(encoding="utf-8")
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)), {})
+    files = {"arm.toml": rigid / "robot.toml"}
+    files |= {f"run{i}.parquet": rigid / f"run{i}.parquet" for i in (1, 2, 3)}
+    files |= dict(zip(("slow.parquet", "low.parquet", "high.parquet"), axis_logs, strict=True))
+    files["pose2.nc"] = responses[1]
+    for name, source in files.items():
+        shutil.copy(source, tmp_path / name)
+    for name, preset in (("axis", "two_mass_axis"), ("arm_elastic", "irb6600_like")):
+        (tmp_path / f"{name}.toml").write_text(load_robot(preset).core.toml)
+    blocks = re.findall(r"```sh\n(.*?)```", page, flags=re.DOTALL)
+    assert len(blocks) == 3
+    for block in blocks:
+        program, command, *arguments = shlex.split(block.replace("\\\n", " "))
+        assert (program, command) == ("axisight", "identify")
+        run(*arguments)
+        assert load_identified(arguments[arguments.index("-o") + 1]).names
