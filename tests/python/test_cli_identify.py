@@ -336,3 +336,26 @@ def test_the_page_runs_as_it_stands(
         assert (program, command) == ("axisight", "identify")
         run(*arguments)
         assert load_identified(arguments[arguments.index("-o") + 1]).names
+
+
+def test_rigid_body_of_a_real_axis(repository: Path, shared_data: Path, tmp_path: Path) -> None:
+    """EMPS: least squares of Janot, Gautier and Brunot (2019), and the run with pulses."""
+    emps, example = shared_data / "emps", repository / "examples" / "emps"
+    out = tmp_path / "emps.toml"
+    run(
+        "rigid-body", example / "robot.toml", emps / "DATA_EMPS.mat", "--no-rotors",
+        "--held-out", emps / "DATA_EMPS_PULSES.mat", "--columns", example / "columns.toml",
+        "--cutoff-hz", 50, "-o", out,
+    )  # fmt: skip
+    back = load_identified(out)
+    published = {
+        "carriage.mass": 95.109,
+        "carriage.viscous_friction": 203.50,
+        "coulomb_friction@1.coulomb_nm": 20.394,
+        "torque_offset@1.offset_nm": -3.165,
+    }
+    for name, value in published.items():
+        # Another filter on the same log: within 3 %, and within a standard error.
+        assert back.value(name) == pytest.approx(value, rel=0.03), name
+    errors = [e["relative_error"][0] for e in back.provenance.settings["torque_error"]]
+    assert errors[0] < 0.05 and errors[1] < 0.07
