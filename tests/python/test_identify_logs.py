@@ -100,15 +100,30 @@ def test_parameters_put_in_come_out(robot, logs) -> None:
 
 def test_samples_around_reversals_are_left_out(robot, logs) -> None:
     """What the filter smears of the sign would be taken for viscous friction."""
-    friction = {}
+    friction, possible = {}, {}
     for reversal_s in (None, 0.05, 0.0):
-        found = identify_logs(robot, logs[:2], reversal_s=reversal_s).estimate
-        chosen = [i for i, name in enumerate(found.names) if "coulomb" in name]
-        friction[reversal_s] = found.values[chosen]
+        found = identify_logs(robot, logs[:2], reversal_s=reversal_s, consistent=True)
+        chosen = ["coulomb" in name for name in found.estimate.names]
+        friction[reversal_s] = found.estimate.values[chosen]
+        chosen = ["coulomb" in name for name in found.estimate.model.names]
+        possible[reversal_s] = found.consistent.theta[chosen]
     # Half a period of 10 Hz.
     np.testing.assert_array_equal(friction[None], friction[0.05])
     assert np.abs(friction[None] / 0.4 - 1).max() < 0.02
     assert np.abs(friction[0.0] / 0.4 - 1).max() > 0.06
+    assert np.abs(possible[None] / 0.4 - 1).max() < 0.02 < np.abs(possible[0.0] / 0.4 - 1).max()
+
+
+def test_the_prior_share_says_how_near_to_the_file(logs) -> None:
+    robot = believed()
+    far, near = (
+        identify_logs(robot, logs[0], consistent=True, prior_share=share) for share in (1.0, 1e-6)
+    )
+    links = [c.extra is None for c in far.estimate.model.columns]
+    nominal = far.estimate.model.nominal[links]
+    size = np.abs(nominal).max()
+    assert np.abs(near.consistent.theta[links] - nominal).max() < 1e-3 * size
+    assert np.abs(far.consistent.theta[links] - nominal).max() > 1e-2 * size
 
 
 def test_elastic_joints_count_as_locked() -> None:
@@ -169,6 +184,8 @@ def test_drive_parameters_that_stand_alone_have_their_errors(logs) -> None:
     own = dict(zip(found.estimate.names, found.estimate.standard_error, strict=True))
     assert errors["axis2.viscous_friction"] == own["axis2.viscous_friction"] > 0
     assert errors["coulomb_friction@3.coulomb_nm"] == own["axis3.coulomb_friction"]
+    # Centres of mass and inertias about them are made from several.
+    assert all(np.isnan(e) for n, e in errors.items() if ".com_" in n or ".inertia_" in n)
     # This one stands for a sum with a motor inertia.
     assert np.isnan(errors["axis1.inertia_zz"]) and np.isnan(errors["axis1.motor_inertia"])
     # The height of a link on a vertical axis moves nothing.
