@@ -16,6 +16,7 @@ from axisight.cli_identify_common import (
     Force,
     Out,
     band,
+    load_source,
     provenance,
     refuse_in_the_way,
     say,
@@ -23,7 +24,7 @@ from axisight.cli_identify_common import (
 )
 from axisight.errors import InputError
 from axisight.logs import read_log
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 
 if TYPE_CHECKING:
     from axisight.graybox.prediction_error import NoiseKind
@@ -98,7 +99,7 @@ def axis_command(
     """
     with errors():
         refuse_in_the_way(out, force)
-        machine = None if robot is None else load_robot(robot)
+        machine = None if robot is None else load_source(robot)
         if out is not None and machine is None:
             raise InputError("--out: expected the robot to write values into, in --robot")
         ratio = _ratio(machine, gear_ratio, axis)

@@ -17,6 +17,7 @@ from axisight.cli_common import OUT, errors
 from axisight.cli_identify_common import (
     Force,
     Out,
+    load_source,
     numbers,
     pairs,
     provenance,
@@ -27,7 +28,7 @@ from axisight.cli_identify_common import (
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frf.interop import load_netcdf
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 
 if TYPE_CHECKING:
     from axisight.frequency_fit import FrequencyFit
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from axisight.frequency_fit.options import Criterion
 
 _USUAL = ("*.stiffness", "*.damping")
+_LINEAR = ("payload", "joint_stiffness", "joint_damping", "motor_inertia")
 _CONVERGED = ("loss_converged", "step_converged")
 POSE = "joint_angle_rad"
 """Attribute of a response that holds its operating point."""
@@ -91,7 +93,9 @@ def elastic_command(
     """
     with errors():
         refuse_in_the_way(out, force)
-        machine = load_robot(robot)
+        machine = load_source(robot)
+        linear = [effect for effect in machine.effects if effect.name in _LINEAR]
+        model = Robot(machine.core, linear)
         data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
         options = axisight.frequency_fit.FrequencyFitOptions(
@@ -101,8 +105,11 @@ def elastic_command(
             starts=starts,
             seed=seed,
         )
-        fit = axisight.frequency_fit.fit_responses(machine, data, begin, options=options)
+        fit = axisight.frequency_fit.fit_responses(model, data, begin, options=options)
         _show(fit)
+        if len(linear) < len(machine.effects):
+            left = ", ".join(e.label for e in machine.effects if e not in linear)
+            say(f"not in the linear model, kept as they are: {left}")
         if out is not None:
             settings = {
                 "parameters": list(begin),

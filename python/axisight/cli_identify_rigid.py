@@ -16,6 +16,7 @@ from axisight.cli_identify_common import (
     Columns,
     Force,
     Out,
+    load_source,
     pairs,
     provenance,
     refuse_in_the_way,
@@ -24,7 +25,6 @@ from axisight.cli_identify_common import (
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.logs import read_log
-from axisight.robot import load_robot
 
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification
@@ -110,7 +110,7 @@ def rigid_body_command(
     """
     with errors():
         refuse_in_the_way(out, force)
-        machine = load_robot(robot)
+        machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
         read = [read_log(path, columns, n_axes=machine.n_axes) for path in paths]
         held = pairs("--known", known)

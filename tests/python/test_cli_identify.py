@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from axisight import excitation, load_robot, robot_parameters, simulate
+from axisight import Robot, excitation, load_robot, robot_parameters, simulate
 from axisight.cli import app
 from axisight.frequency_fit import model_response
 from axisight.frf import frequency_response
@@ -260,6 +260,28 @@ def test_elastic_fits_and_writes(responses, tmp_path: Path) -> None:
     np.testing.assert_array_equal(given["operating_points_rad"], POSES)
     again = run("elastic", "irb6600_like", *responses, *start, "--parameters", names[0])
     assert "axis2" not in again
+
+
+def test_one_command_takes_up_what_another_found(axis_logs, tmp_path: Path) -> None:
+    first, second = tmp_path / "axis.toml", tmp_path / "elastic.toml"
+    run("axis", *axis_logs, "--robot", "two_mass_axis", *LINES, "-o", first)
+    robot = load_identified(first).robot
+    bare = Robot(robot.core)
+    g = model_response(bare, LINES_HZ, [0.0], quantity="acceleration").values
+    variance = (0.01 * np.abs(g)) ** 2
+    response = frequency_response(
+        LINES_HZ, 1.01 * g, estimator="test", variance=variance, output_unit="rad/s^2"
+    )
+    save_netcdf(response, tmp_path / "g.nc")
+    text = run("elastic", first, tmp_path / "g.nc", "--at", 0, "-o", second)
+    kept = "nonlinear_stiffness@1, coulomb_friction@1"
+    assert f"not in the linear model, kept as they are: {kept}" in text
+    assert load_identified(second).effects == robot.effects
+    # Edited since: what stands beside it is no longer known to belong to it.
+    first.write_text(first.read_text().replace("damping = ", "damping = 1"))
+    assert "changed after it was written" in run(
+        "elastic", first, tmp_path / "g.nc", "--at", 0, code=2
+    )
 
 
 def test_elastic_takes_poses_from_options(responses, tmp_path: Path) -> None:
