@@ -17,6 +17,7 @@ from axisight.cli_identify_common import (
     Out,
     band,
     load_source,
+    options,
     provenance,
     refuse_in_the_way,
     say,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 
 def axis_command(
+    ctx: typer.Context,
     slow: Annotated[
         Path, typer.Argument(help="Log of a slow motion both ways, e.g. a triangle wave.")
     ],
@@ -132,24 +134,7 @@ def axis_command(
         )
         say(found.report())
         if out is not None and machine is not None:
-            settings = {
-                "axis": axis,
-                "period_s": period_s,
-                "band_hz": band_hz,
-                "drop_periods": drop_periods,
-                "cutoff_hz": cutoff_hz,
-                "notch_band_hz": notch_band_hz,
-                "plateau_from_hz": plateau_from_hz,
-                "masses": masses,
-                "stribeck": stribeck,
-                "backlash": backlash,
-                "offset": offset,
-                "smoothing_rad_s": smoothing_rad_s,
-                "fixed": fixed,
-                "noise_model": noise_model,
-                "closed_loop": not open_loop,
-            }
-            source = provenance("axis", files, settings)
+            source = provenance("axis", files, options(ctx))
             values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
             write_robot(machine, out, values, force=force)
             say(values.provenance.notes)

@@ -50,6 +50,17 @@ def refuse_in_the_way(out: Path | None, force: bool) -> None:
             raise InputError(f"--out: {path} exists; --force replaces it")
 
 
+def options(ctx: typer.Context) -> dict[str, Any]:
+    """Return the options of a command that say how it worked: numbers, choices, names of logs."""
+    out: dict[str, Any] = {}
+    for name, value in ctx.params.items():
+        if isinstance(value, list | tuple):
+            out[name] = [v.name if isinstance(v, Path) else v for v in value]
+        elif name not in ("robot", "force") and not isinstance(value, Path):
+            out[name] = value
+    return out
+
+
 def provenance(method: str, files: Sequence[Path], settings: Mapping[str, Any]) -> Provenance:
     """Return where values come from: hashes of files, and the options that were given."""
     count = Counter(path.name for path in files)

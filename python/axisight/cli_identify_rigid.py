@@ -17,6 +17,7 @@ from axisight.cli_identify_common import (
     Force,
     Out,
     load_source,
+    options,
     pairs,
     provenance,
     refuse_in_the_way,
@@ -35,6 +36,7 @@ _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist
 
 
 def rigid_body_command(
+    ctx: typer.Context,
     robot: Annotated[
         str,
         typer.Argument(
@@ -107,6 +109,7 @@ def rigid_body_command(
 
     Prints base parameters with standard errors, and torque errors on every log. --out writes a
     robot file; most often it takes --consistent, since a fit alone may have bodies that cannot exist.
+    The exit status is 1 if these were not found to full accuracy.
     """
     with errors():
         refuse_in_the_way(out, force)
@@ -134,30 +137,16 @@ def rigid_body_command(
         if combinations:
             say(str(found.estimate.base))
         _show(found)
-        failed = found.consistent is not None and found.consistent.status == "failed"
-        if out is not None and not failed:
-            settings = {
-                "cutoff_hz": cutoff_hz,
-                "reversal_s": reversal_s,
-                "friction": friction,
-                "rotors": rotors,
-                "dead_band_rad_s": dead_band_rad_s,
-                "method": method,
-                "known": held,
-                "eliminate": eliminate,
-                "group": group,
-                "consistent": consistent,
-                "prior_share": prior_share if consistent else None,
-                "held_out": [path.name for path in held_out or []],
-            }
-            source = provenance("rigid-body", paths, settings)
+        solver = "solved" if found.consistent is None else found.consistent.status
+        if out is not None and solver != "failed":
+            source = provenance("rigid-body", paths, options(ctx))
             try:
                 write_robot(machine, out, found.identified(source), force=force)
             except RobotError as error:
                 if consistent:
                     raise
                 raise InputError(f"{error}; --consistent finds bodies that can exist") from None
-        if failed:
+        if solver in ("inaccurate", "failed"):
             raise typer.Exit(1)
 
 

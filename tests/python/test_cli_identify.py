@@ -93,6 +93,23 @@ def test_rigid_body_prints_and_writes(rigid, tmp_path: Path) -> None:
     assert again.value("axis3.com_x") != back.value("axis3.com_x")
 
 
+def test_a_solver_that_stops_short_says_so(rigid, tmp_path: Path, monkeypatch) -> None:
+    from axisight.rigid_body import from_logs  # noqa: PLC0415
+
+    real = from_logs.identify_consistent
+    monkeypatch.setattr(
+        from_logs, "identify_consistent", lambda *a, **k: real(*a, **k, max_iterations=2)
+    )
+    out = tmp_path / "out.toml"
+    # An arm that wants impossible bodies: masses of the file are far from the torques.
+    frame = pd.read_parquet(rigid / "run1.parquet")
+    frame["torque_cmd_2"] *= -1
+    frame.to_parquet(tmp_path / "wrong.parquet", index=False)
+    wrong = tmp_path / "wrong.parquet"
+    text = run("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out, code=1)
+    assert "bodies that can exist: inaccurate" in text
+
+
 def test_rigid_body_options_reach_the_regression(rigid) -> None:
     first = rigid / "run1.parquet"
     text = run(
