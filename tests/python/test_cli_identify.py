@@ -203,11 +203,11 @@ def test_axis_reports_and_writes(axis_logs, tmp_path: Path) -> None:
 
 def test_axis_options_reach_the_fit(axis_logs) -> None:
     text = run(
-        "axis", *axis_logs, "--gear-ratio", 1 / 224.3, *LINES, "--offset", "--fixed", "k3",
+        "axis", *axis_logs, "--gear-ratio", 1 / 224.3, *LINES, "--offset", "--fixed", "F_v",
         "--smoothing-rad-s", 0.01,
     )  # fmt: skip
     third = text[text.index("Step 3") :]
-    assert "u_0" in third and "k3" not in third[: third.index("status")]
+    assert "u_0" in third and "F_v" not in third[: third.index("status")]
 
 
 @pytest.mark.parametrize(

@@ -230,6 +230,6 @@ def test_impossible_bodies_are_refused_when_written(robot, tmp_path: Path) -> No
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = identify_logs(robot, bad, terms=DriveTerms(viscous="motor", coulomb="motor"))
-    with pytest.raises(RobotError, match="axis"):
+    with pytest.raises(RobotError, match="expected"):
         write_identified(robot, tmp_path / "r.toml", found.identified(SOURCE))
     assert not list(tmp_path.iterdir())
