@@ -25,8 +25,8 @@ def test_the_robot_comes_back(shown: dict[str, Any]) -> None:
 
 
 def test_what_stays_unknown_is_named(shown: dict[str, Any]) -> None:
-    (sentence,) = shown["plan"].advice()
-    assert sentence.startswith("axis1.inertia_scale is determined not at all; freeze it")
+    (sentence,) = shown["plan"].words()
+    assert re.match(r"only axis1.motor_inertia \+ .* axis1.inertia_scale .to 9", sentence)
 
 
 def test_operating_points_are_chosen(shown: dict[str, Any]) -> None:

@@ -240,7 +240,9 @@ def test_regressor_with_names_and_nominal_values() -> None:
 
 
 def test_logarithmic_information_is_relative() -> None:
-    found = identifiability(of_log_information(np.diag([1e4, 4.0]), ["a.stiffness", "a.damping"]))
+    found = identifiability(
+        of_log_information(np.diag([1e4, 4.0]), {"a.stiffness": 2e6, "a.damping": 30.0})
+    )
     np.testing.assert_allclose(found.relative_std, [0.01, 0.5])
 
 

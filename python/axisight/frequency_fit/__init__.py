@@ -1,22 +1,20 @@
 """Fit the linearized robot to frequency responses at several operating points."""
 
 from axisight.frequency_fit.fit import FrequencyFitOptions, fit_responses
-from axisight.frequency_fit.identifiability import Combination, Identifiability, identifiability
 from axisight.frequency_fit.measured import MeasuredResponse, model_response
+from axisight.frequency_fit.planned import planned_information
 from axisight.frequency_fit.poses import PoseChoice, choose_poses
 from axisight.frequency_fit.result import FrequencyFit
 from axisight.frequency_fit.robot_values import identified_responses
 
 __all__ = [
-    "Combination",
     "FrequencyFit",
     "FrequencyFitOptions",
-    "Identifiability",
     "MeasuredResponse",
     "PoseChoice",
     "choose_poses",
     "fit_responses",
-    "identifiability",
     "identified_responses",
     "model_response",
+    "planned_information",
 ]

@@ -14,10 +14,10 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import Parameter
-from axisight.frequency_fit.identifiability import assess
 from axisight.frequency_fit.measured import MeasuredResponse, measured, model_response
 from axisight.frequency_fit.options import FrequencyFitOptions, core_options
 from axisight.frequency_fit.parameters import Spec, specs
+from axisight.frequency_fit.planned import of_search
 from axisight.frequency_fit.result import (
     NORMAL_95,
     FrequencyFit,
@@ -25,6 +25,7 @@ from axisight.frequency_fit.result import (
     warn,
 )
 from axisight.frequency_fit.trust import trust
+from axisight.identifiability import identifiability
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -220,7 +221,8 @@ def _wrap(
     own = found.sandwich if sandwich else found.response
     scale = 1.0 if options.weighted else found.misfit
     names = tuple(spec.name for spec in free)
-    identifiable = assess(wanted, result.information, scale)
+    matrix = result.information / scale
+    identifiable = identifiability(of_search(wanted, matrix, result.values[result.free]))
     at_bound = tuple(wanted[i].name for i in result.at_bound)
     slopes, values = result.slopes, result.values[result.free]
     with np.errstate(invalid="ignore"):
@@ -245,6 +247,7 @@ def _wrap(
         evaluations=sum(one.evaluations for one in passes),
         at_bound=at_bound,
         identifiability=identifiable,
+        information=matrix,
         warnings=warn(
             result,
             identifiable,

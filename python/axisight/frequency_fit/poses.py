@@ -13,9 +13,10 @@ from axisight import _core
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import Parameter
-from axisight.frequency_fit.identifiability import Identifiability, assess, pose_information
 from axisight.frequency_fit.measured import Quantity, Sampling
 from axisight.frequency_fit.parameters import specs
+from axisight.frequency_fit.planned import of_search, pose_information
+from axisight.identifiability import Identifiability, identifiability
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -100,7 +101,7 @@ def choose_poses(
         an array that broadcasts to (n_candidates, n_freq, n_outputs, n_inputs).
     measured_information
         Information there is already, (n_parameters, n_parameters), for example
-        ``fit.identifiability.information``; priors of the parameters are added.
+        ``fit.information``; priors of the parameters are added.
     quantity
         What the responses will be of.
     gap_tolerance
@@ -139,8 +140,8 @@ def choose_poses(
         if spec.prior is not None:
             mean, std = spec.prior
             prior[i, i] += (mean / std) ** 2 if spec.logarithmic else 1 / std**2
-    everything = assess(chosen, matrices.sum(axis=0) + prior)
-    singular = [c for c in everything.unidentified if not np.isfinite(c.std)]
+    everything = identifiability(of_search(chosen, matrices.sum(axis=0) + prior))
+    singular = [c for c in everything.combinations if c.kind == "unidentifiable"]
     if singular:
         raise InputError(
             "candidates_rad: expected points that together determine all parameters; "
@@ -163,5 +164,5 @@ def choose_poses(
         weights=found["weights"],
         sensitivity=found["sensitivity"],
         gap=found["gap"],
-        identifiability=assess(chosen, matrices[places].sum(axis=0) + prior),
+        identifiability=identifiability(of_search(chosen, matrices[places].sum(axis=0) + prior)),
     )

@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.frequency_fit.identifiability import Identifiability, advice
 from axisight.frequency_fit.trust import Trust
+from axisight.identifiability import Combination, Identifiability
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
@@ -46,13 +46,18 @@ class FrequencyFit:
         Of all passes from the best start.
     at_bound
         Names of parameters on a bound.
-    identifiability, warnings
-        Of the data that was used, with combinations that it does not determine; and what to
-        mind, in words.
+    identifiability, information
+        Of the data that was used, with combinations that it does not determine; and its
+        information (n_parameters, n_parameters), per logarithm, of centres of mass per metre.
+
+    Warnings
+    --------
+        What to mind, in words.
     starts
         Loss, status and iterations of the search from every starting point, best first.
     robot
         The robot with the fitted values.
+
     """
 
     names: tuple[str, ...]
@@ -73,6 +78,7 @@ class FrequencyFit:
     evaluations: int
     at_bound: tuple[str, ...]
     identifiability: Identifiability
+    information: Real
     warnings: tuple[str, ...]
     starts: pd.DataFrame = field(repr=False)
     robot: Robot = field(repr=False)
@@ -153,9 +159,6 @@ def covariances(result: _core.FrequencyFitResult, prior: Real, blocks: int) -> C
     return Covariances(inverse @ (expected + np.diag(prior)) @ inverse, sandwich, misfit)
 
 
-POOR_CONDITION = 1e8
-
-
 def warn(
     result: _core.FrequencyFitResult,
     found: Identifiability,
@@ -178,11 +181,16 @@ def warn(
         out.append(f"on a bound: {', '.join(at_bound)}: widen it, or freeze the parameter")
     source = "taken from the scatter of residuals" if sandwich else "too small: use the sandwich"
     out.extend(f"{reason}; standard deviations are {source}" for reason in doubt.reasons())
-    out.extend(advice(found.unidentified))
-    if not found.unidentified and found.condition > POOR_CONDITION:
-        out.append(
-            f"condition number {found.condition:.1e}: the responses hardly separate some parameters"
-        )
+    out.extend(_advice(combination) for combination in found.combinations)
     if dropped:
         out.append(f"{dropped} flagged lines without numbers were left out")
     return tuple(out)
+
+
+def _advice(combination: Combination) -> str:
+    several = combination.parameters
+    what = f"one of {', '.join(several)}" if len(several) > 1 else several[0]
+    return (
+        f"{combination}; freeze {what}, give it a prior, or add lines and operating points that "
+        "tell (see choose_poses)"
+    )

@@ -159,14 +159,26 @@ def of_simulation(
 
 
 def of_log_information(
-    matrix: ArrayLike, names: Sequence[str], *, name: str = "", advice: str = ""
+    matrix: ArrayLike,
+    values: Mapping[str, float],
+    *,
+    name: str = "",
+    advice: str = "",
 ) -> Information:
     """Return the information of an experiment whose ``matrix`` is per logarithm of the parameters.
 
-    As ``axisight.frequency_fit`` has it: scales are one, a standard deviation is relative (of a
-    centre of mass, in metres). ``names``, ``name`` and ``advice`` as in `information`.
+    As ``axisight.frequency_fit`` has it (``FrequencyFit.information``). ``values`` by name, in the
+    order of the matrix, are the scales: a standard deviation is relative to them. For one that
+    is not searched by its logarithm, a centre of mass, give one. ``name`` and ``advice`` as in
+    `information`. Raises InputError for values that are not positive, and as `of_matrix`.
     """
-    return of_matrix(matrix, names=names, scales=np.ones(len(names)), name=name, advice=advice)
+    sizes = np.array(list(values.values()), np.float64)
+    if not (np.isfinite(sizes) & (sizes > 0)).all():
+        raise InputError(f"values: expected positive numbers, got {dict(values)}")
+    per_unit = np.asarray(matrix, np.float64)
+    if per_unit.shape == (len(sizes),) * 2:
+        per_unit = per_unit / np.outer(sizes, sizes)
+    return of_matrix(per_unit, names=list(values), scales=sizes, name=name, advice=advice)
 
 
 def of_covariance(
