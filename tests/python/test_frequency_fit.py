@@ -412,6 +412,13 @@ def test_own_variances_of_few_realizations_are_not_trusted() -> None:
         fit_responses(
             ROBOT, from_realizations(3, 0), names, options=FrequencyFitOptions(neighbours=40)
         )
+    with pytest.raises(InputError, match="responses with degrees_of_freedom"):
+        fit_responses(ROBOT, responses(0.1, 1), names, options=FrequencyFitOptions(neighbours=10))
+    for bad in (3, 5, -2, True, 4.0):
+        with pytest.raises(InputError, match="even number from 4"):
+            FrequencyFitOptions(neighbours=bad)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="no weights"):
+        FrequencyFitOptions(criterion="least_squares", neighbours=4)
 
 
 def test_noise_correlated_over_lines_is_noticed() -> None:
@@ -421,3 +428,35 @@ def test_noise_correlated_over_lines_is_noticed() -> None:
     assert any("neighbouring lines resemble" in text for text in fit.warnings)
     quiet = fit_responses(ROBOT, from_realizations(40, 0), starts(names, 1.1, 0.9))
     assert quiet.std_from == "response" and not quiet.warnings
+
+
+def test_estimated_covariances_of_all_elements_are_put_right() -> None:
+    """Nine elements together and 40 realizations: weights enlarge the residuals by 39 / 30 and the
+    covariance by 39^2 / (30^2 - 1) = 1.7. Mean square of 30 runs of two: 1 +- 3 sqrt(2 / 60)."""
+    names = ELASTIC[:2]
+    truth = true_values(names)
+    g = model_response(ROBOT, LINES_HZ, POSES[0], quantity="acceleration").values
+    size = 0.1 * np.abs(g).reshape(40, 9)
+    errors = []
+    for run in range(30):
+        rng = np.random.default_rng([40, run])
+        parts = rng.normal(size=(2, 40, 40, 9)) * np.sqrt(0.5 * 40)
+        error = (parts[0] + 1j * parts[1]) * size
+        mean = error.mean(axis=0)
+        left = error - mean
+        covariance = np.einsum("rli,rlj->lij", left, left.conj()) / (39 * 40)
+        data = MeasuredResponse(
+            POSES[0],
+            LINES_HZ,
+            g + mean.reshape(g.shape),
+            "acceleration",
+            covariance=covariance,
+            degrees_of_freedom=39,
+        )
+        assert data.elements_weighed_together == 9
+        fit = fit_responses(ROBOT, [data], starts(names, 1.1, 0.9))
+        errors.append((fit.values - truth) / fit.std_response)
+        assert not any("own variance" in text for text in fit.warnings)
+    assert np.mean(np.square(errors)) == pytest.approx(1.0, abs=0.55)
+    assert fit.misfit == pytest.approx(39 / 30, rel=0.15)
+    assert not fit.warnings

@@ -128,6 +128,21 @@ def test_effects_that_are_not_linear() -> None:
         model_response(load_robot("two_mass_axis"), LINES_HZ)
 
 
+@pytest.mark.parametrize("freedom", [0, -1.0, np.nan, np.inf, "many"])
+def test_degrees_of_freedom_are_positive(freedom: Any) -> None:
+    with pytest.raises(InputError, match="degrees_of_freedom: expected"):
+        made(degrees_of_freedom=freedom)
+
+
+def test_a_quantity_without_unit_will_do() -> None:
+    found = array(units=None, quantity="velocity")
+    assert MeasuredResponse.of(POSES[0], found).quantity == "velocity"
+    with pytest.raises(InputError, match="that agree"):
+        MeasuredResponse.of(POSES[0], array(units="rad/Nm", quantity="velocity"))
+    with pytest.raises(InputError, match="units to be one of"):
+        MeasuredResponse.of(POSES[0], array(units="dB", quantity="velocity"))
+
+
 def test_a_zero_element_has_no_logarithm() -> None:
     g = CLEAN.response.copy()
     g[:, 0, 1] = 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from axisight.frf.pooled import IMPROBABLE, neighbours_wanted, pooled_variance
+from axisight.frf.pooled import IMPROBABLE, neighbours_for, pooled_variance
 
 LINES = 120
 GROWTH = np.exp(0.03 * np.arange(LINES))[:, None]
@@ -12,13 +12,13 @@ GROWTH = np.exp(0.03 * np.arange(LINES))[:, None]
 
 def test_freedom_adds_up_to_thirty() -> None:
     """Neighbours of nu degrees give a logarithm of variance psi'(nu) / count: 1/30 is wanted."""
-    assert neighbours_wanted(None, 400) == neighbours_wanted(30.0, 400) == 0
+    assert neighbours_for(None, 400) == neighbours_for(30.0, 400) == 0
     for freedom in (1.0, 2.0, 3.0, 7.0, 20.0):
-        count = neighbours_wanted(freedom, 400)
+        count = neighbours_for(freedom, 400)
         assert count % 2 == 0
         assert special.polygamma(1, freedom) / count <= 1 / 30
         assert count == 4 or special.polygamma(1, freedom) / (count - 2) > 1 / 30
-    assert neighbours_wanted(2.0, 30) == 10
+    assert neighbours_for(2.0, 30) == 10
 
 
 @pytest.mark.parametrize("level", [1.0, np.cos(np.arange(LINES))[:, None] ** 2 + 0.1])
@@ -49,7 +49,7 @@ def test_scatter_is_what_the_distribution_says(freedom: float) -> None:
     lines are correlated over the window) and as narrow as a mean of that many; hardly a line
     keeps its own variance (more than by the F distribution, which the logarithms only resemble)."""
     rng = np.random.default_rng(1)
-    count = neighbours_wanted(freedom, LINES)
+    count = neighbours_for(freedom, LINES)
     variance = GROWTH * rng.gamma(freedom, 1 / freedom, (LINES, 4000))
     found = pooled_variance(np.ones_like(variance), variance, freedom, count)
     kept = found == variance

@@ -13,9 +13,10 @@ from axisight.blackbox._data import Complex, Real
 from axisight.errors import InputError
 from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import (
-    ENOUGH_FREEDOM,
-    FEWEST_NEIGHBOURS,
-    neighbours_wanted,
+    FEW_FREEDOM,
+    OwnWeights,
+    check_neighbours,
+    neighbours_for,
     pooled_variance,
 )
 from axisight.frf.response import DIMS
@@ -39,16 +40,18 @@ class UsableLines:
     neighbours: int
 
     @property
-    def pooled(self) -> bool:
-        """Whether lines are weighed by their neighbours."""
-        return self.variance is not None and self.neighbours > 0
+    def own(self) -> OwnWeights:
+        """What weights from the lines' own variances do; nothing if they are known or pooled."""
+        if self.variance is None or self.neighbours:
+            return OwnWeights()
+        return OwnWeights.of(self.degrees_of_freedom)
 
     @property
-    def uncertain(self) -> bool:
+    def few(self) -> bool:
         """Whether lines are weighed by their own variance of few degrees of freedom."""
         freedom = self.degrees_of_freedom
-        own = self.variance is not None and not self.pooled
-        return own and freedom is not None and freedom < ENOUGH_FREEDOM
+        own = self.variance is not None and not self.neighbours
+        return own and freedom is not None and freedom - 1 < FEW_FREEDOM
 
     def weights(self, magnitude: Real) -> tuple[Real, Real]:
         """Return weights and the variance of weighted residuals (real and imaginary part each).
@@ -59,7 +62,7 @@ class UsableLines:
             weight = 1 / np.abs(self.values) if self.weighting == "relative" else 1.0
             return np.broadcast_to(weight, self.values.shape), np.ones(self.values.shape)
         weighing = self.variance
-        if self.pooled and self.degrees_of_freedom is not None:
+        if self.neighbours and self.degrees_of_freedom is not None:
             weighing = pooled_variance(
                 magnitude, self.variance, self.degrees_of_freedom, self.neighbours
             )
@@ -69,6 +72,11 @@ class UsableLines:
 
 def usable_lines(response: xr.Dataset, weighting: str, neighbours: int | None) -> UsableLines:
     """Return the lines of a response that are numbers; raises InputError if there are none."""
+    check_neighbours(neighbours)
+    if neighbours and weighting != "variance":
+        raise InputError(
+            f"neighbours: expected None or 0 with weighting={weighting!r}, got {neighbours}"
+        )
     if weighting not in get_args(Weighting):
         raise InputError(
             f"weighting: expected 'variance', 'relative' or 'absolute', got {weighting!r}"
@@ -89,11 +97,12 @@ def usable_lines(response: xr.Dataset, weighting: str, neighbours: int | None) -
                 "weighting='relative'"
             )
         freedom = median_freedom(response)
-        count = neighbours_wanted(freedom, int(good.sum())) if neighbours is None else neighbours
-        if count < FEWEST_NEIGHBOURS or freedom is None:
-            count = 0
-        elif count >= good.sum():
-            raise InputError(f"neighbours: expected fewer than {good.sum()} lines, got {count}")
+        if neighbours and freedom is None:
+            raise InputError(
+                f"neighbours: expected a response with degrees_of_freedom to pool {neighbours} "
+                "lines, got one without"
+            )
+        count = neighbours_for(freedom, int(good.sum()), neighbours)
         lines = replace(
             lines, variance=variance[good], degrees_of_freedom=freedom, neighbours=count
         )

@@ -10,7 +10,7 @@ likelihood where the variance of the response is known.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
@@ -22,6 +22,7 @@ from axisight.blackbox._data import Complex, Real, lines, whole
 from axisight.blackbox._sections import Domain, Sections, Solved, Weighted
 from axisight.blackbox._weights import UsableLines, Weighting, usable_lines
 from axisight.errors import AxisightError, InputError
+from axisight.frf.pooled import MISFIT_EXPLAINED, few_words
 from axisight.frf.response import DIMS, frequency_response
 
 
@@ -34,7 +35,6 @@ class RationalModel:
     fitted. ``status``: ``converged``, or ``not_converged`` (the best found is given); ``warnings``
     say what to do. ``loss`` is the sum of squares of weighted residuals, real and imaginary
     parts, of expectation ``degrees_of_freedom`` where the weights come from a known variance.
-    ``variance_freedom``: complex degrees of freedom of a variance that is estimated, else None.
     """
 
     poles: Complex
@@ -46,8 +46,6 @@ class RationalModel:
     loss: float
     degrees_of_freedom: int
     n_parameters: int
-    weighting: Weighting
-    variance_freedom: float | None
     n_out: int
     n_in: int
     iterations: int
@@ -56,6 +54,7 @@ class RationalModel:
     numerators: Real = field(repr=False)
     """(n_elements, order + extras), elements row by row."""
     problem: Weighted = field(repr=False)
+    used: UsableLines = field(repr=False)
     pole_covariance: Real = field(repr=False)
     """Of the coefficients of the sections."""
     units: tuple[str, str] = field(repr=False)
@@ -65,6 +64,16 @@ class RationalModel:
     def order(self) -> int:
         """Number of poles without integrators."""
         return self.sections.order
+
+    @property
+    def weighting(self) -> Weighting:
+        """By what the lines were weighed."""
+        return self.used.weighting
+
+    @property
+    def variance_freedom(self) -> float | None:
+        """Complex degrees of freedom of a variance that is estimated, else None."""
+        return self.used.degrees_of_freedom
 
     @property
     def stable(self) -> bool:
@@ -134,6 +143,20 @@ class RationalModel:
             attrs={"order": self.order, "integrators": self.integrators, "status": self.status},
         )
 
+    def _chance(self, reduced: float) -> float:
+        """Probability of a larger reduced loss."""
+        count, nu = self.degrees_of_freedom, self.variance_freedom
+        if nu is None:
+            return float(stats.chi2.sf(reduced * count, count))
+        if self.used.neighbours:
+            # Real and imaginary part of every element count.
+            return float(stats.f.sf(reduced, count, 2 * nu * self.problem.values.size))
+        # By its own variance a squared residual is F(2, 2 nu), nu / (nu - 2) times more scattered.
+        if nu <= 2:
+            return np.nan
+        fewer = count * (nu - 2) / nu
+        return float(stats.chi2.sf(reduced * fewer, fewer))
+
     def _variance(self, x: Complex, columns: Complex) -> Real:
         """Variance of every element: of the residues at these poles, and of the poles.
 
@@ -159,14 +182,18 @@ class RationalModel:
     @property
     def reduced_loss(self) -> float:
         """Loss over what the variance makes it: one if the model holds."""
-        expected = self.degrees_of_freedom * float(self.problem.spread.mean())
-        return self.loss / max(expected, 1e-300)
+        return self.loss / max(self.degrees_of_freedom * self.loss_scale, 1e-300)
+
+    @property
+    def loss_scale(self) -> float:
+        """What the variance makes the square of a weighted residual."""
+        return float(self.problem.spread.mean()) * self.used.own.misfit
 
     @property
     def noise_scale(self) -> float:
         """Factor on the standard deviations of weighted residuals: one with a variance given."""
         if self.weighting == "variance":
-            return 1.0
+            return float(np.sqrt(self.used.own.variance))
         return float(np.sqrt(self.loss / max(self.degrees_of_freedom, 1)))
 
     def residual_tests(self, lags: int = 10) -> xr.Dataset:
@@ -192,12 +219,7 @@ class RationalModel:
         statistic = 2 * n * np.sum((np.stack(related) / power) ** 2, axis=0)
         shape = (self.n_out, self.n_in)
         reduced = self.reduced_loss
-        chance = np.nan
-        if self.weighting == "variance":
-            freedom = self.variance_freedom or np.inf
-            # Real and imaginary part of every element count.
-            other = min(2 * freedom * self.problem.values.size, 1e12)
-            chance = float(stats.f.sf(reduced, self.degrees_of_freedom, other))
+        chance = self._chance(reduced) if self.weighting == "variance" else np.nan
         return xr.Dataset(
             {
                 "whiteness_p": (DIMS[1:], stats.chi2.sf(statistic, 2 * most).reshape(shape)),
@@ -244,8 +266,9 @@ def fit_rational(
     neighbours
         How many neighbouring lines say by which variance a line is weighed: a weight from a
         variance that is too small by chance rules the fit. None: none where the variance is
-        known (no ``degrees_of_freedom``) or rests on 30, else as many as make 30 together; 0:
-        each line by its own. Uncertainties come from the variance as given, not the pooled one.
+        known (no ``degrees_of_freedom``) or rests on 30, else as many as make 30 together, an
+        even number from 4; 0: each line by its own, and uncertainties are enlarged by what such
+        weights cost. Pooled, they come from the variance as given.
     stable
         Keep the poles stable: mirrored while vector fitting, never left in the search. The
         integrators stay.
@@ -264,8 +287,6 @@ def fit_rational(
         raise InputError(f"integrators: expected 0, 1 or 2, got {integrators!r}")
     if n + integrators + direct == 0:
         raise InputError("order: expected at least one pole, integrator or direct term, got none")
-    if neighbours is not None:
-        neighbours = whole("neighbours", neighbours, 0)
     used = usable_lines(response, weighting, neighbours)
     f = used.frequency_hz
     if sample_time_s is not None and not (np.isfinite(sample_time_s) and sample_time_s > 0):
@@ -293,7 +314,7 @@ def fit_rational(
         first, _, steps, _ = min(found, key=lambda item: item[1])
         sections, evaluations, settled = _searched(problem, first, domain, stable, limit)
         steps += evaluations
-        for _ in range(RENEWALS if used.pooled else 0):
+        for _ in range(RENEWALS if used.neighbours else 0):
             # Neighbours' variances relative to the model, not to a magnitude with its error.
             columns = problem.columns(sections)
             modelled = np.abs(columns @ problem.residues(sections).numerators.T)
@@ -414,9 +435,8 @@ def _packed(
     loss = solved.loss
     n_parameters = sections.order + numerators.size
     freedom = solved.left.size - n_parameters
-    scale = 1.0 if used.variance is not None else loss / max(freedom, 1)
+    scale = used.own.variance if used.variance is not None else loss / max(freedom, 1)
     covariance, warnings = _covariance(problem, sections, scale)
-    warnings += _doubts(used, loss / max(freedom * float(problem.spread.mean()), 1e-300))
     direct = np.zeros(shape)
     if problem.extra.shape[1] > integrators:
         direct = numerators[:, -1].reshape(shape)
@@ -425,7 +445,7 @@ def _packed(
             0,
             "the search reached its limit: allow more iterations, start closer, or lower the order",
         )
-    return RationalModel(
+    model = RationalModel(
         poles=domain.natural(sections.poles()),
         sample_time_s=domain.sample_time_s,
         integrators=integrators,
@@ -435,8 +455,7 @@ def _packed(
         loss=loss,
         degrees_of_freedom=freedom,
         n_parameters=n_parameters,
-        weighting=used.weighting,
-        variance_freedom=used.degrees_of_freedom,
+        used=used,
         n_out=shape[0],
         n_in=shape[1],
         iterations=steps,
@@ -450,24 +469,21 @@ def _packed(
             str(response.attrs.get("output_unit", "")),
         ),
     )
+    return replace(model, warnings=(*model.warnings, *_doubts(model)))
 
 
-LOSS_EXPLAINED = 1.1
-"""Residuals larger than the variance explains by this factor: the model is incomplete."""
-
-
-def _doubts(used: UsableLines, reduced_loss: float) -> list[str]:
+def _doubts(model: RationalModel) -> list[str]:
     """Return what speaks against standard errors from the variance of the response."""
     out = []
-    if used.variance is not None and reduced_loss > LOSS_EXPLAINED:
+    if model.weighting == "variance" and model.reduced_loss > MISFIT_EXPLAINED:
         out.append(
-            f"the residuals are {reduced_loss:.3g} times what the variance explains: raise the "
-            "order, or the variance is too small; standard errors are too small"
+            f"the residuals are {model.reduced_loss:.3g} times what the variance explains: raise "
+            "the order, or the variance is too small; standard errors are too small"
         )
-    if used.uncertain:
+    if model.used.few and model.variance_freedom is not None:
         out.append(
-            f"lines are weighed by their own variance of {used.degrees_of_freedom:.3g} degrees of "
-            "freedom: standard errors are too small; use neighbours=None or more realizations"
+            f"{few_words(model.variance_freedom)}; standard errors are uncertain, NaN where they "
+            "have no bound"
         )
     return out
 
@@ -523,7 +539,7 @@ def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: obje
                 column.append(np.nan)
             continue
         count = model.degrees_of_freedom + model.n_parameters
-        level = model.loss / float(model.problem.spread.mean())
+        level = model.loss / model.loss_scale
         if model.weighting != "variance":
             level = count * float(np.log(max(model.loss, 1e-300) / count))
         d = model.n_parameters

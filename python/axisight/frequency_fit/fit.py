@@ -84,6 +84,11 @@ def fit_responses(
                     f"{chosen.criterion}, got none; average several periods or realizations, or "
                     "use least_squares or log_least_squares"
                 )
+    if chosen.neighbours and all(one.degrees_of_freedom is None for one in data):
+        raise InputError(
+            f"neighbours: expected responses with degrees_of_freedom to pool the variance of "
+            f"{chosen.neighbours} lines, got none that tells"
+        )
     model = [*robot.effects, *effects]
     chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
     nothing: list[Complex | None] = [None] * len(data)
@@ -218,7 +223,8 @@ def _wrap(
     sandwich = options.uncertainty == "sandwich" or (
         options.uncertainty == "auto" and (not doubt.holds or options.loss != "squared")
     )
-    own = found.sandwich if sandwich else found.response
+    response = found.response * doubt.inflation
+    own = found.sandwich if sandwich else response
     scale = 1.0 if options.weighted else found.misfit
     names = tuple(spec.name for spec in free)
     matrix = result.information / scale
@@ -235,7 +241,7 @@ def _wrap(
         interval=_interval(free, values, spread),
         covariance=own * np.outer(slopes, slopes),
         correlation=correlation,
-        std_response=slopes * np.sqrt(np.diag(found.response)),
+        std_response=slopes * np.sqrt(np.diag(response)),
         std_sandwich=slopes * np.sqrt(np.diag(found.sandwich)),
         std_from="sandwich" if sandwich else "response",
         status=result.status,

@@ -11,29 +11,23 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import positive
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.frf import Flag
 from axisight.frf.confidence import median_freedom
-from axisight.frf.pooled import (
-    ENOUGH_FREEDOM,
-    FEWEST_NEIGHBOURS,
-    neighbours_wanted,
-    pooled_variance,
-)
-from axisight.frf.quantity import RATES
+from axisight.frf.pooled import neighbours_for, pooled_variance
+from axisight.frf.quantity import ORDER, RATES, Quantity, quantity_of
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Quantity = Literal["position", "velocity", "acceleration"]
 Sampling = Literal["zero_order_hold", "continuous"]
 PoseTuple = tuple[
     list[float], Real, Complex, Real | None, Real | None, Complex | None, Complex | None, int
 ]
 
 UNITS: dict[str, Quantity] = {f"rad{rate}/Nm": quantity for quantity, rate in RATES.items()}
-ORDER: dict[Quantity, int] = {"position": 0, "velocity": 1, "acceleration": 2}
 DIMS = ("frequency_hz", "output", "input")
 
 
@@ -84,6 +78,8 @@ class MeasuredResponse:
                 f"response: expected shape {shape} (lines, outputs, inputs), got {response.shape}"
             )
         _store(self, "response", response)
+        if self.degrees_of_freedom is not None:
+            positive("degrees_of_freedom", self.degrees_of_freedom)
         if self.variance is not None and self.covariance is not None:
             raise InputError("variance: expected a variance or a covariance, got both")
         if self.variance is not None:
@@ -101,21 +97,24 @@ class MeasuredResponse:
     ) -> MeasuredResponse:
         """Return the response in a Dataset of `axisight.frf`, or in a DataArray.
 
-        ``joint_angle_rad`` as the attribute. The unit of ``data`` says what is measured:
-        rad/Nm, rad/s/Nm or rad/s^2/Nm. Of a Dataset flagged lines without numbers are left
-        out and counted; its ``variance`` is used unless a ``covariance`` is given (over the
-        lines of the data). Raises InputError for other units, dimensions, and NaN elsewhere.
+        ``joint_angle_rad`` as the attribute. The unit of ``data`` says what is measured, rad/Nm,
+        rad/s/Nm or rad/s^2/Nm, or without one its attribute ``quantity``. Of a Dataset flagged
+        lines without numbers are left out and counted; its ``variance`` is used unless a
+        ``covariance`` is given (over the lines of the data). Raises InputError for other units,
+        dimensions, and NaN elsewhere.
         """
         array = data["response"] if isinstance(data, xr.Dataset) and "response" in data else data
         if not isinstance(array, xr.DataArray) or set(array.dims) != set(DIMS):
             got = tuple(array.dims) if isinstance(array, xr.DataArray) else type(data).__name__
             raise InputError(f"response: expected dimensions {', '.join(DIMS)}, got {got}")
         unit = array.attrs.get("units")
-        if unit not in UNITS:
+        attrs = data.attrs if isinstance(data, xr.Dataset) else array.attrs
+        if unit not in UNITS and (unit or "quantity" not in attrs):
             raise InputError(
                 f"response: expected the attribute units to be one of {', '.join(UNITS)}, "
                 f"got {unit!r}"
             )
+        quantity = quantity_of(xr.Dataset({"response": array}, attrs=attrs))
         response = array.transpose(*DIMS).values
         keep = np.ones(len(response), bool)
         variance = freedom = None
@@ -126,13 +125,14 @@ class MeasuredResponse:
             if "variance" in data and covariance is None:
                 known = data["variance"].transpose(*DIMS).values
                 variance = None if np.isnan(known).all() else known[keep]
-            freedom = median_freedom(data)
+            if variance is not None or covariance is not None:
+                freedom = median_freedom(data)
         at = _real("joint_angle_rad", joint_angle_rad, 1)
         return cls(
             tuple(at),
             array["frequency_hz"].values[keep],
             response[keep],
-            UNITS[unit],
+            quantity,
             variance,
             None if covariance is None else np.asarray(covariance)[keep],
             freedom,
@@ -140,10 +140,15 @@ class MeasuredResponse:
         )
 
     @property
-    def uncertain_weights(self) -> bool:
-        """Whether the variance of a line alone is too uncertain to weigh it by."""
-        freedom = self.degrees_of_freedom
-        return freedom is not None and freedom < ENOUGH_FREEDOM
+    def elements_weighed_together(self) -> int:
+        """How many elements of a line a weight matrix holds: 1 by variances."""
+        if self.covariance is None:
+            return 1
+        m = int(self.response.shape[1])
+        blocks = self.covariance.reshape(-1, m, m, m, m)
+        apart = np.arange(m)[:, None] != np.arange(m)
+        # Elements (output, input): of different inputs, or of different outputs only.
+        return m * m if blocks.transpose(0, 1, 3, 2, 4)[:, :, :, apart].any() else m
 
     def pooled(self, neighbours: int | None, model: Complex | None) -> Real | None:
         """Return variances to weigh by from neighbouring lines; None to weigh by each line's own.
@@ -154,15 +159,9 @@ class MeasuredResponse:
         freedom = self.degrees_of_freedom
         if freedom is None or self.variance is None:
             return None
-        count = neighbours
-        if count is None:
-            count = neighbours_wanted(freedom, len(self.frequency_hz))
-        if count < FEWEST_NEIGHBOURS:
+        count = neighbours_for(freedom, len(self.frequency_hz), neighbours)
+        if not count:
             return None
-        if count >= len(self.frequency_hz):
-            raise InputError(
-                f"neighbours: expected fewer than the {len(self.frequency_hz)} lines, got {count}"
-            )
         order = np.argsort(self.frequency_hz)
         out = np.empty_like(self.variance)
         magnitude = np.abs(self.response if model is None else model)

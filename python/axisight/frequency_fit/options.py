@@ -9,6 +9,7 @@ import numpy as np
 
 from axisight.errors import InputError
 from axisight.frequency_fit.measured import Sampling, check_sampling
+from axisight.frf.pooled import check_neighbours
 
 Criterion = Literal[
     "least_squares",
@@ -44,8 +45,9 @@ class FrequencyFitOptions:
         relative variance.
     neighbours
         How many neighbouring lines, half of them on either side, say by which variance a line
-        is weighed. ``None``: none where the variance is known (no ``degrees_of_freedom``) or
-        rests on 30, else as many as make 30 together. 0: each line by its own.
+        is weighed: an even number from 4. ``None``: none where the variance is known (no
+        ``degrees_of_freedom``) or rests on 30, else as many as make 30 together. 0: each line
+        by its own; then the covariance is enlarged by what such weights cost.
     uncertainty
         ``response`` takes standard deviations from the variance of the response, ``sandwich``
         from the scatter of the residuals over blocks of ``block_lines`` lines (fewer where that
@@ -89,9 +91,11 @@ class FrequencyFitOptions:
             raise InputError(
                 f"uncertainty: expected auto, response or sandwich, got {self.uncertainty!r}"
             )
-        if self.neighbours is not None and not _whole(self.neighbours, 0):
+        check_neighbours(self.neighbours)
+        if self.neighbours and not self.weighted:
             raise InputError(
-                f"neighbours: expected None or a whole number from 0, got {self.neighbours!r}"
+                f"neighbours: expected None or 0 with the criterion {self.criterion}, which has "
+                f"no weights, got {self.neighbours}"
             )
         for name, least in (
             ("reweightings", 0),
@@ -101,7 +105,7 @@ class FrequencyFitOptions:
             ("max_iterations", 1),
         ):
             value = getattr(self, name)
-            if not _whole(value, least):
+            if isinstance(value, bool) or not isinstance(value, int) or value < least:
                 raise InputError(f"{name}: expected a whole number from {least}, got {value!r}")
         for name in ("loss_scale", "start_spread", "gain_tolerance", "step_tolerance"):
             value = getattr(self, name)
@@ -117,10 +121,6 @@ class FrequencyFitOptions:
     def logarithmic(self) -> bool:
         """Whether logarithms are compared."""
         return "log" in self.criterion
-
-
-def _whole(value: object, least: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= least
 
 
 @dataclass(frozen=True)

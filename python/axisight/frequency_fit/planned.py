@@ -14,13 +14,13 @@ from axisight.fitting import Parameter
 from axisight.frequency_fit.measured import (
     MeasuredResponse,
     PoseTuple,
-    Quantity,
     Sampling,
     check_sampling,
     model_response,
 )
 from axisight.frequency_fit.options import FrequencyFitOptions, core_options
 from axisight.frequency_fit.parameters import Spec, specs
+from axisight.frf.quantity import Quantity
 from axisight.identifiability import Information, of_log_information
 from axisight.robot import Robot
 

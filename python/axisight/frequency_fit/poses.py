@@ -13,9 +13,10 @@ from axisight import _core
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import Parameter
-from axisight.frequency_fit.measured import Quantity, Sampling
+from axisight.frequency_fit.measured import Sampling
 from axisight.frequency_fit.parameters import specs
 from axisight.frequency_fit.planned import of_search, pose_information
+from axisight.frf.quantity import Quantity
 from axisight.identifiability import Identifiability, identifiability
 from axisight.robot import Robot
 

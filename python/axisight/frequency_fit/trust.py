@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.frequency_fit.measured import MeasuredResponse
+from axisight.frf.pooled import FEW_FREEDOM, MISFIT_EXPLAINED, OwnWeights, few_words
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MISFIT_EXPLAINED = 1.1
-"""Residuals larger than the variance explains by this factor: the model is incomplete."""
 RELATED = 3.0
 """Standard deviations; by chance 0.3 % of fits lie beyond."""
 
@@ -26,12 +25,14 @@ class Trust:
     ``excess``: mean square of the whitened residuals over what the variance explains, None if
     unknown. ``related``: correlation of residuals at neighbouring lines, in standard deviations
     of chance. ``own_weights``: fewest complex degrees of freedom of a variance that weighs its
-    own line, None where all are known or pooled.
+    own line, None where all are known, pooled or many. ``inflation``: by which weights from
+    their own variance make the covariance of the parameters larger than they claim.
     """
 
     excess: float | None
     related: float
     own_weights: float | None
+    inflation: float
 
     @property
     def holds(self) -> bool:
@@ -53,10 +54,7 @@ class Trust:
                 "is correlated over the lines (drift, leakage, smoothing)"
             )
         if self.own_weights is not None:
-            out.append(
-                f"lines are weighed by their own variance of {self.own_weights:.3g} degrees of "
-                "freedom: use neighbours=None, more lines or more realizations"
-            )
+            out.append(few_words(self.own_weights))
         return out
 
 
@@ -74,24 +72,45 @@ def trust(
     residuals of all responses, ``misfit`` their mean square, degrees of freedom counted.
     """
     known = all(one.variance is not None or one.covariance is not None for one in data)
-    uncertain = [
-        one.degrees_of_freedom
+    own = [
+        one
         for one, weights in zip(data, weighing, strict=True)
-        if one.uncertain_weights and weights is None and one.degrees_of_freedom is not None
+        if weights is None and one.degrees_of_freedom is not None
+    ]
+    few = [
+        one.degrees_of_freedom
+        for one in own
+        if one.degrees_of_freedom is not None
+        and one.degrees_of_freedom - one.elements_weighed_together < FEW_FREEDOM
     ]
     values: Complex = residual[:, 0] + 1j * residual[:, 1]
     return Trust(
         excess=misfit / _explained(data, weighing) if weighted and known else None,
         related=_related(data, values),
-        own_weights=min(uncertain) if weighted and uncertain else None,
+        own_weights=min(few) if weighted and few else None,
+        inflation=_inflation(data, weighing) if weighted else 1.0,
     )
+
+
+def _inflation(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]) -> float:
+    factors = [
+        1.0 if weights is not None else _own(one).variance
+        for one, weights in zip(data, weighing, strict=True)
+    ]
+    found = float(np.average(factors, weights=[one.response.size for one in data]))
+    # Without bound the sandwich is taken, or the user insists.
+    return found if np.isfinite(found) else 1.0
+
+
+def _own(one: MeasuredResponse) -> OwnWeights:
+    return OwnWeights.of(one.degrees_of_freedom, one.elements_weighed_together)
 
 
 def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]) -> float:
     """Mean square of whitened residuals that the variance explains.
 
-    Weighed by other lines, that is the mean ratio of both variances; weighed by the own one the
-    mean of an F distribution, nu / (nu - 1).
+    Weighed by other lines, that is the mean ratio of both variances; by the own one, see
+    `OwnWeights`.
     """
     out, count = 0.0, 0
     for one, weights in zip(data, weighing, strict=True):
@@ -101,8 +120,8 @@ def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]
             used = np.isfinite(weights)
             n = int(used.sum())
             ratio = float(np.mean(one.variance[used] / weights[used])) if n else 1.0
-        elif one.degrees_of_freedom is not None and one.degrees_of_freedom > 1:
-            ratio = one.degrees_of_freedom / (one.degrees_of_freedom - 1)
+        elif np.isfinite(_own(one).misfit):
+            ratio = _own(one).misfit
         out, count = out + n * ratio, count + n
     return out / max(count, 1)
 

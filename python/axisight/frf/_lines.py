@@ -15,7 +15,9 @@ from axisight.records.arbitrary import ArbitraryRecords
 from axisight.records.periodic import PeriodicRecords
 
 Quantity = Literal["position", "velocity", "acceleration"]
-ORDER = {"position": 0, "velocity": 1, "acceleration": 2}
+ORDER: dict[Quantity, int] = {"position": 0, "velocity": 1, "acceleration": 2}
+RATES: dict[Quantity, str] = {"position": "", "velocity": "/s", "acceleration": "/s^2"}
+"""What follows the unit of the position in that of its derivatives."""
 
 SMALLEST = 1e-12
 """Amplitudes and singular values below this share of the largest are rounding."""
@@ -32,7 +34,7 @@ def line_factor(frequency_hz: Real, quantity: Quantity) -> Complex:
 def output_unit(records: PeriodicRecords | ArbitraryRecords, quantity: Quantity) -> str:
     """Unit of the output, seconds added."""
     one_of("quantity", quantity, ORDER)
-    return records.output_unit + ("", "/s", "/s^2")[ORDER[quantity]]
+    return records.output_unit + RATES[quantity]
 
 
 def provenance(records: PeriodicRecords, quantity: Quantity) -> dict[str, Any]:

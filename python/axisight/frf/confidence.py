@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.arguments import between
+from axisight.errors import InputError
 from axisight.frf.response import DIMS, estimate_of
 
 
@@ -49,11 +50,14 @@ def with_freedom(dataset: xr.Dataset, freedom: NDArray[np.float64]) -> xr.Datase
 def median_freedom(dataset: xr.Dataset) -> float | None:
     """Return the median over the lines of the complex degrees of freedom of ``variance``.
 
-    None where the Dataset does not tell: the variance then counts as known.
+    None where the Dataset does not tell: the variance then counts as known. Raises InputError
+    for numbers that are not positive.
     """
     found = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))
     if found is None:
         return None
     values = np.asarray(found, float)
     values = values[np.isfinite(values)]
+    if (values <= 0).any():
+        raise InputError(f"degrees_of_freedom: expected positive numbers, got {values.min()}")
     return float(np.median(values)) if values.size else None

@@ -3,15 +3,20 @@
 A sample variance with nu complex degrees of freedom scatters; a weight 1 / variance scatters more.
 Weighing every line by its own makes a least-squares estimate vary nu / (nu - 2) times more than
 the weights claim, without bound from three realizations. So a line is weighed by what its
-neighbours say, and its own variance is kept for the covariance of the estimate: both do not
-depend on each other, so that this covariance stays right however well neighbours resemble.
+neighbours say, and its own variance is kept for the covariance of the estimate. Where variances
+of lines are independent, so are both, and this covariance is right however badly neighbours
+resemble each other. Variances that share data (of smoothed responses, local models) are not.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
+
+from axisight.errors import InputError
 
 Real = NDArray[np.float64]
 
@@ -26,18 +31,84 @@ FEWEST_NEIGHBOURS = 4
 """A straight line needs that many."""
 LARGEST_SHARE = 3
 """One in so many lines at most counts as a neighbour."""
+FEW_FREEDOM = 10.0
+"""Degrees of freedom beyond the elements weighed together: with fewer, `OwnWeights` is uncertain."""
+MISFIT_EXPLAINED = 1.1
+"""Residuals larger than the variance explains by this factor: the model is incomplete."""
 
 
-def neighbours_wanted(degrees_of_freedom: float | None, n_lines: int) -> int:
-    """Return how many neighbours make the weight of a line sure enough; none for a known variance.
+def neighbours_for(
+    degrees_of_freedom: float | None, n_lines: int, wanted: int | None = None
+) -> int:
+    """Return how many neighbours say the weight of a line, 0 if it is its own variance.
 
-    ``degrees_of_freedom`` are complex, of a line's variance.
+    degrees_of_freedom
+        Complex, of a line's variance; None if it is known.
+    n_lines
+        That there are.
+    wanted
+        By the user: 0 or an even number from 4. None: as many as make 30 degrees of freedom, at
+        most a third of the lines, none for a known variance or one of 30.
+
+    Raises InputError for another number, and one that cannot be had.
     """
+    if wanted is not None:
+        check_neighbours(wanted)
+        if wanted >= n_lines:
+            raise InputError(f"neighbours: expected fewer than the {n_lines} lines, got {wanted}")
+        return 0 if degrees_of_freedom is None else wanted
     if degrees_of_freedom is None or degrees_of_freedom >= ENOUGH_FREEDOM:
         return 0
-    scatter = float(special.polygamma(1, max(degrees_of_freedom, 0.5)))
+    scatter = float(special.polygamma(1, degrees_of_freedom))
     half = max(int(np.ceil(0.5 * ENOUGH_FREEDOM * scatter)), FEWEST_NEIGHBOURS // 2)
-    return 2 * min(half, n_lines // (2 * LARGEST_SHARE))
+    count = 2 * min(half, n_lines // (2 * LARGEST_SHARE))
+    return count if count >= FEWEST_NEIGHBOURS else 0
+
+
+def check_neighbours(wanted: int | None) -> None:
+    """Refuse a number of neighbours that is none."""
+    if wanted is None:
+        return
+    whole = isinstance(wanted, int | np.integer) and not isinstance(wanted, bool)
+    if not whole or not (wanted == 0 or (wanted >= FEWEST_NEIGHBOURS and wanted % 2 == 0)):
+        raise InputError(
+            f"neighbours: expected None, 0 or an even number from {FEWEST_NEIGHBOURS}, "
+            f"got {wanted!r}"
+        )
+
+
+@dataclass(frozen=True)
+class OwnWeights:
+    """What weights from a line's own estimated variance do to a fit.
+
+    ``misfit``: mean square of whitened residuals. ``variance``: factor on the covariance of the
+    parameters that the weights claim. NaN where they have no bound.
+    """
+
+    misfit: float = 1.0
+    variance: float = 1.0
+
+    @classmethod
+    def of(cls, degrees_of_freedom: float | None, elements: int = 1) -> OwnWeights:
+        """Return the moments of an inverse complex Wishart matrix of so many ``elements``.
+
+        ``degrees_of_freedom`` nu: nu / (nu - p) and nu^2 / ((nu - p)^2 - 1).
+        """
+        if degrees_of_freedom is None:
+            return cls()
+        nu, left = degrees_of_freedom, degrees_of_freedom - elements
+        return cls(
+            misfit=nu / left if left > 0 else np.nan,
+            variance=nu**2 / (left**2 - 1) if left > 1 else np.nan,
+        )
+
+
+def few_words(degrees_of_freedom: float) -> str:
+    """Return what to say of lines weighed by their own variance of few degrees of freedom."""
+    return (
+        f"lines are weighed by their own variance of {degrees_of_freedom:.3g} degrees of freedom: "
+        "use neighbours=None if it is 0, more lines, or more realizations"
+    )
 
 
 def pooled_variance(
@@ -59,7 +130,8 @@ def pooled_variance(
     A straight line goes through the logarithms of the neighbours' variances, relative to the
     magnitude where that makes them smoother. The logarithm of a sample variance is low by
     ln nu - psi(nu), which is put right. A line above its neighbours by more than
-    the 1 - 1e-6 quantile of F(2 nu, 2 x 30) keeps its own variance.
+    the 1 - 1e-6 quantile of F(2 nu, 2 x 30) keeps its own variance. ``degrees_of_freedom`` above
+    zero and ``neighbours`` as from `neighbours_for`, which checks.
     """
     shape = variance.shape
     own = variance.reshape(shape[0], -1)

@@ -6,10 +6,9 @@ import xarray as xr
 
 from axisight.arguments import one_of
 from axisight.errors import InputError
-from axisight.frf._lines import ORDER, Quantity
+from axisight.frf._lines import ORDER, RATES, Quantity
 
-RATES: dict[Quantity, str] = {"position": "", "velocity": "/s", "acceleration": "/s^2"}
-"""What follows the unit of the position in that of its derivatives."""
+__all__ = ["ORDER", "RATES", "Quantity", "quantity_of"]
 
 _OUTPUTS: dict[str, Quantity] = {
     unit + rate: quantity for unit in ("rad", "m") for quantity, rate in RATES.items()

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError
 from axisight.frf.confidence import median_freedom
-from axisight.frf.pooled import FEWEST_NEIGHBOURS, neighbours_wanted, pooled_variance
-from axisight.frf.quantity import quantity_of
+from axisight.frf.pooled import neighbours_for, pooled_variance
+from axisight.frf.quantity import ORDER, quantity_of
 from axisight.frf.response import Flag
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_DERIVATIVES_MISSING = {"position": 2, "velocity": 1, "acceleration": 0}
 _FEWEST_LINES = 8
 # Relative error of a response up to which simple models are not told from it.
 _MODEL_FLOOR = 0.05
@@ -69,8 +68,8 @@ class Collocated:
         neighbouring lines is taken (`pooled_variance`).
         """
         variance, freedom = self.variance, self.degrees_of_freedom
-        count = neighbours_wanted(freedom, len(variance))
-        if freedom is not None and count >= FEWEST_NEIGHBOURS:
+        count = neighbours_for(freedom, len(variance))
+        if freedom is not None and count:
             variance = pooled_variance(np.abs(modelled), variance, freedom, count)
         known = np.where(np.isfinite(variance), variance, 0.0)
         return np.asarray(known / np.abs(modelled) ** 2)
@@ -117,7 +116,7 @@ def collocated(
         if axis not in response[name].values:
             known = ", ".join(str(a) for a in response[name].values)
             raise InputError(f"axis: expected one of {known}, got {axis!r}")
-    missing = _DERIVATIVES_MISSING[quantity_of(response, quantity)]
+    missing = ORDER["acceleration"] - ORDER[quantity_of(response, quantity)]
     one = response.sel(output=axis, input=axis)
     frequency = np.asarray(one["frequency_hz"].values, np.float64)
     factor = (2j * np.pi * frequency) ** missing
