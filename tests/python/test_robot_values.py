@@ -158,7 +158,7 @@ def test_values_of_an_axis_fit_stand_where_they_belong(tmp_path: Path) -> None:
     model = AxisModel(gear_ratio=RATIO)
     fit = axis_fit(model, TRUTH)
     robot = load_robot("two_mass_axis")
-    found = identified_axis(fit, robot, SOURCE)
+    found = identified_axis(fit, robot, SOURCE, covariance="sandwich")
     write_identified(robot, tmp_path / "r.toml", found)
     back = load_identified(tmp_path / "r.toml")
     values = robot_parameters(back.robot)
@@ -240,13 +240,19 @@ def test_effects_in_the_way_are_set_to_neutral(tmp_path: Path) -> None:
     model = AxisModel(gear_ratio=RATIO, cubic=(False,))
     truth = {n: v for n, v in TRUTH.items() if n != "k3"}
     preset = load_robot("two_mass_axis")
-    stuck = Effect("presliding_friction", 1, {"coulomb_nm": 0.5})
+    others = [
+        Effect("presliding_friction", 1, {"coulomb_nm": 0.5}),
+        Effect("quadratic_drag", 1, {"drag_nm_s2_rad2": 1e-3}),
+        Effect("load_dependent_friction", 1, {"coefficient": 0.05}),
+        Effect("backlash", 1, {"half_width_rad": 1e-4}),
+    ]
     ripple = Effect("resolver_ripple", 1, {"cosine_1_rad": 1e-3})
-    robot = Robot(preset.core, [*preset.effects, stuck, ripple])
+    robot = Robot(preset.core, [*preset.effects, *others, ripple])
     found = identified_axis(axis_fit(model, truth), robot, SOURCE)
     write_identified(robot, tmp_path / "r.toml", found)
     back = {e.label: e.parameters for e in load_identified(tmp_path / "r.toml").robot.effects}
-    assert back["nonlinear_stiffness@1"] == back["presliding_friction@1"] == {}
+    assert back["nonlinear_stiffness@1"] == {}
+    assert all(back[effect.label] == {} for effect in others)
     assert back["coulomb_friction@1"]["coulomb_nm"] != 0.644
     assert back["resolver_ripple@1"] == {"cosine_1_rad": 1e-3}
     assert "set to neutral" in found.provenance.notes
@@ -275,7 +281,41 @@ def test_axis_fits_of_other_things_are_refused() -> None:
         with pytest.raises(InputError, match=words):
             call()
     lost = dataclasses.replace(fit, sandwich=np.full_like(fit.sandwich, np.nan))
-    assert np.isnan(identified_axis(lost, robot, SOURCE).standard_errors).all()
+    found = identified_axis(lost, robot, SOURCE, covariance="sandwich")
+    assert np.isnan(found.standard_errors).all()
+    assert "too few: unknown; the fit trusts the other kind (white)" in found.provenance.notes
+
+
+@pytest.mark.parametrize(("block_s", "kind"), [(0.25, "white"), (0.03, "sandwich")])
+def test_written_standard_errors_are_those_of_the_summary(tmp_path, block_s, kind) -> None:
+    # Six blocks of a quarter of a second are too few for a sandwich of seven parameters.
+    data = record(n=3000, noise=1e-4 * np.random.default_rng(0).normal(size=3000))
+    settings = FitSettings(gradual=(), block_s=block_s)
+    fit = fit_axis(AxisModel(gear_ratio=RATIO), data, TRUTH, settings=settings)
+    assert fit.trusted == "white"
+    fit = dataclasses.replace(fit, trusted=kind)
+    robot = load_robot("two_mass_axis")
+    write_identified(robot, tmp_path / "r.toml", identified_axis(fit, robot, SOURCE))
+    back = load_identified(tmp_path / "r.toml")
+    order = [fit.free.index(n) for n in ("J_m", "k1", "k3", "d", "F_v", "F_c")]
+    np.testing.assert_allclose(back.standard_errors, fit.standard_error[order], rtol=1e-9)
+    assert np.isfinite(back.standard_errors).all()
+    words = {"white": "of white prediction errors", "sandwich": f"sandwich of {fit.blocks} blocks"}
+    assert f"standard errors: {words[kind]}" in back.provenance.notes
+    assert "the other kind" not in back.provenance.notes
+
+
+def test_gear_ratios_that_differ_little_are_converted() -> None:
+    fit = axis_fit(AxisModel(gear_ratio=RATIO), TRUTH)
+    # Two parts in a million, 9e-9 in the ratio itself.
+    other = dataclasses.replace(fit, parameters=fit.parameters | {"r": RATIO * (1 + 2e-6)})
+    robot = load_robot("two_mass_axis")
+    one, two = (identified_axis(f, robot, SOURCE) for f in (fit, other))
+    change = two.value("axis1.stiffness") / one.value("axis1.stiffness") - 1
+    # A square to first order; rounding of 1e-16 in a change of 4e-6.
+    assert change == pytest.approx(4e-6, rel=1e-5)
+    assert "converted from the gear ratio" in two.provenance.notes
+    assert "converted" not in one.provenance.notes
 
 
 # Calibration.

@@ -18,7 +18,7 @@ from axisight.robot_sidecar import known
 from axisight.robot_values import noted, values_of
 
 Array = NDArray[np.float64]
-Covariance = Literal["sandwich", "white"]
+Covariance = Literal["trusted", "sandwich", "white"]
 
 # Thesis name: quantity of the robot file.
 QUANTITIES = {
@@ -31,9 +31,11 @@ EXACT_SIGN_SMOOTHING_RAD_S = 0.01
 """What effects take for a sign that the fit followed exactly, as the preset of the thesis has it."""
 MOST_RIPPLES = 3
 """Harmonics that the effect torque_ripple holds."""
-# A fitted axis has its own of these; on top of it they would count twice.
+# Friction and gear springs: a fitted axis has its own; on top of it these would count twice.
 REPLACED = (
     "viscous_friction",
+    "quadratic_drag",
+    "load_dependent_friction",
     "coulomb_friction",
     "asymmetric_friction",
     "stribeck_friction",
@@ -41,6 +43,7 @@ REPLACED = (
     "joint_stiffness",
     "nonlinear_stiffness",
     "joint_damping",
+    "backlash",
     "motor_inertia",
 )
 
@@ -51,7 +54,7 @@ def identified_axis(
     provenance: Provenance,
     *,
     axis: int = 1,
-    covariance: Covariance = "sandwich",
+    covariance: Covariance = "trusted",
     smoothing_rad_s: float | None = None,
 ) -> Identified:
     """Return the fit of one axis in the terms of a robot file, for `write_identified`.
@@ -80,16 +83,17 @@ def identified_axis(
         the robot's, k1, d, J_a by (r_fit / r_robot)^2, k3 by the fourth power, b by the inverse:
         the motor moves alike.
     robot
-        Where they will be written. Friction and gear effects of the axis that it has already and
-        that the fit has not are set to neutral: the fitted values stand in their place.
+        Where they will be written. Effects of friction and gear spring of the axis (`REPLACED`)
+        that it has already and the fit has not are set to neutral: the fit stands in their place.
     provenance
         Where they come from.
     axis
         Number of the axis, from 1.
     covariance
-        ``"sandwich"`` or ``"white"``, of the fit, carried to first order through the conversion. The
-        sandwich of records with few blocks is unknown, and standard errors are then too.
-        Values that were held are written if the robot has others, standard error zero, and noted.
+        Which one of the fit: ``"trusted"`` (by its ``trusted``), ``"sandwich"`` or ``"white"``; to
+        first order through the conversion. The sandwich of few blocks is unknown, and so are
+        then standard errors. The notes say which. Held values are written if the robot has others,
+        standard error zero, and noted.
     smoothing_rad_s
         Width [rad/s] over which friction effects smooth the sign; by default that of the model,
         0.01 rad/s where the model follows the sign exactly.
@@ -100,32 +104,14 @@ def identified_axis(
     if not isinstance(fit, AxisFit):
         raise InputError(f"fit: expected an AxisFit, got {type(fit).__name__}")
     joint, ratio = _joint(robot, axis)
-    if covariance not in ("sandwich", "white"):
-        raise InputError(f"covariance: expected sandwich or white, got {covariance!r}")
+    spread, kind = _spread(fit, covariance)
     width = _width(fit, smoothing_rad_s)
     values, slopes = _converted(fit, ratio)
-    spread = fit.sandwich if covariance == "sandwich" else fit.covariance
     effects, owner = _effects(fit, values, axis, width)
-    present = robot_parameters(robot)
-    names: dict[str, str] = {}
-    held = []
-    for name in values:
-        place = f"{joint}.{QUANTITIES[name]}" if name in QUANTITIES else owner.get(name)
-        if place is None:
-            continue
-        if name not in fit.free:
-            if present.get(place) == values[name] and not slopes[name].any():
-                continue
-            held.append(name)
-        names[name] = place
+    names, held = _places(fit, robot, joint, values, slopes, owner)
     unplaced = _unplaced(fit, values, slopes, spread, {*QUANTITIES, *owner})
-    labels = [effect.label for effect in effects]
-    replaced = [
-        Effect(e.name, axis, {})
-        for e in robot.effects
-        if e.axis == axis and e.name in REPLACED and e.label not in labels
-    ]
-    notes = _notes(fit, robot, joint, ratio, unplaced)
+    replaced = _replaced(robot, axis, effects)
+    notes = [kind, *_notes(fit, robot, joint, ratio, unplaced)]
     if held:
         notes.append(f"held in the fit: {', '.join(held)}")
     if replaced:
@@ -140,6 +126,62 @@ def identified_axis(
         noted(provenance, [*notes, f"search: {fit.status}", *fit.warnings], unplaced),
         effects=[*effects, *replaced],
     )
+
+
+def _spread(fit: AxisFit, covariance: Covariance) -> tuple[Array, str]:
+    """Covariance of the free parameters and words about its kind."""
+    if covariance not in ("trusted", "sandwich", "white"):
+        raise InputError(f"covariance: expected trusted, sandwich or white, got {covariance!r}")
+    kind = fit.trusted if covariance == "trusted" else covariance
+    if kind == "white":
+        text = "standard errors: of white prediction errors of one variance"
+        matrix = fit.covariance
+    else:
+        text = f"standard errors: sandwich of {fit.blocks} blocks"
+        matrix = fit.sandwich
+        if not np.isfinite(matrix).any():
+            text += ", too few: unknown"
+    other = "" if kind == fit.trusted else f"; the fit trusts the other kind ({fit.trusted})"
+    return matrix, text + other
+
+
+def _places(
+    fit: AxisFit,
+    robot: Robot,
+    joint: str,
+    values: Mapping[str, float],
+    slopes: Mapping[str, Array],
+    owner: Mapping[str, str],
+) -> tuple[dict[str, str], list[str]]:
+    """Full name in the robot file by thesis name of what is written, and which of it was held."""
+    present = robot_parameters(robot)
+    names: dict[str, str] = {}
+    held = []
+    for name, value in values.items():
+        place = f"{joint}.{QUANTITIES[name]}" if name in QUANTITIES else owner.get(name)
+        if place is None:
+            continue
+        if name not in fit.free:
+            if present.get(place) == value and not slopes[name].any():
+                continue
+            held.append(name)
+        names[name] = place
+    return names, held
+
+
+def _replaced(robot: Robot, axis: int, effects: list[Effect]) -> list[Effect]:
+    """Effects of the robot that the fit stands in for, at their neutral values."""
+    labels = [effect.label for effect in effects]
+    return [
+        Effect(e.name, axis, {})
+        for e in robot.effects
+        if e.axis == axis and e.name in REPLACED and e.label not in labels
+    ]
+
+
+def _same_ratio(own: float, ratio: float) -> bool:
+    """Whether two gear ratios differ by rounding only; they are small, 1/200 and the like."""
+    return bool(np.isclose(own, ratio, rtol=1e-12, atol=0.0))
 
 
 def _joint(robot: Robot, axis: int) -> tuple[str, float]:
@@ -178,8 +220,7 @@ def _converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, 
     values, slopes = {}, {}
     for name, value in fit.parameters.items():
         power = _power(name)
-        # Ratios that differ by rounding are the same.
-        factor = 1.0 if np.isclose(own, ratio, rtol=1e-12) else (own / ratio) ** power
+        factor = 1.0 if _same_ratio(own, ratio) else (own / ratio) ** power
         values[name] = value * factor
         slope = np.zeros(len(fit.free))
         if name in fit.free:
@@ -259,7 +300,7 @@ def _notes(
     if others:
         notes.append(f"not written, no place in a robot file: {', '.join(others)}")
     own = fit.parameters["r"]
-    if not np.isclose(own, ratio, rtol=1e-12):
+    if not _same_ratio(own, ratio):
         notes.append(f"converted from the gear ratio {own:.9g} of the fit to {ratio:.9g}")
     return notes
 
