@@ -32,7 +32,8 @@ def check_data(model: AxisModel, data_sets: Sequence[AxisData] | AxisData) -> tu
         if not isinstance(record, AxisData):
             raise InputError(f"data_sets[{i}]: expected AxisData, got {type(record).__name__}")
         record.measured(model)
-        least = 4 * model.n_masses
+        # A difference needs one sample more than the speed at the start is found from.
+        least = max(4 * model.n_masses, START_SAMPLES + 1)
         if len(record) < least:
             raise InputError(
                 f"{label(i, record)}: expected at least {least} samples, got {len(record)}"
@@ -69,7 +70,8 @@ def check_start(
 ) -> tuple[str, ...]:
     """Refuse records clearly in motion at their first sample that the model starts at rest.
 
-    Returns words for those that may be, if their noise is not slow. ``values`` are all parameters, roughly right.
+    Returns words for those that may be, if their noise is not slow. ``values`` are all
+    parameters, roughly right.
     """
     out = []
     for i, record in enumerate(data if model.initial == "rest" else ()):

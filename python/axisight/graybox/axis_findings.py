@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 # Fit (3.54) [%] below which the residuals have more than a quarter of the power of the motion.
 LOW_FIT = 50.0
 # Total inertias of start and end further apart than this are no matter of a poor start.
-FAR = 4.0
+FAR = 3.5
 # Factors by which a motion is off when its unit is not rad and rad/s.
 UNITS = {
     180 / np.pi: "degrees instead of radians",
@@ -133,7 +133,8 @@ def _lags(record: AxisData) -> int:
 def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
     """Return the power of the residuals at low frequency over that of white ones.
 
-    1 + 2 sum (1 - k / L) rho(k): what it is for errors that slow derivatives average.
+    1 + 2 sum_k (1 - k / (L + 1)) rho(k), k from 1 to L: the power at frequency zero by Bartlett's
+    window, as it is for errors that slow derivatives average.
     """
     lags = min(_lags(d) for d in data)
     rho = _autocovariance(residuals, lags)
@@ -152,8 +153,10 @@ def start_findings(task: Task, point: Point, token: _core.CancelToken) -> tuple[
     free = replace(task, model=replace(task.model, initial="free"))
     try:
         other = search(free, point, token)
-    except InputError:  # diverges: no better
-        return ()
+    except InputError as error:
+        return tuple(
+            f"{text}; could not be judged: the free start failed ({error})" for text in task.doubts
+        )
     lengths = np.cumsum([len(d) for d in task.data])[:-1]
     share = max(slow_share(task.data, np.split(other.errors, lengths)), 1.0)
     more = len(task.data) * (2 * task.model.n_masses - 1)
@@ -171,11 +174,15 @@ def covariance_findings(
     names: Sequence[str],
     covariance: Array,
     sandwich: Array,
-    blocks: int,
+    counts: tuple[int, int],
     residuals: Sequence[Array],
 ) -> tuple[list[str], bool]:
-    """Return words where errors are not white, and whether to trust the sandwich instead."""
+    """Return words where errors are not white, and whether to trust the sandwich instead.
+
+    ``counts`` are the blocks of the sandwich and its degrees of freedom.
+    """
     n = len(names)
+    blocks, freedom = counts
     differenced = ""
     if task.model.output == "velocity_difference":
         first = _autocovariance(residuals, 1)[1]
@@ -193,7 +200,6 @@ def covariance_findings(
         seen = np.isfinite(size) & (size > 0)
         ratio = np.where(seen, np.sqrt(np.diag(sandwich) / np.where(seen, size, 1.0)), 1.0)
         # Scatter of so many blocks, were the errors white.
-        freedom = max(blocks - n, 1)
         chance = stats.chi2.ppf([CHANCE / 2 / n, 1 - CHANCE / 2 / n], freedom) / freedom
         low, high = np.sqrt(chance)
         off = (ratio > max(high, DISAGREE)) | (ratio < min(low, 1 / DISAGREE))

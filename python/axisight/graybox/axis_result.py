@@ -22,7 +22,15 @@ from axisight.graybox.axis_findings import (
     weight_findings,
 )
 from axisight.graybox.axis_model import OUTPUT_UNIT, AxisData, AxisModel
-from axisight.graybox.axis_search import LEAST_BLOCKS, Point, Task, free_run
+from axisight.graybox.axis_search import (
+    CONVERGED,
+    LEAST_BLOCKS,
+    Point,
+    Task,
+    error_variance,
+    free_run,
+)
+from axisight.graybox.normal_matrix import inverse_normal
 
 Array = NDArray[np.float64]
 
@@ -60,7 +68,8 @@ class AxisFit:
     scatter of blocks of data, which stays valid where errors are correlated or the model is
     incomplete. ``trusted`` names the one that `standard_error`, `interval` and `summary` take:
     ``"sandwich"`` where the residuals contradict white errors of one variance and there are
-    blocks enough (``blocks`` of them), else ``"white"``. ``status`` is ``loss_converged``,
+    blocks enough (``blocks`` of them), else ``"white"``; ``sandwich_freedom`` are its degrees of
+    freedom, blocks less everything estimated, gains and starts too. ``status`` is ``loss_converged``,
     ``step_converged``, ``exact`` (residuals are rounding errors), ``max_iterations``,
     ``stalled``, or ``noise_rounds`` (parameters and noise filter did not agree). ``warnings``
     say in words what to mind. ``residuals`` are the prediction errors by record, model minus
@@ -93,12 +102,13 @@ class AxisFit:
     noise: NoiseModel
     trusted: Literal["white", "sandwich"] = "white"
     blocks: int = 0
+    sandwich_freedom: int = 0
     weights: tuple[float, ...] = ()
 
     @property
     def converged(self) -> bool:
         """Whether the search ended by itself."""
-        return self.status in ("loss_converged", "step_converged", "exact")
+        return self.status in CONVERGED
 
     @property
     def standard_error(self) -> Array:
@@ -134,7 +144,7 @@ class AxisFit:
         if kind not in ("trusted", "white", "sandwich"):
             raise InputError(f"kind: expected trusted, white or sandwich, got {kind!r}")
         chosen = self.trusted if kind == "trusted" else kind
-        freedom = np.inf if chosen == "white" else max(self.blocks - len(self.free), 1)
+        freedom = np.inf if chosen == "white" else self.sandwich_freedom
         i = self.free.index(name)
         variance = self._covariance(chosen)[i, i]
         half = float(stats.t.ppf(0.5 + level / 2, freedom) * np.sqrt(variance))
@@ -202,13 +212,14 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     model = task.model
     names = task.free_names
     errors, lengths = point.errors, [len(d) for d in task.data]
-    skipped = len(point.whitening) * len(lengths)
-    variance = float(errors @ errors) / max(errors.size - skipped - len(point.matrix), 1)
+    variance = error_variance(task, point)
     inverse, condition = inverse_normal(point.matrix)
     n = len(names)
     # What the data do not show stays unknown, even without any error.
     covariance = np.where(np.isfinite(inverse), variance, 1.0) * inverse
-    sandwich = _sandwich(inverse, point.block_gradients)
+    blocks, estimated = point.block_gradients.shape
+    freedom = blocks - estimated
+    sandwich = _sandwich(inverse, point.block_gradients, freedom)
     std = np.sqrt(np.diag(covariance)[:n])
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance[:n, :n] / np.outer(std, std)
@@ -229,12 +240,11 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         run = measured + part / root if simulated else free_run(task, point, i)
         fits.append(float(fit_percent(measured, run)[0]))
     texts += fit_findings(task, parameters, fits)
-    blocks = len(point.block_gradients)
     trusted: Literal["white", "sandwich"] = "white"
     if point.status != "exact" and min(fits) < ROUNDING:
         unequal = weight_findings(task, residuals)
         words, coloured = covariance_findings(
-            task, names, covariance[:n, :n], sandwich[:n, :n], blocks, residuals
+            task, names, covariance[:n, :n], sandwich[:n, :n], (blocks, freedom), residuals
         )
         texts += [*unequal, *words]
         if not bounded and point.status not in STATUS_ADVICE:
@@ -265,6 +275,7 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
         noise=noise,
         trusted=trusted,
         blocks=blocks,
+        sandwich_freedom=freedom,
         weights=tuple(d.weight for d in task.data),
     )
 
@@ -273,33 +284,14 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
 ROUNDING = 100 - 1e-7
 
 
-def _sandwich(inverse: Array, gradients: Array) -> Array:
+def _sandwich(inverse: Array, gradients: Array, freedom: int) -> Array:
     """Covariance from the scatter of block gradients; NaN where the blocks are too few."""
     blocks, n = gradients.shape
     if blocks < LEAST_BLOCKS * n:
         return np.full_like(inverse, np.nan)
     with np.errstate(invalid="ignore"):
-        out = inverse @ (gradients.T @ gradients) @ inverse * (blocks / (blocks - n))
+        out = inverse @ (gradients.T @ gradients) @ inverse * (blocks / freedom)
     return np.asarray(out, dtype=np.float64)
-
-
-def inverse_normal(matrix: Array) -> tuple[Array, float]:
-    """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
-
-    Directions that the data do not show get the pseudo-inverse; the condition is then infinite.
-    """
-    size = np.sqrt(np.diag(matrix))
-    size[size == 0] = 1.0
-    unit = matrix / np.outer(size, size)
-    values, vectors = np.linalg.eigh(unit)
-    seen = values > 1e-15 * len(values)
-    condition = float(values[-1] / values[0]) if seen.all() else np.inf
-    weights = np.where(seen, 1 / np.where(seen, values, 1.0), 0.0)
-    inverse = (vectors * weights) @ vectors.T / np.outer(size, size)
-    # A direction without data has no finite variance.
-    blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
-    inverse[np.ix_(blind, blind)] = np.inf
-    return inverse, condition
 
 
 def _warnings(

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 # Shares of the speed error fed back in rounds before the search proper, see `FitSettings`.
 GRADUAL = (0.2, 0.02)
+# Status of a search that ended by itself.
+CONVERGED = ("loss_converged", "step_converged", "exact")
 # Rounds need not be finished: where they end is a start.
 ROUGH = 1e-4
 
@@ -242,6 +244,17 @@ def _search_after(
         held = replace(point, gains=rigid_gains(task.model, ratio, gain), predicts=True)
         point = search(rough, held, token)
     return search(task, replace(point, gains=(), predicts=False), token)
+
+
+def error_variance(task: Task, point: Point) -> float:
+    """Return the variance of the weighted prediction errors at the end of a search.
+
+    Degrees of freedom are samples less everything estimated, and less the first ones of each
+    record, which a noise filter leaves out.
+    """
+    left_out = len(point.whitening) * len(task.data)
+    freedom = point.errors.size - left_out - len(point.matrix)
+    return float(point.errors @ point.errors) / max(freedom, 1)
 
 
 # Share of the energy of the data by which losses of one minimum may differ.

@@ -13,12 +13,14 @@ from axisight.errors import InputError
 from axisight.graybox.axis_checks import check_data, check_energy, check_start, data_warnings
 from axisight.graybox.axis_findings import start_findings
 from axisight.graybox.axis_model import AxisData, AxisModel, number
-from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude, inverse_normal
+from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
 from axisight.graybox.axis_search import (
+    CONVERGED,
     FitSettings,
     Point,
     Task,
     disagreement,
+    error_variance,
     first_point,
     free_places,
     free_run,
@@ -27,6 +29,7 @@ from axisight.graybox.axis_search import (
     search_rounds,
 )
 from axisight.graybox.noise_filter import estimate_filter
+from axisight.graybox.normal_matrix import inverse_normal
 
 NoiseKind = Literal["output_error", "innovations", "ar"]
 
@@ -222,9 +225,8 @@ def _whitened(task: Task, point: Point, token: _core.CancelToken) -> Point:
             return point  # white already
         point = search(task, replace(point, whitening=whitening), token)
         inverse, _ = inverse_normal(point.matrix)
-        variance = float(point.errors @ point.errors) / max(point.errors.size - len(places), 1)
+        size = np.sqrt(error_variance(task, point) * np.diag(inverse))
         moved = np.abs(np.array(point.theta)[places] - before)
-        if same_order and np.all(moved <= AGREED * np.sqrt(variance * np.diag(inverse))):
+        if same_order and np.all(moved <= AGREED * size):
             return point
-    ended = point.status in ("loss_converged", "step_converged", "exact")
-    return replace(point, status="noise_rounds") if ended else point
+    return replace(point, status="noise_rounds") if point.status in CONVERGED else point

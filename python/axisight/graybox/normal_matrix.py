@@ -1,0 +1,27 @@
+"""Inverse of the normal matrix of least squares, with what data do not show left unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def inverse_normal(matrix: Array) -> tuple[Array, float]:
+    """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
+
+    Directions that the data do not show get the pseudo-inverse; the condition is then infinite.
+    """
+    size = np.sqrt(np.diag(matrix))
+    size[size == 0] = 1.0
+    unit = matrix / np.outer(size, size)
+    values, vectors = np.linalg.eigh(unit)
+    seen = values > 1e-15 * len(values)
+    condition = float(values[-1] / values[0]) if seen.all() else np.inf
+    weights = np.where(seen, 1 / np.where(seen, values, 1.0), 0.0)
+    inverse = (vectors * weights) @ vectors.T / np.outer(size, size)
+    # A direction without data has no finite variance.
+    blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
+    inverse[np.ix_(blind, blind)] = np.inf
+    return inverse, condition
