@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import scipy.linalg
 import xarray as xr
 
 from axisight.errors import InputError
 from axisight.frf import frequency_response
 from axisight.graybox.chain_fit import fit_chain
-from axisight.graybox.collocated import Collocated, collocated
+from axisight.graybox.collocated import Collocated, collocated, sandwich, standard_errors
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 from axisight.robot import load_robot
 
@@ -248,6 +249,95 @@ def test_a_variance_of_few_periods_is_pooled_relative_to_the_model() -> None:
     variance[::7] = np.nan
     some = Collocated(frequency, model.astype(complex), variance, 1.0).noise(model)
     assert not some[::7].any() and (some[1::7] > 0).all()
+
+
+def regression() -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives (2 n, 3) and residuals (2 n,) of twelve lines."""
+    rng = np.random.default_rng(4)
+    slope = rng.normal(size=(24, 3)) * [1.0, 1e-6, 1e6]
+    noise = rng.normal(size=24)
+    return slope, noise - slope @ np.linalg.lstsq(slope, noise)[0]
+
+
+def test_sandwich_is_that_of_the_definition() -> None:
+    slope, residual = regression()
+    inverse = np.linalg.inv(slope.T @ slope)
+    want = np.zeros((3, 3))
+    for line in range(12):
+        own = [line, line + 12]
+        part = slope[own]
+        left = np.eye(2) - part @ inverse @ part.T
+        score = part.T @ np.linalg.inv(scipy.linalg.sqrtm(left)) @ residual[own]
+        want += np.outer(inverse @ score, inverse @ score)
+    size = np.sqrt(np.diag(want))
+    # Rounding, and that of a condition of a few units once the columns are scaled.
+    np.testing.assert_allclose(
+        sandwich(slope, residual) / np.outer(size, size), want / np.outer(size, size), atol=1e-12
+    )
+
+
+def test_what_lines_do_not_show_is_infinite() -> None:
+    slope, residual = regression()
+    known = sandwich(slope, residual)
+    # A parameter without effect, and two with the same effect.
+    more = np.column_stack([slope, np.zeros(24), 2 * slope[:, 2]])
+    found = sandwich(more, residual)
+    assert np.isinf(np.diag(found)[2:]).all() and np.isnan(found[3, :3]).all()
+    np.testing.assert_allclose(found[:2, :2], known[:2, :2], rtol=1e-10)
+    for noise in (0.0, 1.0):
+        errors = standard_errors(more, residual, np.full(12, noise))
+        assert np.isinf(errors[2:]).all() and np.isfinite(errors[:2]).all()
+
+
+def test_what_one_line_decides_has_no_error() -> None:
+    slope, residual = regression()
+    alone = np.zeros(24)
+    alone[5] = 1e-3
+    found = sandwich(np.column_stack([slope, alone]), residual)
+    assert np.isnan(found[3]).all() and np.isnan(found[:, 3]).all()
+    # The others do without that row.
+    without = slope.copy()
+    without[5] = 0.0
+    np.testing.assert_allclose(found[:3, :3], sandwich(without, residual), rtol=1e-10)
+    errors = standard_errors(np.column_stack([slope, alone]), residual, np.ones(12))
+    assert np.isnan(errors[3]) and np.isfinite(errors[:3]).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize(("spring", "mass"), [(1e12, 1e-3), (1e15, 1e-6)])
+def test_a_mass_far_beyond_the_band_has_no_finite_error(
+    noise: float, spring: float, mass: float
+) -> None:
+    true = chain(2, np.random.default_rng(0))
+    start = SpringMassChain(
+        np.append(true.inertia_kg_m2, mass),
+        np.append(true.stiffness_nm_rad, spring),
+        np.append(true.damping_nm_s_rad, 2e3),
+        RATIO,
+    )
+    data = response(true, noise, np.random.default_rng(1))
+    found = fit_chain(data, 3, gear_ratio=RATIO, start=start)
+    # Only the sum of both arms is seen, and their spring moves nothing.
+    assert np.isinf(found.inertia_standard_error[1:]).all()
+    assert found.stiffness_standard_error[1] > found.chain.stiffness_nm_rad[1]
+    assert np.isfinite([found.inertia_standard_error[0], found.stiffness_standard_error[0]]).all()
+    assert "inertia 2, inertia 3, spring 2: hardly seen" in " ".join(found.findings)
+
+
+def test_a_search_that_ends_on_its_bound_says_so() -> None:
+    true = chain(2, np.random.default_rng(0))
+    data = response(true, 0.02, np.random.default_rng(1))
+    for far, status in ((5000.0, "on_bound"), (100.0, "converged")):
+        start = SpringMassChain(
+            true.inertia_kg_m2 * [1.0, far], true.stiffness_nm_rad, true.damping_nm_s_rad, RATIO
+        )
+        found = fit_chain(data, 2, gear_ratio=RATIO, start=start)
+        assert found.status == status
+        words = "inertia 2, spring 1: on a bound, a thousandfold from the start"
+        assert (words in " ".join(found.findings)) is (status == "on_bound")
+        if status == "converged":
+            # Two per cent of noise on 196 lines.
+            np.testing.assert_allclose(found.chain.inertia_kg_m2, true.inertia_kg_m2, rtol=0.02)
 
 
 def test_quantity_is_read_and_never_assumed() -> None:

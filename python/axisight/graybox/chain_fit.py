@@ -24,6 +24,9 @@ _ROOM = 0.05
 _POOR_DB = 3.0
 _UNCERTAIN = 0.5
 _SPAN = 1e3
+# Relative distance to the end of the span within which a search has ended there: steps of the
+# trust region come close to a bound and do not reach it.
+_AT_END = 0.01
 _BEYOND = 1.2
 
 
@@ -36,6 +39,8 @@ class ChainFit:
     inertia_standard_error, stiffness_standard_error, damping_standard_error
         In the units and shapes of the chain's values; from the scatter of every line about the
         model (:func:`axisight.graybox.collocated.sandwich`), which errors of the model enlarge.
+        Infinite for what the lines do not show, NaN for what a single line decides. Not valid
+        for values on a bound.
     viscous_friction_nm_s_rad
         Of the motor, motor side, with its standard error.
     delay_s
@@ -44,7 +49,8 @@ class ChainFit:
         What half of the lines are within: modelled over measured response, magnitude and phase
         together (1 rad counts as 8.7 dB).
     status
-        ``"converged"`` or ``"not_converged"``.
+        ``"converged"``, ``"on_bound"`` (masses, springs or dampers a thousandfold from the start,
+        beyond which none is sought: the minimum lies elsewhere) or ``"not_converged"``.
     findings
         What to know before using the values.
     """
@@ -244,6 +250,16 @@ class _Problem:
         self.lower[:free] = self.first[:free] - np.log(_SPAN)
         self.upper[:free] = self.first[:free] + np.log(_SPAN)
 
+    def at_end(self, x: Real) -> list[int]:
+        """Places of masses, springs and dampers at the end of their span.
+
+        Dampers that are zero are not: that is a chain too.
+        """
+        free = 2 * self.n - 1
+        apart = np.abs(x[:free] - self.first[:free]) >= np.log(_SPAN * (1 - _AT_END))
+        large = x[free : free + self.n - 1] >= _SPAN * (1 - _AT_END)
+        return np.flatnonzero(np.concatenate([apart, large])).tolist()
+
     def parts(self, x: Real) -> tuple[Real, Real, Real, float, float]:
         """Inertias, stiffnesses, dampers, friction (joint side), delay."""
         n = self.n
@@ -349,17 +365,15 @@ def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: lis
         findings.append(
             f"half of the lines are more than {error:.1f} dB off the chain: other masses, or noise"
         )
-    uncertain = np.flatnonzero(deviation[: 2 * n - 1] > _UNCERTAIN)
-    names = [f"inertia {i + 1}" for i in range(n)] + [f"spring {i + 1}" for i in range(n - 1)]
     beyond = found_chain.poles_rad_s > _BEYOND * data.angular_rad_s[-1]
     if beyond.any():
         findings.append(
             f"resonance {found_chain.poles_rad_s[beyond][0]:.3g} rad/s lies beyond the band: its mass "
             "and spring are guesses; fit fewer masses"
         )
-    if len(uncertain):
-        listed = ", ".join(names[i] for i in uncertain)
-        findings.append(f"{listed}: hardly seen in this band; fit fewer masses")
+    ends = problem.at_end(found.x)
+    findings += _doubts(n, ends, deviation)
+    status = "on_bound" if ends else "converged"
     return ChainFit(
         chain=found_chain,
         inertia_standard_error=inertia * deviation[:n],
@@ -369,6 +383,25 @@ def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: lis
         viscous_friction_standard_error=float(problem.friction * ratio**2 * deviation[3 * n - 2]),
         delay_s=late,
         error_db=error,
-        status="converged" if converged else "not_converged",
+        status=status if converged else "not_converged",
         findings=tuple(findings),
     )
+
+
+def _doubts(n: int, ends: list[int], deviation: Real) -> list[str]:
+    """Words about values on a bound, and about those that the lines do not show."""
+    names = [f"inertia {i + 1}" for i in range(n)]
+    names += [f"{kind} {i + 1}" for kind in ("spring", "damper") for i in range(n - 1)]
+    relative = deviation[: 2 * n - 1]
+    out = []
+    for places, words in (
+        (ends, "on a bound, a thousandfold from the start: start closer, or fit fewer masses"),
+        (np.flatnonzero(relative > _UNCERTAIN), "hardly seen in this band; fit fewer masses"),
+        (
+            np.flatnonzero(np.isnan(relative)),
+            "decided by a single line, standard error unknown; excite more lines there",
+        ),
+    ):
+        if len(places):
+            out.append(f"{', '.join(names[i] for i in places)}: {words}")
+    return out

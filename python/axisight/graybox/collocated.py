@@ -13,6 +13,7 @@ from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import neighbours_for, pooled_variance
 from axisight.frf.quantity import ORDER, quantity_of
 from axisight.frf.response import Flag
+from axisight.graybox.normal_matrix import pseudo_inverse
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -20,7 +21,10 @@ Complex = NDArray[np.complex128]
 _FEWEST_LINES = 8
 # Relative error of a response up to which simple models are not told from it.
 _MODEL_FLOOR = 0.05
+# Share of a residual that the fit leaves, below which one line decides.
 _DECIDED = 1e-8
+# Share of the variance of a parameter that may be hidden.
+_MOST_HIDDEN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +146,9 @@ def standard_errors(slope: Real, residual: Real, noise: Real) -> Real:
 
     From the scatter of the lines (`sandwich`), but not below what the known noise makes of them:
     ``noise`` (n,) is the variance of the complex residual of each line, zero if unknown.
+    Infinite for parameters that the lines do not show, NaN for those that one line decides.
     """
-    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    inverse, _, _ = pseudo_inverse(slope.T @ slope)
     # Half of the variance in the real and half in the imaginary part.
     noisy = np.tile(np.sqrt(noise / 2), 2)[:, None] * slope @ inverse
     least = (noisy**2).sum(axis=0)
@@ -158,16 +163,26 @@ def sandwich(slope: Real, residual: Real) -> Real:
     compromise between noise and the errors of simple models. Each line's residuals are enlarged
     by what the fit has taken from them (the correction CR2 of Bell and McCaffrey 2002): the few
     lines of a notch decide much and would show too little.
+
+    Parameters that the lines do not show have an infinite variance. Where a line alone decides a
+    direction, its residuals are zero there and show no scatter; parameters that owe such
+    directions more than half of their variance have NaN, for it is unknown.
     """
     lines = len(residual) // 2
     rows = slope.reshape(2, lines, -1).swapaxes(0, 1)
-    inverse = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    inverse, _, blind = pseudo_inverse(slope.T @ slope)
     share, vectors = np.linalg.eigh(rows @ inverse @ rows.swapaxes(1, 2))
     left = 1 - share
-    # A line that alone decides a parameter shows no scatter.
-    grow = np.where(left > _DECIDED, 1 / np.sqrt(np.maximum(left, _DECIDED)), 0.0)
+    shows = left > _DECIDED
+    grow = np.where(shows, 1 / np.sqrt(np.maximum(left, _DECIDED)), 0.0)
     parts = residual.reshape(2, lines).T
     enlarged = np.einsum("nij,nj,nkj,nk->ni", vectors, grow, vectors, parts)
-    scores = np.einsum("nip,ni->np", rows, enlarged)
-    covariance = inverse @ (scores.T @ scores) @ inverse
-    return np.asarray((covariance + covariance.T) / 2)
+    change = np.einsum("nip,ni->np", rows, enlarged) @ inverse
+    covariance = np.asarray(change.T @ change)
+    # The inverse is the sum of these squares over all lines and directions.
+    pull = np.einsum("nji,njp->nip", vectors, rows) @ inverse
+    hidden = (np.where(shows[..., None], 0.0, pull) ** 2).sum(axis=(0, 1))
+    unknown = blind | (hidden > _MOST_HIDDEN * np.diag(inverse))
+    covariance[unknown], covariance[:, unknown] = np.nan, np.nan
+    covariance[blind, blind] = np.inf
+    return covariance

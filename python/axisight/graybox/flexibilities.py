@@ -160,7 +160,8 @@ def _findings(
         found.append(
             f"gear_ratio {ratio:g}: it is joint angle per motor angle, below one for a reduction"
         )
-    if notch.damping_ratio < 2 * notch.damping_standard_error:
+    # An unknown error does not show damping either.
+    if not notch.damping_ratio >= 2 * notch.damping_standard_error:
         found.append("the notch is too narrow or too noisy to show damping: d is a guess")
     return tuple(found)
 

@@ -32,7 +32,7 @@ class Landmark:
     frequency_rad_s, damping_ratio
         Natural frequency and damping ratio of the pair of zeros or poles.
     frequency_standard_error_rad_s, damping_standard_error
-        From the scatter about the local model.
+        From the scatter about the local model; NaN where a single line decides.
     n_lines
         Lines that took part.
     """

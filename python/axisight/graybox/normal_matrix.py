@@ -11,7 +11,18 @@ Array = NDArray[np.float64]
 def inverse_normal(matrix: Array) -> tuple[Array, float]:
     """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
 
-    Directions that the data do not show get the pseudo-inverse; the condition is then infinite.
+    Infinite among parameters that the data do not show, as is then the condition.
+    """
+    inverse, condition, blind = pseudo_inverse(matrix)
+    inverse[np.ix_(blind, blind)] = np.inf
+    return inverse, condition
+
+
+def pseudo_inverse(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
+    """Return the pseudo-inverse, the condition number, and which parameters data do not show.
+
+    Directions count as not shown by the matrix scaled to unit diagonal; the condition is then
+    infinite.
     """
     size = np.sqrt(np.diag(matrix))
     size[size == 0] = 1.0
@@ -23,5 +34,4 @@ def inverse_normal(matrix: Array) -> tuple[Array, float]:
     inverse = (vectors * weights) @ vectors.T / np.outer(size, size)
     # A direction without data has no finite variance.
     blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
-    inverse[np.ix_(blind, blind)] = np.inf
-    return inverse, condition
+    return inverse, condition, blind

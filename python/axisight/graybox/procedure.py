@@ -394,9 +394,9 @@ def _spring(
         2 * k * one.notch.frequency_standard_error_rad_s / one.notch.frequency_rad_s
         for one, k in zip(flexibilities, stiffness, strict=True)
     ]
-    return cubic_spring(
-        stiffness.tolist(), deflections, standard_error_nm_rad=errors, method=method
-    )
+    # What one line decides alone has no standard error.
+    known = errors if np.isfinite(errors).all() else None
+    return cubic_spring(stiffness.tolist(), deflections, standard_error_nm_rad=known, method=method)
 
 
 def _chain(
