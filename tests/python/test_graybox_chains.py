@@ -225,7 +225,7 @@ def test_fit_is_unbiased_and_its_intervals_hold(relative: float, periods: int | 
         scores.append(np.concatenate(score))
     z = np.array(scores)
     # The mean of 60 scores is normal with 1 / sqrt(60) = 0.13; 3.5 of these for seven of them.
-    # Weights from the measured magnitude put five of the seven at 0.9 to 1.5 for 10 %.
+    # Weights from the measured magnitude put five of the seven at -0.6 to -1.3 for 10 %.
     assert np.abs(z.mean(axis=0)).max() < 0.45
     # Coverage 95 %; 60 runs of some four independent parameters: 1.4 %, three of these.
     assert 0.905 < np.mean(np.abs(z) < 1.96) < 0.99

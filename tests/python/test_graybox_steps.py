@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from axisight.errors import InputError
 from axisight.excitation import multisine, square, triangle
 from axisight.frf import etfe, frequency_response
-from axisight.graybox import AxisData, AxisModel, collocated
+from axisight.graybox import AxisData, AxisModel, Collocated, Landmark, collocated, flexibilities
 from axisight.graybox.flexibilities import cubic_spring, initial_flexibility, simulate_deflection
 from axisight.graybox.landmarks import find_notch
 from axisight.graybox.procedure import axis_data, identify_axis, initial_model
@@ -417,6 +417,28 @@ def test_initial_model_of_one_amplitude_says_so(logs: list[Log]) -> None:
     )
     assert found.spring is None and found.start["k3"] == 0.0
     assert any("second amplitude" in text for text in found.findings)
+
+
+def test_a_notch_that_one_line_decides_has_no_standard_error(
+    logs: list[Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def alone(data: Collocated, **options: object) -> Landmark:
+        found = find_notch(data, **options)
+        nan = np.nan
+        return replace(found, frequency_standard_error_rad_s=nan, damping_standard_error=nan)
+
+    monkeypatch.setattr(flexibilities, "find_notch", alone)
+    found = initial_model(
+        logs[0],
+        logs[1:],
+        gear_ratio=RATIO,
+        period_s=5.0,
+        lines=np.arange(5, 201),
+        drop_periods=1,
+    )
+    assert found.spring is not None and found.spring.cubic_nm_rad3 > 0
+    assert np.isnan([found.spring.linear_standard_error, found.spring.cubic_standard_error]).all()
+    assert any("too narrow or too noisy to show damping" in text for text in found.findings)
 
 
 def test_initial_model_misuse(logs: list[Log]) -> None:
