@@ -126,7 +126,7 @@ def _autocovariance(parts: Sequence[Array], lags: int) -> Array:
 
 
 def _lags(record: AxisData) -> int:
-    """Lags up to a quarter of a second, at most a fiftieth of the record, so that sums are known."""
+    """Lags up to a quarter of a second, at most a fiftieth of the record: sums are known then."""
     return max(1, min(round(_LAG_S / record.sample_time_s), len(record) // 50))
 
 

@@ -69,14 +69,14 @@ class AxisFit:
     incomplete. ``trusted`` names the one that `standard_error`, `interval` and `summary` take:
     ``"sandwich"`` where the residuals contradict white errors of one variance and there are
     blocks enough (``blocks`` of them), else ``"white"``; ``sandwich_freedom`` are its degrees of
-    freedom, blocks less everything estimated, gains and starts too. ``status`` is ``loss_converged``,
-    ``step_converged``, ``exact`` (residuals are rounding errors), ``max_iterations``,
-    ``stalled``, or ``noise_rounds`` (parameters and noise filter did not agree). ``warnings``
-    say in words what to mind. ``residuals`` are the prediction errors by record, model minus
-    measurement, whitened by the noise model and not weighted; ``error_std`` is the standard
-    deviation of the weighted ones. ``weights`` are those of the records, given or estimated.
-    ``starts`` are the states (`AxisModel.state_names`) at the first sample
-    of every record.
+    freedom, blocks less everything estimated, gains and starts too. ``status`` is
+    ``loss_converged``, ``step_converged``, ``exact`` (residuals are rounding errors),
+    ``max_iterations``, ``stalled``, or ``noise_rounds`` (parameters and noise filter did not
+    agree). ``warnings`` say in words what to mind. ``residuals`` are the prediction errors by
+    record, model minus measurement, whitened by the noise model and not weighted; ``error_std`` is
+    the standard deviation of the weighted ones. ``weights`` are those of the records, given or
+    estimated. ``starts`` are the states (`AxisModel.state_names`) at the first sample of every
+    record.
     """
 
     model: AxisModel

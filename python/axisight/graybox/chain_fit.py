@@ -368,8 +368,8 @@ def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: lis
     beyond = found_chain.poles_rad_s > _BEYOND * data.angular_rad_s[-1]
     if beyond.any():
         findings.append(
-            f"resonance {found_chain.poles_rad_s[beyond][0]:.3g} rad/s lies beyond the band: its mass "
-            "and spring are guesses; fit fewer masses"
+            f"resonance {found_chain.poles_rad_s[beyond][0]:.3g} rad/s lies beyond the band: its "
+            "mass and spring are guesses; fit fewer masses"
         )
     ends = problem.at_end(found.x)
     findings += _doubts(n, ends, deviation)

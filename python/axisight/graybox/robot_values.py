@@ -28,7 +28,7 @@ QUANTITIES = {
     "d": "damping",
 }
 EXACT_SIGN_SMOOTHING_RAD_S = 0.01
-"""What effects take for a sign that the fit followed exactly, as the preset of the thesis has it."""
+"""What effects take for a sign that the fit followed exactly, as the preset of the thesis does."""
 MOST_RIPPLES = 3
 """Harmonics that the effect torque_ripple holds."""
 # Friction and gear springs: a fitted axis has its own; on top of it these would count twice.
