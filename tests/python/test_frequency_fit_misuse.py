@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from axisight import Effect, InputError, Parameter, Robot, load_robot
+from axisight import Effect, InputError, Parameter, Robot, frf, load_robot
 from axisight.frequency_fit import (
     FrequencyFitOptions,
     MeasuredResponse,
@@ -141,6 +141,31 @@ def test_a_quantity_without_unit_will_do() -> None:
         MeasuredResponse.of(POSES[0], array(units="rad/Nm", quantity="velocity"))
     with pytest.raises(InputError, match="units to be one of"):
         MeasuredResponse.of(POSES[0], array(units="dB", quantity="velocity"))
+
+
+def test_an_element_is_left_out_of_a_dataset() -> None:
+    assert CLEAN.variance is not None
+    variance = CLEAN.variance.copy()
+    variance[:, 0, 1] = np.inf
+    data = frf.frequency_response(
+        LINES_HZ, CLEAN.response, estimator="t", variance=variance, output_unit="rad/s^2"
+    )
+    fit = fit_responses(ROBOT, [(POSES[0], data)], starts(NAMES))
+    assert fit.n_residuals == 2 * 40 * 8
+
+
+@pytest.mark.parametrize("freedom", [0.0, -2.0, np.nan])
+def test_degrees_of_freedom_of_a_dataset_are_positive(freedom: float) -> None:
+    data = frf.frequency_response(
+        LINES_HZ,
+        CLEAN.response,
+        estimator="t",
+        variance=CLEAN.variance,
+        output_unit="rad/s^2",
+        attrs={"degrees_of_freedom": freedom},
+    )
+    with pytest.raises(InputError, match="degrees_of_freedom: expected positive"):
+        fit_responses(ROBOT, [(POSES[0], data)], NAMES)
 
 
 def test_a_zero_element_has_no_logarithm() -> None:

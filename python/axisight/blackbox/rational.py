@@ -249,7 +249,8 @@ def fit_rational(
     """Return a rational model with common poles of a frequency response.
 
     response
-        Dataset of `axisight.frf.frequency_response`; lines that are NaN are left out.
+        Dataset of `axisight.frf.frequency_response`; lines that are NaN, or have no finite variance
+        where that weighs, are left out.
     order
         Number of poles besides the integrators.
     sample_time_s

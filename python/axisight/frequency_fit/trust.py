@@ -16,6 +16,8 @@ Complex = NDArray[np.complex128]
 
 RELATED = 3.0
 """Standard deviations; by chance 0.3 % of fits lie beyond."""
+CHANCE = 1e-3
+"""Probability that the line furthest off in a fit is called an outlier by chance."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +26,15 @@ class Trust:
 
     ``excess``: mean square of the whitened residuals over what the variance explains, None if
     unknown. ``related``: correlation of residuals at neighbouring lines, in standard deviations
-    of chance. ``own_weights``: fewest complex degrees of freedom of a variance that weighs its
+    of chance. ``outlier``: the line that is furthest off, in words, if it is too far for chance,
+    else None. ``own_weights``: fewest complex degrees of freedom of a variance that weighs its
     own line, None where all are known, pooled or many. ``inflation``: by which weights from
     their own variance make the covariance of the parameters larger than they claim.
     """
 
     excess: float | None
     related: float
+    outlier: str | None
     own_weights: float | None
     inflation: float
 
@@ -53,6 +57,8 @@ class Trust:
                 f"({self.related:.1f} standard deviations): the model is incomplete, or the noise "
                 "is correlated over the lines (drift, leakage, smoothing)"
             )
+        if self.outlier is not None:
+            out.append(self.outlier)
         if self.own_weights is not None:
             out.append(few_words(self.own_weights))
         return out
@@ -87,6 +93,7 @@ def trust(
     return Trust(
         excess=misfit / _explained(data, weighing) if weighted and known else None,
         related=_related(data, values),
+        outlier=_outlier(data, values, misfit) if weighted and not few else None,
         own_weights=min(few) if weighted and few else None,
         inflation=_inflation(data, weighing) if weighted else 1.0,
     )
@@ -104,6 +111,30 @@ def _inflation(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]
 
 def _own(one: MeasuredResponse) -> OwnWeights:
     return OwnWeights.of(one.degrees_of_freedom, one.elements_weighed_together)
+
+
+def _outlier(data: Sequence[MeasuredResponse], residual: Complex, misfit: float) -> str | None:
+    """Return in words the residual furthest off, if normal ones of this mean square are not so far.
+
+    The squared magnitude over its mean is exponential: n of them exceed ln(n / p) with
+    probability p. The mean is that of all, so a model that misses everywhere has no outlier.
+    """
+    size = np.abs(residual)
+    place = int(np.argmax(size))
+    mean = max(2 * misfit, 1e-300)
+    if size[place] ** 2 / mean < np.log(len(size) / CHANCE):
+        return None
+    for number, one in enumerate(data, 1):
+        if place < one.response.size:
+            line, output, source = np.unravel_index(place, one.response.shape)
+            return (
+                f"response {number}: the line at {one.frequency_hz[line]:.4g} Hz (output "
+                f"{output + 1}, input {source + 1}) is {size[place] / np.sqrt(mean):.1f} times as "
+                "far off as the others: look at it, leave it out (infinite variance), or use "
+                "loss='huber'"
+            )
+        place -= one.response.size
+    return None
 
 
 def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]) -> float:

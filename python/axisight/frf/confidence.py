@@ -50,14 +50,17 @@ def with_freedom(dataset: xr.Dataset, freedom: NDArray[np.float64]) -> xr.Datase
 def median_freedom(dataset: xr.Dataset) -> float | None:
     """Return the median over the lines of the complex degrees of freedom of ``variance``.
 
-    None where the Dataset does not tell: the variance then counts as known. Raises InputError
+    None where the Dataset does not tell or says infinity: the variance then counts as known; or
+    has no variance. Raises InputError
     for numbers that are not positive.
     """
     found = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))
-    if found is None:
+    if found is None or "variance" not in dataset or dataset["variance"].isnull().all():
         return None
     values = np.asarray(found, float)
-    values = values[np.isfinite(values)]
-    if (values <= 0).any():
-        raise InputError(f"degrees_of_freedom: expected positive numbers, got {values.min()}")
-    return float(np.median(values)) if values.size else None
+    values = values[~np.isnan(values)]
+    if not values.size or (values <= 0).any():
+        got = values.min() if values.size else np.nan
+        raise InputError(f"degrees_of_freedom: expected positive numbers, got {got}")
+    middle = float(np.median(values))
+    return middle if np.isfinite(middle) else None

@@ -85,7 +85,8 @@ def frequency_response(
     attrs
         More provenance, e.g. numbers of experiments and periods.
 
-    A line where any element is not finite becomes NaN throughout, and is flagged.
+    A line where any element is not finite becomes NaN throughout, and is flagged. An infinite
+    variance says that nothing is known of an element: fits leave it out.
 
     Raises InputError for shapes that do not fit.
     """
@@ -116,8 +117,8 @@ def frequency_response(
     for name, value in squared.items():
         if value is not None:
             given = _expect(name, value, shape)
-            finite = np.where(np.isfinite(given) & known[:, None, None], given, np.nan)
-            variables[name] = (DIMS, finite, {"units": f"({unit})^2"})
+            at_known = np.where(known[:, None, None], given, np.nan)
+            variables[name] = (DIMS, at_known, {"units": f"({unit})^2"})
     condition = _expect("condition", np.full(n, np.nan) if condition is None else condition, (n,))
     flag = _expect("flag", np.zeros(n, np.int8) if flag is None else flag, (n,))
     if not np.isin(flag, list(Flag)).all():
