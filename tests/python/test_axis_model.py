@@ -93,6 +93,42 @@ def test_sign_of_friction_agrees_with_event_search_of_scipy():
     assert np.abs(speed - wanted).max() < 3e-6 * np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("friction", [0.0, 1.0])
+def test_ramps_of_torque_are_those_of_fine_steps(friction):
+    """Held in 100 steps at their middles, the torque errs by (1 / 100)^2 / 24 of its change in a
+    sample, 6e-6; friction by sign changes regime within samples."""
+    model = AxisModel(gear_ratio=RATIO, hold="first", friction_smoothing_rad_s=friction)
+    u = 1.2 * np.convolve(torque(440, 3, size=1.0), np.ones(41) / 41, "valid")
+    speed = model.simulate(TRUTH, u, SAMPLE_S).output.values
+    middles = (np.arange(100) + 0.5) / 100
+    fine = (u[:-1, None] + np.diff(u)[:, None] * middles).ravel()
+    held_model = AxisModel(gear_ratio=RATIO, friction_smoothing_rad_s=friction)
+    wanted = held_model.simulate(TRUTH, fine, SAMPLE_S / 100).output.values[::100]
+    assert np.count_nonzero(np.diff(np.sign(wanted[wanted != 0]))) >= 1
+    assert np.abs(speed[:-1] - wanted).max() < 1e-5 * np.abs(wanted).max()
+
+
+def test_backlash_is_that_of_the_effect():
+    # The gap with its rounded edge, by the general simulator. Steps of 1/16 sample follow the edge.
+    robot = axisight.load_robot("two_mass_axis")
+    u = torque(600, 5)
+    gap = axisight.Effect("backlash", 1, {"half_width_rad": 2e-4})
+    general = axisight.simulate(robot, torque_nm=u[:, None], effects=[gap], tolerance=1e-10)
+    model = AxisModel(
+        gear_ratio=0.004458314757021846,
+        backlash=True,
+        friction_smoothing_rad_s=0.01,
+        output="position",
+        substeps=16,
+    )
+    found = model.simulate({**TRUTH, "b": 2e-4}, u, SAMPLE_S).output.values
+    motor = general.motor_position_rad.values[:, 0]
+    without = model.simulate({**TRUTH, "b": 0.0}, u, SAMPLE_S).output.values
+    error = np.abs(found - motor).max()
+    assert error < 1e-5 * np.abs(motor).max()
+    assert error < 1e-2 * np.abs(without - motor).max()
+
+
 def test_agrees_with_the_general_simulator_on_the_preset():
     robot = axisight.load_robot("two_mass_axis")
     u = torque(2000, 5)
