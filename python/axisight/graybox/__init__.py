@@ -1,5 +1,6 @@
 """Gray-box identification: physical parameters from motor-side data."""
 
+from axisight.graybox.against_robot import Comparison, compare_with_robot
 from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
 from axisight.graybox.axis_result import AxisFit, NoiseModel
 from axisight.graybox.axis_search import FitSettings
@@ -49,6 +50,7 @@ __all__ = [
     "AxisParameter",
     "ChainFit",
     "Collocated",
+    "Comparison",
     "CubicSpring",
     "FitSettings",
     "Flexibility",
@@ -61,6 +63,7 @@ __all__ = [
     "SpringMassChain",
     "axis_data",
     "collocated",
+    "compare_with_robot",
     "cross_validation",
     "cubic_spring",
     "find_notch",

@@ -103,10 +103,10 @@ def identified_axis(
     """
     if not isinstance(fit, AxisFit):
         raise InputError(f"fit: expected an AxisFit, got {type(fit).__name__}")
-    joint, ratio = _joint(robot, axis)
+    joint, ratio = joint_of(robot, axis)
     spread, kind = _spread(fit, covariance)
     width = _width(fit, smoothing_rad_s)
-    values, slopes = _converted(fit, ratio)
+    values, slopes = converted(fit, ratio)
     effects, owner = _effects(fit, values, axis, width)
     names, held = _places(fit, robot, joint, values, slopes, owner)
     unplaced = _unplaced(fit, values, slopes, spread, {*QUANTITIES, *owner})
@@ -184,7 +184,7 @@ def _same_ratio(own: float, ratio: float) -> bool:
     return bool(np.isclose(own, ratio, rtol=1e-12, atol=0.0))
 
 
-def _joint(robot: Robot, axis: int) -> tuple[str, float]:
+def joint_of(robot: Robot, axis: int) -> tuple[str, float]:
     """Name of the joint of an axis and the size of its gear ratio."""
     if isinstance(axis, bool) or axis not in range(1, robot.n_axes + 1):
         raise InputError(f"axis: expected 1 to {robot.n_axes}, got {axis!r}")
@@ -214,7 +214,7 @@ def _power(name: str) -> int:
     return 2 if name.startswith(("k1", "d", "J_a")) else 0
 
 
-def _converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, Array]]:
+def converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, Array]]:
     """All values for the gear ratio of the robot, and derivatives (n_free,) by the free ones."""
     own = fit.parameters["r"]
     values, slopes = {}, {}
@@ -294,7 +294,7 @@ def _notes(
         listed = " + ".join(f"{n} {v:.6g}" for n, v in arm.items())
         notes.append(
             f"not written: {listed} kg m^2, which a chain holds in the links beyond {joint}; the "
-            f"robot has {_inertia_about(robot, joint):.6g} there at its operating point"
+            f"robot has {inertia_about(robot, joint):.6g} there at its operating point"
         )
     others = [n for n in unplaced if n not in arm]
     if others:
@@ -305,7 +305,8 @@ def _notes(
     return notes
 
 
-def _inertia_about(robot: Robot, joint: str) -> float:
+def inertia_about(robot: Robot, joint: str) -> float:
+    """Inertia of all links beyond a joint at the operating point [kg m^2]."""
     q = np.zeros(robot.n_joints)
     q[robot.core.axis_joints] = robot.core.operating_point
     place = robot.joint_names.index(joint)
