@@ -30,6 +30,8 @@ from axisight.logs import read_log
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification
     from axisight.rigid_body.estimate import Method
+    from axisight.robot import Robot
+    from axisight.robot_file import Provenance
 
 _FRICTION = ("viscous", "coulomb", "offset")
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
@@ -70,7 +72,7 @@ def rigid_body_command(
         float | None,
         typer.Option(
             help="Time (s) around each turn of a motor that is left out: the filter smears "
-            "Coulomb friction there. Default: half a period of the cutoff."
+            "Coulomb friction there. Default: two periods of the cutoff."
         ),
     ] = None,
     method: Annotated[
@@ -137,17 +139,26 @@ def rigid_body_command(
         if combinations:
             say(str(found.estimate.base))
         _show(found)
-        solver = "solved" if found.consistent is None else found.consistent.status
-        if out is not None and solver != "failed":
-            source = provenance("rigid-body", paths, options(ctx))
-            try:
-                write_robot(machine, out, found.identified(source), force=force)
-            except RobotError as error:
-                if consistent:
-                    raise
-                raise InputError(f"{error}; --consistent finds bodies that can exist") from None
-        if solver in ("inaccurate", "failed"):
+        if out is not None:
+            source = provenance("rigid-body", paths, options(ctx), columns)
+            _write(found, machine, out, source, force=force)
+        if found.consistent is not None and found.consistent.status in ("inaccurate", "failed"):
             raise typer.Exit(1)
+
+
+def _write(
+    found: LogIdentification, machine: Robot, out: Path, source: Provenance, *, force: bool
+) -> None:
+    """Write the robot, or say why not if there are no bodies to write."""
+    if found.consistent is not None and found.consistent.status == "failed":
+        say(f"not written: {out}: no bodies that can exist were found")
+        return
+    try:
+        write_robot(machine, out, found.identified(source), force=force)
+    except RobotError as error:
+        if found.consistent is not None:
+            raise
+        raise InputError(f"{error}; --consistent finds bodies that can exist") from None
 
 
 def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
