@@ -107,7 +107,36 @@ def test_a_solver_that_stops_short_says_so(rigid, tmp_path: Path, monkeypatch) -
     frame.to_parquet(tmp_path / "wrong.parquet", index=False)
     wrong = tmp_path / "wrong.parquet"
     text = run("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out, code=1)
-    assert "bodies that can exist: inaccurate" in text
+    assert "bodies that can exist: inaccurate" in text and "written:" in text
+    assert "bodies that can exist: inaccurate" in load_identified(out).provenance.notes
+
+
+def test_no_bodies_are_said_not_to_be_written(rigid, tmp_path: Path) -> None:
+    """Values that no body has leave nothing to write."""
+    out = tmp_path / "out.toml"
+    text = run(
+        "rigid-body", rigid / "robot.toml", rigid / "run1.parquet", "--consistent",
+        "--known", "axis2.inertia_xx=-5", "-o", out, code=1,
+    )  # fmt: skip
+    assert "bodies that can exist: failed" in text
+    assert f"not written: {out}: no bodies that can exist were found" in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_column_map_is_among_the_hashes(rigid, tmp_path: Path) -> None:
+    out, columns = tmp_path / "out.toml", tmp_path / "columns.toml"
+    axes = [
+        f'[[axis]]\nposition = {{ name = "position_{i}", unit = "rad" }}\n'
+        f'torque = {{ name = "torque_cmd_{i}", unit = "Nm" }}\n'
+        for i in (1, 2, 3)
+    ]
+    head = 'schema = "axisight.columns/1"\n[time]\nname = "time_s"\nunit = "s"\n'
+    columns.write_text(head + "".join(axes))
+    first = rigid / "run1.parquet"
+    run("rigid-body", rigid / "robot.toml", first, "--consistent", "--columns", columns, "-o", out)
+    found = load_identified(out).provenance
+    assert found.data == {p.name: hash_file(p) for p in (first, columns)}
+    assert found.settings["columns"] == "columns.toml"
 
 
 def test_rigid_body_options_reach_the_regression(rigid) -> None:
@@ -135,6 +164,8 @@ def test_rigid_body_options_reach_the_regression(rigid) -> None:
         (["--held-out", "none.parquet"], ["none.parquet"]),
         (["--reversal-s", "-1"], ["reversal_s"]),
         (["--eliminate", "0"], ["eliminate", "positive"]),
+        (["--eliminate", "0.3", "--consistent"], ["eliminate", "none together with consistent"]),
+        (["--known", "axis1.viscous_friction=-1", "--consistent"], ["known", "no negative"]),
         (["-o", "no_folder_can/\0be.toml"], ["--out"]),
     ],
 )
@@ -199,6 +230,7 @@ def test_axis_reports_and_writes(axis_logs, tmp_path: Path) -> None:
     assert {e.label for e in back.effects} == {"nonlinear_stiffness@1", "coulomb_friction@1"}
     assert list(back.provenance.data) == [path.name for path in axis_logs]
     assert back.provenance.settings["band_hz"] == "2,40"
+    assert back.provenance.settings["slow"] == axis_logs[0].name
 
 
 def test_axis_options_reach_the_fit(axis_logs) -> None:
@@ -274,6 +306,8 @@ def test_elastic_fits_and_writes(responses, tmp_path: Path) -> None:
     assert np.abs(score).max() < 4
     given = back.provenance.settings
     assert given["start"]["axis1.stiffness"] == 1e6
+    assert given["parameters"] == list(names) and given["seed"] == 0 and "out" not in given
+    assert given["responses"] == [path.name for path in responses]
     np.testing.assert_array_equal(given["operating_points_rad"], POSES)
     again = run("elastic", "irb6600_like", *responses, *start, "--parameters", names[0])
     assert "axis2" not in again

@@ -148,7 +148,7 @@ def test_what_reversals_leave_out_is_said(robot, logs) -> None:
     out = ((late >= -reach * (1 + 1e-9)) & (late < reach * (1 - 1e-9))).any(axis=1)
     (said,) = (f for f in found.findings if f.kind == FindingKind.LEFT_OUT)
     assert f"{100 * out.mean():.3g} % of axis 2 (within 0.2 s)" in said.message
-    # At 3 Hz two periods would leave next to nothing.
+    # At 4 Hz two periods would leave next to nothing.
     with pytest.warns(IdentificationWarning, match="samples left out .* take slower motions"):
         short = identify_logs(robot, logs[:2], cutoff_hz=4.0).estimate
     (said,) = (f for f in short.findings if f.kind == FindingKind.LEFT_OUT)
@@ -158,7 +158,7 @@ def test_what_reversals_leave_out_is_said(robot, logs) -> None:
 
 
 def test_known_values_are_held_by_bodies_that_can_exist_too(logs, tmp_path: Path) -> None:
-    """Also by impossible-looking ones: the mass follows."""
+    """A first moment six times that of the arm takes a heavier link, not another moment."""
     held = {"axis3.mass_x": 9.0, "axis2.viscous_friction": 0.02, "axis1.motor_inertia": 7e-4}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)
@@ -170,13 +170,6 @@ def test_known_values_are_held_by_bodies_that_can_exist_too(logs, tmp_path: Path
     write_identified(believed(), tmp_path / "r.toml", values)
     back = load_identified(tmp_path / "r.toml")
     np.testing.assert_allclose(back.value("axis3.mass") * back.value("axis3.com_x"), 9.0, rtol=1e-9)
-    # Held where the truth is, bodies are those of the unconstrained fit with the same prior.
-    truth = dict(zip(found.estimate.model.names, truth_of(found.estimate.model), strict=True))
-    right = identify_logs(
-        believed(), logs[:2], known={"axis2.viscous_friction": 0.0}, consistent=True
-    )
-    zero = right.estimate.model.names.index("axis2.viscous_friction")
-    assert right.consistent.theta[zero] == 0.0 < truth["axis2.viscous_friction"]
 
 
 def test_values_that_were_given_have_no_error_and_a_note(logs) -> None:

@@ -473,7 +473,7 @@ def test_a_compliance_without_a_spring_is_kept_beside_the_file() -> None:
 
 def test_standard_errors_of_a_rotation_vector_against_finite_differences() -> None:
     """A base that is turned by a radian: its vector does not move as the deviation does."""
-    robot, found = calibration(("base",))
+    _, found = calibration(("base",))
     turned = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
     start = dataclasses.replace(found.nominal, base_rotation=turned)
     errors = errors_about(start, ("base",), rotation=False)

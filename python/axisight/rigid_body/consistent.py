@@ -369,12 +369,7 @@ class _Problem:
         linear = np.concatenate([-(self.weight**2) * self.prior, np.zeros(k)])
         blocks: list[Any] = [sparse.hstack([sparse.csc_matrix(self.factor), -sparse.eye(k)])]
         right = [self.target]
-        if len(self.held):
-            pick = np.zeros((len(self.held), p + k))
-            pick[np.arange(len(self.held)), self.held] = 1.0
-            blocks.append(sparse.csc_matrix(pick))
-            right.append(self.known[self.held] / self.scale[self.held])
-        cones: list[Any] = [clarabel.ZeroConeT(k + len(self.held))]
+        cones: list[Any] = [clarabel.ZeroConeT(k)]
         if len(self.signs):
             pick = np.zeros((len(self.signs), p + k))
             pick[np.arange(len(self.signs)), self.signs] = -1.0
@@ -392,11 +387,16 @@ class _Problem:
         settings.verbose = False
         settings.max_iter = iterations
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
+        # What is known goes to the right-hand side.
+        z = np.zeros(p + k)
+        z[self.held] = self.known[self.held] / self.scale[self.held]
+        left = np.delete(np.arange(p + k), self.held)
+        matrix = sparse.vstack(blocks, format="csc")
         solver = clarabel.DefaultSolver(
-            sparse.triu(quadratic / unit**2, format="csc"),
-            linear / unit**2,
-            sparse.vstack(blocks, format="csc"),
-            np.concatenate(right),
+            sparse.triu(quadratic[left][:, left] / unit**2, format="csc"),
+            linear[left] / unit**2,
+            matrix[:, left],
+            np.concatenate(right) - matrix @ z,
             cones,
             settings,
         )
@@ -408,7 +408,8 @@ class _Problem:
             status = "inaccurate"
         else:
             return np.full(p, np.nan), "failed", int(found.iterations)
-        return np.array(found.x[:p]), status, int(found.iterations)
+        z[left] = found.x
+        return z[:p], status, int(found.iterations)
 
 
 def _svec() -> tuple[Array, Array]:

@@ -129,15 +129,9 @@ def identify_rigid_body(
 
     floor = 1e-12 * np.sqrt((torque**2).mean()) * np.ones(model.n_rows)
     noise = _column_noise(base, column_noise, factors, torque) if method == "tls" else None
-    keep = np.arange(len(base))
-    while True:
-        now = factors.columns(keep)
-        solution = _solve(now, method, floor, None if noise is None else noise[keep])
-        covariance, freedom = block_covariance(now, solution)
-        worst = _least_certain(solution, covariance, eliminate)
-        if worst is None:
-            break
-        keep = np.delete(keep, worst)
+    keep, now, solution, (covariance, freedom) = _eliminated(
+        factors, method, floor, noise, eliminate
+    )
     if not solution.converged:
         text = "row weights did not settle in 50 iterations: a row may fit exactly; try method=ls"
         findings.append(IdentificationFinding(FindingKind.WEIGHTS, text))
@@ -181,6 +175,24 @@ def regrouped(base: BaseParameters, independent: NDArray[np.intp], matrix: Array
         rank_qr=base.rank_qr,
         gap=base.gap,
     )
+
+
+def _eliminated(
+    factors: Factors, method: Method, floor: Array, noise: Array | None, limit: float | None
+) -> tuple[NDArray[np.intp], Factors, Solution, tuple[Array, Array]]:
+    """Solve without the least certain parameter until all that are left are certain enough.
+
+    Returns what was kept, its factors, its solution, covariance and degrees of freedom.
+    """
+    keep = np.arange(factors.k)
+    while True:
+        now = factors.columns(keep)
+        solution = _solve(now, method, floor, None if noise is None else noise[keep])
+        spread = block_covariance(now, solution)
+        worst = _least_certain(solution, spread[0], limit)
+        if worst is None:
+            return keep, now, solution, spread
+        keep = np.delete(keep, worst)
 
 
 def _solve(factors: Factors, method: Method, floor: Array, noise: Array | None) -> Solution:
