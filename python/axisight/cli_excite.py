@@ -76,15 +76,11 @@ def excite_command(
                 raise InputError(f"--square: expected AMPLITUDE,PERIOD, got {square}")
             _replace(data, "square", amplitude_rad_s=wave[0], period_s=wave[1])
         limits = {
-            "velocity_rad_s": _numbers("--velocity-limit", velocity_limit),
-            "acceleration_rad_s2": _numbers("--acceleration-limit", acceleration_limit),
-            "torque_nm": _numbers("--torque-limit", torque_limit),
+            "velocity_rad_s": _one_or_each("--velocity-limit", velocity_limit),
+            "acceleration_rad_s2": _one_or_each("--acceleration-limit", acceleration_limit),
+            "torque_nm": _one_or_each("--torque-limit", torque_limit),
         }
-        _replace(
-            data,
-            "limits",
-            **{k: v[0] if v is not None and len(v) == 1 else v for k, v in limits.items()},
-        )
+        _replace(data, "limits", **limits)
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
         data |= {name: value for name, value in top.items() if value is not None}
         made = excite(read_design(data, "options" if design is None else str(design)))
@@ -135,3 +131,8 @@ def _replace(data: dict[str, Any], part: str, **values: Any) -> None:
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     return None if text is None else numbers(option, text)
+
+
+def _one_or_each(option: str, text: str | None) -> float | list[float] | None:
+    found = _numbers(option, text)
+    return found[0] if found is not None and len(found) == 1 else found

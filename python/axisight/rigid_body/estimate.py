@@ -116,17 +116,7 @@ def identify_rigid_body(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
     )
 
-    shares = reversals(model, base.columns, motion[1])
-    findings = reversal_findings(shares)
-    found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
-    if len(found.independent) < len(base):
-        message = rank_message(base, found, shares, motion)
-        if deficient == "raise":
-            raise IdentifiabilityError(message)
-        findings.append(IdentificationFinding(FindingKind.RANK, message))
-        base = regrouped(base, found.independent, found.matrix)
-        factors = factors.columns(found.independent)
-
+    base, factors, findings = _separated(base, factors, motion, deficient)
     floor = 1e-12 * np.sqrt((torque**2).mean()) * np.ones(model.n_rows)
     noise = _column_noise(base, column_noise, factors, torque) if method == "tls" else None
     keep, now, solution, (covariance, freedom) = _eliminated(
@@ -160,6 +150,26 @@ def identify_rigid_body(
         if finding.serious:
             warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     return result.with_findings(findings)
+
+
+def _separated(
+    base: BaseParameters,
+    factors: Factors,
+    motion: tuple[Array, Array, Array],
+    deficient: Literal["raise", "group"],
+) -> tuple[BaseParameters, Factors, list[IdentificationFinding]]:
+    """Return what the data separate: the base parameters, or, if that is wanted, fewer."""
+    shares = reversals(base.model, base.columns, motion[1])
+    findings = reversal_findings(shares)
+    found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
+    if len(found.independent) == len(base):
+        return base, factors, findings
+    message = rank_message(base, found, shares, motion)
+    if deficient == "raise":
+        raise IdentifiabilityError(message)
+    findings.append(IdentificationFinding(FindingKind.RANK, message))
+    fewer = regrouped(base, found.independent, found.matrix)
+    return fewer, factors.columns(found.independent), findings
 
 
 def regrouped(base: BaseParameters, independent: NDArray[np.intp], matrix: Array) -> BaseParameters:
