@@ -25,6 +25,7 @@ from axisight.cli_identify_common import (
     write_robot,
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
+from axisight.fitting import robot_parameters
 from axisight.logs import read_log
 
 if TYPE_CHECKING:
@@ -63,7 +64,10 @@ def rigid_body_command(
         ),
     ] = "viscous,coulomb,offset",
     rotors: Annotated[
-        bool, typer.Option("--rotors/--no-rotors", help="Estimate motor inertias.")
+        bool,
+        typer.Option(
+            "--rotors/--no-rotors", help="Estimate motor inertias, or hold those of the file."
+        ),
     ] = True,
     dead_band_rad_s: Annotated[
         float, typer.Option(help="Motor speed below which Coulomb friction counts as zero.")
@@ -118,7 +122,7 @@ def rigid_body_command(
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
         read = [read_log(path, columns, n_axes=machine.n_axes) for path in paths]
-        held = pairs("--known", known)
+        held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
             # They are among the notes that are printed.
             warnings.simplefilter("ignore", IdentificationWarning)
@@ -128,7 +132,7 @@ def rigid_body_command(
                 held_out=read[len(logs) :],
                 cutoff_hz=cutoff_hz,
                 reversal_s=reversal_s,
-                terms=_terms(friction, rotors, dead_band_rad_s),
+                terms=_terms(friction, dead_band_rad_s),
                 method=cast("Method", method),
                 known=held,
                 eliminate=eliminate,
@@ -161,7 +165,12 @@ def _write(
         raise InputError(f"{error}; --consistent finds bodies that can exist") from None
 
 
-def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
+def _rotors(machine: Robot) -> dict[str, float]:
+    """Motor inertias of the robot: without a term for them, links would hold them once more."""
+    return {n: v for n, v in robot_parameters(machine).items() if n.endswith(".motor_inertia")}
+
+
+def _terms(friction: str, dead_band_rad_s: float) -> DriveTerms:
     chosen = [] if friction == "none" else friction.split(",")
     for term in chosen:
         if term not in _FRICTION:
@@ -169,7 +178,7 @@ def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
                 f"--friction: expected some of {', '.join(_FRICTION)}, or none, got {term!r}"
             )
     return axisight.rigid_body.DriveTerms(
-        inertia="motor" if rotors else None,
+        inertia="motor",
         viscous="motor" if "viscous" in chosen else None,
         coulomb="motor" if "coulomb" in chosen else None,
         offset="motor" if "offset" in chosen else None,

@@ -16,10 +16,11 @@ from axisight.cli import app
 from axisight.frequency_fit import model_response
 from axisight.frf import frequency_response
 from axisight.frf.interop import save_netcdf
+from axisight.rigid_body import DriveTerms, TorqueModel
 from axisight.robot_file import hash_file, load_identified
 from frequency_fit_data import LINES_HZ, POSES
 from frequency_fit_data import ROBOT as ELASTIC
-from rigid_body_data import robot_of, three_axes
+from rigid_body_data import robot_of, smooth_motion, three_axes
 from test_identify_logs import motor_log
 
 
@@ -121,6 +122,27 @@ def test_no_bodies_are_said_not_to_be_written(rigid, tmp_path: Path) -> None:
     assert "bodies that can exist: failed" in text
     assert f"not written: {out}: no bodies that can exist were found" in text
     assert not list(tmp_path.iterdir())
+
+
+def test_rotors_of_the_file_are_not_in_the_links_too(rigid, tmp_path: Path) -> None:
+    """The file has the rotors of the logs: held or estimated, the torques are those of the arm."""
+    arm = robot_of(three_axes())
+    motion = smooth_motion(arm, 200, 0.02, 9)
+
+    def torque(robot: Robot) -> np.ndarray:
+        model = TorqueModel(robot, terms=DriveTerms(inertia="motor"), side="motor")
+        return model.matrix(*motion) @ model.nominal
+
+    want = torque(arm)
+    for options in ((), ("--no-rotors",)):
+        out = tmp_path / f"out{len(options)}.toml"
+        first = rigid / "run1.parquet"
+        run("rigid-body", rigid / "robot.toml", first, "--consistent", *options, "-o", out)
+        found = load_identified(out)
+        assert ("held at given values: axis1.motor" in found.provenance.notes) == bool(options)
+        # Noise of the logs leaves a thousandth; rotors twice are a seventh.
+        error = np.sqrt(((torque(found.robot) - want) ** 2).mean(axis=0) / (want**2).mean(axis=0))
+        assert error.max() < 0.01
 
 
 def test_the_column_map_is_among_the_hashes(rigid, tmp_path: Path) -> None:

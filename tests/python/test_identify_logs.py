@@ -240,8 +240,18 @@ def test_effects_that_the_regression_took_up_are_neutral(logs, tmp_path: Path) -
         viscous = identify_logs(
             robot, logs[:2], terms=DriveTerms(inertia="motor", viscous="motor"), consistent=True
         )
+    assert "no term for motor inertias" not in viscous.identified(SOURCE).provenance.notes
     labels = [e.label for e in viscous.identified(SOURCE).effects]
     assert "stribeck_friction@1" not in labels and "quadratic_drag@2" in labels
+
+
+def test_links_that_hold_rotors_are_noted(robot, logs) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)
+        found = identify_logs(robot, logs[0], terms=DriveTerms(viscous="motor"), consistent=True)
+    assert (
+        "no term for motor inertias: links hold them" in found.identified(SOURCE).provenance.notes
+    )
 
 
 def test_bodies_that_can_exist_are_not_eliminated(robot, logs) -> None:

@@ -74,6 +74,11 @@ class LogIdentification:
         if self.consistent is not None:
             notes.insert(0, f"bodies that can exist: {self.consistent.status}")
             notes += [self.consistent.advice] if self.consistent.advice else []
+        if not any(name.endswith(".motor_inertia") for name in model.names):
+            notes.append(
+                "no term for motor inertias: links hold them, and those of the file count on top; "
+                "hold them with `known` instead"
+            )
         if self.estimate.known:
             listed = ", ".join(
                 f"{name} = {value:.6g}" for name, value in self.estimate.known.items()
