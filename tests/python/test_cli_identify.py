@@ -140,7 +140,7 @@ def test_rotors_of_the_file_are_not_in_the_links_too(rigid, tmp_path: Path) -> N
         run("rigid-body", rigid / "robot.toml", first, "--consistent", *options, "-o", out)
         found = load_identified(out)
         assert ("held at given values: axis1.motor" in found.provenance.notes) == bool(options)
-        # Noise of the logs leaves a thousandth; rotors twice are a seventh.
+        # Noise of the logs leaves a thousandth; rotors twice are a fourth.
         error = np.sqrt(((torque(found.robot) - want) ** 2).mean(axis=0) / (want**2).mean(axis=0))
         assert error.max() < 0.01
 
