@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from axisight.errors import AxisightError
+from axisight.errors import AxisightError, InputError
 
 OUT = Console()
 ERR = Console(stderr=True)
@@ -26,3 +26,11 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
     except KeyboardInterrupt:
         ERR.print(stopped, highlight=False, soft_wrap=True)
         raise typer.Exit(130) from None
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Return numbers with commas between; raises InputError naming the option."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from axisight.cli_common import OUT, errors
+from axisight.cli_common import OUT, errors, numbers
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.plots import plot_references, plot_signal
@@ -65,24 +65,22 @@ def excite_command(
     """Make references for a robot, check them against its limits in simulation, and write them."""
     with errors():
         data = {} if design is None else load_design(design)
-        _replace(data, "signal", kind=kind, period_s=period_s, band_hz=_numbers(band_hz))
+        _replace(
+            data, "signal", kind=kind, period_s=period_s, band_hz=_numbers("--band-hz", band_hz)
+        )
         _replace(data, "signal", peak_rad_s=peak_rad_s, grid=grid, phases=phases)
         _replace(data, "signal", seed=seed, starts=starts, time_s=time_s)
-        wave = _numbers(square)
+        wave = _numbers("--square", square)
         if wave is not None:
             if len(wave) != 2:
                 raise InputError(f"--square: expected AMPLITUDE,PERIOD, got {square}")
             _replace(data, "square", amplitude_rad_s=wave[0], period_s=wave[1])
         limits = {
-            "velocity_rad_s": _numbers(velocity_limit),
-            "acceleration_rad_s2": _numbers(acceleration_limit),
-            "torque_nm": _numbers(torque_limit),
+            "velocity_rad_s": _one_or_each("--velocity-limit", velocity_limit),
+            "acceleration_rad_s2": _one_or_each("--acceleration-limit", acceleration_limit),
+            "torque_nm": _one_or_each("--torque-limit", torque_limit),
         }
-        _replace(
-            data,
-            "limits",
-            **{k: v[0] if v is not None and len(v) == 1 else v for k, v in limits.items()},
-        )
+        _replace(data, "limits", **limits)
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
         data |= {name: value for name, value in top.items() if value is not None}
         made = excite(read_design(data, "options" if design is None else str(design)))
@@ -131,8 +129,10 @@ def _replace(data: dict[str, Any], part: str, **values: Any) -> None:
         data[part] = {**data.get(part, {}), **given}
 
 
-def _numbers(text: str | None) -> list[float] | None:
-    try:
-        return None if text is None else [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"expected numbers with commas between, got {text!r}") from None
+def _numbers(option: str, text: str | None) -> list[float] | None:
+    return None if text is None else numbers(option, text)
+
+
+def _one_or_each(option: str, text: str | None) -> float | list[float] | None:
+    found = _numbers(option, text)
+    return found[0] if found is not None and len(found) == 1 else found

@@ -134,7 +134,7 @@ def axis_command(
         )
         say(found.report())
         if out is not None and machine is not None:
-            source = provenance("axis", files, options(ctx))
+            source = provenance("axis", files, options(ctx), columns)
             values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
             write_robot(machine, out, values, force=force)
             say(values.provenance.notes)

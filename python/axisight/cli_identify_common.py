@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from axisight.cli_common import OUT
+from axisight.cli_common import OUT, numbers
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import (
@@ -51,18 +51,21 @@ def refuse_in_the_way(out: Path | None, force: bool) -> None:
 
 
 def options(ctx: typer.Context) -> dict[str, Any]:
-    """Return the options of a command that say how it worked: numbers, choices, names of logs."""
+    """Return the options of a command that say how it worked: numbers, choices, names of files."""
     out: dict[str, Any] = {}
     for name, value in ctx.params.items():
         if isinstance(value, list | tuple):
             out[name] = [v.name if isinstance(v, Path) else v for v in value]
-        elif name not in ("robot", "force") and not isinstance(value, Path):
-            out[name] = value
+        elif name not in ("robot", "out", "force"):
+            out[name] = value.name if isinstance(value, Path) else value
     return out
 
 
-def provenance(method: str, files: Sequence[Path], settings: Mapping[str, Any]) -> Provenance:
-    """Return where values come from: hashes of files, and the options that were given."""
+def provenance(
+    method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
+) -> Provenance:
+    """Return where values come from: hashes of files, the column map too, and the options given."""
+    files = [*files, *([] if columns is None else [columns])]
     count = Counter(path.name for path in files)
     names = [path.name if count[path.name] == 1 else str(path) for path in files]
     return Provenance(
@@ -98,14 +101,6 @@ def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
             raise InputError(f"{option}: expected {name} once, got it twice")
         (out[name],) = numbers(f"{option} {name}", value)
     return out
-
-
-def numbers(option: str, text: str) -> list[float]:
-    """Return numbers with commas between; raises InputError naming the option."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
 
 
 def band(option: str, text: str | None) -> tuple[float, float] | None:

@@ -13,12 +13,12 @@ import xarray as xr
 from rich.table import Table
 
 import axisight
-from axisight.cli_common import OUT, errors
+from axisight.cli_common import OUT, errors, numbers
 from axisight.cli_identify_common import (
     Force,
     Out,
     load_source,
-    numbers,
+    options,
     pairs,
     provenance,
     refuse_in_the_way,
@@ -43,6 +43,7 @@ POSE = "joint_angle_rad"
 
 
 def elastic_command(
+    ctx: typer.Context,
     robot: Annotated[str, typer.Argument(help="robot.toml or a preset: where the search starts.")],
     responses: Annotated[
         list[Path],
@@ -98,28 +99,24 @@ def elastic_command(
         model = Robot(machine.core, linear)
         data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
-        options = axisight.frequency_fit.FrequencyFitOptions(
+        search = axisight.frequency_fit.FrequencyFitOptions(
             criterion=cast("Criterion", criterion),
             sampling=cast("Sampling", sampling),
             loss="huber" if robust else "squared",
             starts=starts,
             seed=seed,
         )
-        fit = axisight.frequency_fit.fit_responses(model, data, begin, options=options)
+        fit = axisight.frequency_fit.fit_responses(model, data, begin, options=search)
         _show(fit)
         if len(linear) < len(machine.effects):
             left = ", ".join(e.label for e in machine.effects if e not in linear)
             say(f"not in the linear model, kept as they are: {left}")
         if out is not None:
-            settings = {
+            # What patterns and files stood for takes their place.
+            settings = options(ctx) | {
                 "parameters": list(begin),
                 "start": begin,
                 "operating_points_rad": [list(angles) for angles, _ in data],
-                "criterion": criterion,
-                "sampling": sampling,
-                "robust": robust,
-                "starts": starts,
-                "seed": seed,
             }
             source = provenance("elastic", responses, settings)
             found = axisight.frequency_fit.identified_responses(fit, source)

@@ -25,11 +25,14 @@ from axisight.cli_identify_common import (
     write_robot,
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
+from axisight.fitting import robot_parameters
 from axisight.logs import read_log
 
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification
     from axisight.rigid_body.estimate import Method
+    from axisight.robot import Robot
+    from axisight.robot_file import Provenance
 
 _FRICTION = ("viscous", "coulomb", "offset")
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
@@ -61,7 +64,10 @@ def rigid_body_command(
         ),
     ] = "viscous,coulomb,offset",
     rotors: Annotated[
-        bool, typer.Option("--rotors/--no-rotors", help="Estimate motor inertias.")
+        bool,
+        typer.Option(
+            "--rotors/--no-rotors", help="Estimate motor inertias, or hold those of the file."
+        ),
     ] = True,
     dead_band_rad_s: Annotated[
         float, typer.Option(help="Motor speed below which Coulomb friction counts as zero.")
@@ -70,7 +76,7 @@ def rigid_body_command(
         float | None,
         typer.Option(
             help="Time (s) around each turn of a motor that is left out: the filter smears "
-            "Coulomb friction there. Default: half a period of the cutoff."
+            "Coulomb friction there. Default: two periods of the cutoff."
         ),
     ] = None,
     method: Annotated[
@@ -116,7 +122,7 @@ def rigid_body_command(
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
         read = [read_log(path, columns, n_axes=machine.n_axes) for path in paths]
-        held = pairs("--known", known)
+        held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
             # They are among the notes that are printed.
             warnings.simplefilter("ignore", IdentificationWarning)
@@ -126,7 +132,7 @@ def rigid_body_command(
                 held_out=read[len(logs) :],
                 cutoff_hz=cutoff_hz,
                 reversal_s=reversal_s,
-                terms=_terms(friction, rotors, dead_band_rad_s),
+                terms=_terms(friction, dead_band_rad_s),
                 method=cast("Method", method),
                 known=held,
                 eliminate=eliminate,
@@ -137,20 +143,34 @@ def rigid_body_command(
         if combinations:
             say(str(found.estimate.base))
         _show(found)
-        solver = "solved" if found.consistent is None else found.consistent.status
-        if out is not None and solver != "failed":
-            source = provenance("rigid-body", paths, options(ctx))
-            try:
-                write_robot(machine, out, found.identified(source), force=force)
-            except RobotError as error:
-                if consistent:
-                    raise
-                raise InputError(f"{error}; --consistent finds bodies that can exist") from None
-        if solver in ("inaccurate", "failed"):
+        if out is not None:
+            source = provenance("rigid-body", paths, options(ctx), columns)
+            _write(found, machine, out, source, force=force)
+        if found.consistent is not None and found.consistent.status in ("inaccurate", "failed"):
             raise typer.Exit(1)
 
 
-def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
+def _write(
+    found: LogIdentification, machine: Robot, out: Path, source: Provenance, *, force: bool
+) -> None:
+    """Write the robot, or say why not if there are no bodies to write."""
+    if found.consistent is not None and found.consistent.status == "failed":
+        say(f"not written: {out}: no bodies that can exist were found")
+        return
+    try:
+        write_robot(machine, out, found.identified(source), force=force)
+    except RobotError as error:
+        if found.consistent is not None:
+            raise
+        raise InputError(f"{error}; --consistent finds bodies that can exist") from None
+
+
+def _rotors(machine: Robot) -> dict[str, float]:
+    """Motor inertias of the robot: without a term for them, links would hold them once more."""
+    return {n: v for n, v in robot_parameters(machine).items() if n.endswith(".motor_inertia")}
+
+
+def _terms(friction: str, dead_band_rad_s: float) -> DriveTerms:
     chosen = [] if friction == "none" else friction.split(",")
     for term in chosen:
         if term not in _FRICTION:
@@ -158,7 +178,7 @@ def _terms(friction: str, rotors: bool, dead_band_rad_s: float) -> DriveTerms:
                 f"--friction: expected some of {', '.join(_FRICTION)}, or none, got {term!r}"
             )
     return axisight.rigid_body.DriveTerms(
-        inertia="motor" if rotors else None,
+        inertia="motor",
         viscous="motor" if "viscous" in chosen else None,
         coulomb="motor" if "coulomb" in chosen else None,
         offset="motor" if "offset" in chosen else None,

@@ -11,7 +11,7 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli_common import OUT, errors
+from axisight.cli_common import OUT, errors, numbers
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.logs import Log, read_log
@@ -77,7 +77,7 @@ def simulate_command(
             machine,
             **inputs,
             effects=[parse_effect(text) for text in effect or []],
-            start_rad=None if start is None else _numbers("--start", start),
+            start_rad=None if start is None else numbers("--start", start),
             model=cast(Model, model),
             method=cast(Method, method),
             tolerance=tolerance,
@@ -135,15 +135,8 @@ def parse_effect(text: str) -> Effect:
             raise InputError(f"--effect {text!r}: expected PARAM=VALUE, got {item!r}")
         if key in parameters:
             raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
-        (parameters[key],) = _numbers(f"--effect {text!r}: {key}", value)
+        (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
     try:
         return Effect(name, int(axis) if at else None, parameters)
     except InputError as error:
         raise InputError(f"--effect {text!r}: {error}") from None
-
-
-def _numbers(field: str, text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{field}: expected numbers, got {text!r}") from None

@@ -16,10 +16,11 @@ from axisight.cli import app
 from axisight.frequency_fit import model_response
 from axisight.frf import frequency_response
 from axisight.frf.interop import save_netcdf
+from axisight.rigid_body import DriveTerms, TorqueModel
 from axisight.robot_file import hash_file, load_identified
 from frequency_fit_data import LINES_HZ, POSES
 from frequency_fit_data import ROBOT as ELASTIC
-from rigid_body_data import robot_of, three_axes
+from rigid_body_data import robot_of, smooth_motion, three_axes
 from test_identify_logs import motor_log
 
 
@@ -107,7 +108,57 @@ def test_a_solver_that_stops_short_says_so(rigid, tmp_path: Path, monkeypatch) -
     frame.to_parquet(tmp_path / "wrong.parquet", index=False)
     wrong = tmp_path / "wrong.parquet"
     text = run("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out, code=1)
-    assert "bodies that can exist: inaccurate" in text
+    assert "bodies that can exist: inaccurate" in text and "written:" in text
+    assert "bodies that can exist: inaccurate" in load_identified(out).provenance.notes
+
+
+def test_no_bodies_are_said_not_to_be_written(rigid, tmp_path: Path) -> None:
+    """Values that no body has leave nothing to write."""
+    out = tmp_path / "out.toml"
+    text = run(
+        "rigid-body", rigid / "robot.toml", rigid / "run1.parquet", "--consistent",
+        "--known", "axis2.inertia_xx=-5", "-o", out, code=1,
+    )  # fmt: skip
+    assert "bodies that can exist: failed" in text
+    assert f"not written: {out}: no bodies that can exist were found" in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_rotors_of_the_file_are_not_in_the_links_too(rigid, tmp_path: Path) -> None:
+    """The file has the rotors of the logs: held or estimated, the torques are those of the arm."""
+    arm = robot_of(three_axes())
+    motion = smooth_motion(arm, 200, 0.02, 9)
+
+    def torque(robot: Robot) -> np.ndarray:
+        model = TorqueModel(robot, terms=DriveTerms(inertia="motor"), side="motor")
+        return model.matrix(*motion) @ model.nominal
+
+    want = torque(arm)
+    for options in ((), ("--no-rotors",)):
+        out = tmp_path / f"out{len(options)}.toml"
+        first = rigid / "run1.parquet"
+        run("rigid-body", rigid / "robot.toml", first, "--consistent", *options, "-o", out)
+        found = load_identified(out)
+        assert ("held at given values: axis1.motor" in found.provenance.notes) == bool(options)
+        # Noise of the logs leaves a thousandth; rotors twice are a fourth.
+        error = np.sqrt(((torque(found.robot) - want) ** 2).mean(axis=0) / (want**2).mean(axis=0))
+        assert error.max() < 0.01
+
+
+def test_the_column_map_is_among_the_hashes(rigid, tmp_path: Path) -> None:
+    out, columns = tmp_path / "out.toml", tmp_path / "columns.toml"
+    axes = [
+        f'[[axis]]\nposition = {{ name = "position_{i}", unit = "rad" }}\n'
+        f'torque = {{ name = "torque_cmd_{i}", unit = "Nm" }}\n'
+        for i in (1, 2, 3)
+    ]
+    head = 'schema = "axisight.columns/1"\n[time]\nname = "time_s"\nunit = "s"\n'
+    columns.write_text(head + "".join(axes))
+    first = rigid / "run1.parquet"
+    run("rigid-body", rigid / "robot.toml", first, "--consistent", "--columns", columns, "-o", out)
+    found = load_identified(out).provenance
+    assert found.data == {p.name: hash_file(p) for p in (first, columns)}
+    assert found.settings["columns"] == "columns.toml"
 
 
 def test_rigid_body_options_reach_the_regression(rigid) -> None:
@@ -135,6 +186,8 @@ def test_rigid_body_options_reach_the_regression(rigid) -> None:
         (["--held-out", "none.parquet"], ["none.parquet"]),
         (["--reversal-s", "-1"], ["reversal_s"]),
         (["--eliminate", "0"], ["eliminate", "positive"]),
+        (["--eliminate", "0.3", "--consistent"], ["eliminate", "none together with consistent"]),
+        (["--known", "axis1.viscous_friction=-1", "--consistent"], ["known", "no negative"]),
         (["-o", "no_folder_can/\0be.toml"], ["--out"]),
     ],
 )
@@ -199,6 +252,7 @@ def test_axis_reports_and_writes(axis_logs, tmp_path: Path) -> None:
     assert {e.label for e in back.effects} == {"nonlinear_stiffness@1", "coulomb_friction@1"}
     assert list(back.provenance.data) == [path.name for path in axis_logs]
     assert back.provenance.settings["band_hz"] == "2,40"
+    assert back.provenance.settings["slow"] == axis_logs[0].name
 
 
 def test_axis_options_reach_the_fit(axis_logs) -> None:
@@ -274,6 +328,8 @@ def test_elastic_fits_and_writes(responses, tmp_path: Path) -> None:
     assert np.abs(score).max() < 4
     given = back.provenance.settings
     assert given["start"]["axis1.stiffness"] == 1e6
+    assert given["parameters"] == list(names) and given["seed"] == 0 and "out" not in given
+    assert given["responses"] == [path.name for path in responses]
     np.testing.assert_array_equal(given["operating_points_rad"], POSES)
     again = run("elastic", "irb6600_like", *responses, *start, "--parameters", names[0])
     assert "axis2" not in again

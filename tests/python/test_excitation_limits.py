@@ -203,3 +203,12 @@ def test_every_kind_can_be_designed(kind: str) -> None:
 def test_wrong_designs(signal: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         excite(read_design({"robot": "irb6600_like", "signal": signal}))
+
+
+@pytest.mark.parametrize("option", ["--band-hz", "--square", "--velocity-limit", "--torque-limit"])
+def test_the_command_names_the_option_that_is_no_list_of_numbers(tmp_path, option):
+    out = tmp_path / "e.csv"
+    result = CliRunner().invoke(app, ["excite", "--out", str(out), option, "2;4"])
+    assert result.exit_code == 2 and not out.exists()
+    text = " ".join(result.output.split())
+    assert f"{option}: expected numbers with commas between, got '2;4'" in text

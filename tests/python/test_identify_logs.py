@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from axisight import InputError, Log, Robot, load_robot
-from axisight.errors import IdentifiabilityError, RobotError
+from axisight import Effect, InputError, Log, Robot, load_robot
+from axisight.errors import IdentifiabilityError, IdentificationWarning, RobotError
 from axisight.rigid_body import (
     USUAL_TERMS,
     DriveTerms,
@@ -17,6 +17,7 @@ from axisight.rigid_body import (
     identify_logs,
     identify_rigid_body,
 )
+from axisight.rigid_body.findings import FindingKind
 from axisight.robot_file import Provenance, load_identified, write_identified
 from rigid_body_data import description, drive_values, parse, robot_of, smooth_motion, three_axes
 
@@ -101,17 +102,161 @@ def test_parameters_put_in_come_out(robot, logs) -> None:
 def test_samples_around_reversals_are_left_out(robot, logs) -> None:
     """What the filter smears of the sign would be taken for viscous friction."""
     friction, possible = {}, {}
-    for reversal_s in (None, 0.05, 0.0):
+    for reversal_s in (None, 0.2, 0.0):
         found = identify_logs(robot, logs[:2], reversal_s=reversal_s, consistent=True)
         chosen = ["coulomb" in name for name in found.estimate.names]
         friction[reversal_s] = found.estimate.values[chosen]
         chosen = ["coulomb" in name for name in found.estimate.model.names]
         possible[reversal_s] = found.consistent.theta[chosen]
-    # Half a period of 10 Hz.
-    np.testing.assert_array_equal(friction[None], friction[0.05])
-    assert np.abs(friction[None] / 0.4 - 1).max() < 0.02
+    # Two periods of 10 Hz.
+    np.testing.assert_array_equal(friction[None], friction[0.2])
+    assert np.abs(friction[None] / 0.4 - 1).max() < 0.01
     assert np.abs(friction[0.0] / 0.4 - 1).max() > 0.06
-    assert np.abs(possible[None] / 0.4 - 1).max() < 0.02 < np.abs(possible[0.0] / 0.4 - 1).max()
+    assert np.abs(possible[None] / 0.4 - 1).max() < 0.01 < np.abs(possible[0.0] / 0.4 - 1).max()
+
+
+def test_intervals_hold_the_truth_by_default(robot) -> None:
+    """Position noise too; over 300 intervals 94 % do, with half a period left out 74 %."""
+    hits, scores = [], []
+    for run in range(4):
+        noisy = [motor_log(robot, 100 + 2 * run + k, noise=0.05) for k in (0, 1)]
+        rng = np.random.default_rng(run)
+        for log in noisy:
+            log.position_rad[:] += rng.normal(0, 1e-4, log.position_rad.shape)
+        found = identify_logs(robot, noisy).estimate
+        want = found.base.from_standard(truth_of(found.model))
+        lower, upper = found.interval()
+        hits += list((lower <= want) & (want <= upper))
+        chosen = ["coulomb" in name for name in found.names]
+        scores += list(((found.values - want) / found.standard_error)[chosen])
+        (said,) = (f for f in found.findings if f.kind == FindingKind.LEFT_OUT)
+        assert not said.serious and "within 0.2 s" in said.message
+    # 100 intervals: a share of 0.95 is below 0.85 in one case of 10^4, one of 0.74 above in 200.
+    assert len(hits) == 100 and np.mean(hits) > 0.85
+    assert np.abs(scores).max() < 4
+
+
+def test_what_reversals_leave_out_is_said(robot, logs) -> None:
+    found = identify_logs(robot, logs[0]).estimate
+    motion = estimate_motion(
+        logs[0].position_rad, logs[0].torque_nm, sample_time_s=STEP, cutoff_hz=10.0
+    )
+    sign = np.sign(motion.velocity_rad_s[:, 1])
+    turns = motion.time_s[1:][np.diff(sign) != 0]
+    reach = np.ceil(0.2 / motion.sample_time_s) * motion.sample_time_s
+    late = motion.time_s[:, None] - turns
+    out = ((late >= -reach * (1 + 1e-9)) & (late < reach * (1 - 1e-9))).any(axis=1)
+    (said,) = (f for f in found.findings if f.kind == FindingKind.LEFT_OUT)
+    assert f"{100 * out.mean():.3g} % of axis 2 (within 0.2 s)" in said.message
+    # At 4 Hz two periods would leave next to nothing.
+    with pytest.warns(IdentificationWarning, match="samples left out .* take slower motions"):
+        short = identify_logs(robot, logs[:2], cutoff_hz=4.0).estimate
+    (said,) = (f for f in short.findings if f.kind == FindingKind.LEFT_OUT)
+    assert said.serious and "the usual 0.5 s" in said.message
+    none = identify_logs(robot, logs[0], reversal_s=0.0).estimate
+    assert not [f for f in none.findings if f.kind == FindingKind.LEFT_OUT]
+
+
+def test_known_values_are_held_by_bodies_that_can_exist_too(logs, tmp_path: Path) -> None:
+    """A first moment six times that of the arm takes a heavier link, not another moment."""
+    held = {"axis3.mass_x": 9.0, "axis2.viscous_friction": 0.02, "axis1.motor_inertia": 7e-4}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)
+        found = identify_logs(believed(), logs[:2], known=held, consistent=True)
+    assert found.consistent.status == "solved"
+    theta = dict(zip(found.estimate.model.names, found.consistent.theta, strict=True))
+    assert {name: theta[name] for name in held} == held
+    values = found.identified(SOURCE)
+    write_identified(believed(), tmp_path / "r.toml", values)
+    back = load_identified(tmp_path / "r.toml")
+    np.testing.assert_allclose(back.value("axis3.mass") * back.value("axis3.com_x"), 9.0, rtol=1e-9)
+
+
+def test_values_that_were_given_have_no_error_and_a_note(logs) -> None:
+    names = TorqueModel(believed(), terms=USUAL_TERMS, side="motor").names
+    nominal = dict(
+        zip(names, TorqueModel(believed(), terms=USUAL_TERMS, side="motor").nominal, strict=True)
+    )
+    held = {
+        "axis2.viscous_friction": 0.011,
+        "axis3.coulomb_friction": 0.39,
+        "axis3.mass": nominal["axis3.mass"] + 0.5,
+        "axis3.mass_y": 0.2,
+        "axis2.motor_inertia": nominal["axis2.motor_inertia"],
+    }
+    for consistent in (False, True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IdentificationWarning)
+            found = identify_logs(believed(), logs[:2], known=held, consistent=consistent)
+        values = found.identified(SOURCE)
+        errors = dict(zip(values.names, values.standard_errors, strict=True))
+        assert values.value("axis2.viscous_friction") == 0.011
+        for name in ("axis2.viscous_friction", "coulomb_friction@3.coulomb_nm", "axis3.mass"):
+            assert errors[name] == 0.0
+        # Both of what it is made of were given; of the others only the mass was.
+        assert errors["axis3.com_y"] == 0.0 and np.isnan(errors["axis3.com_x"])
+        # What the file has already needs no line.
+        assert "axis2.motor_inertia" not in errors
+        assert "held at given values: axis2.viscous_friction = 0.011, axis3.coul" in (
+            values.provenance.notes
+        )
+
+
+def test_effects_that_the_regression_took_up_are_neutral(logs, tmp_path: Path) -> None:
+    """Simulated, the written robot must not have friction or payload twice."""
+    bare = believed()
+    old = [
+        Effect("stribeck_friction", 1, {"coulomb_nm": 0.3, "excess_nm": 0.2}),
+        Effect("presliding_friction", 2, {"coulomb_nm": 0.3}),
+        Effect("quadratic_drag", 2, {"drag_nm_s2_rad2": 1e-4}),
+        Effect("viscous_friction", 3, {"viscous_nm_s_rad": 1e-2}),
+        Effect("motor_inertia", 1, {"relative_change": 0.2}),
+        Effect("payload", None, {"mass_kg": 20.0}),
+        Effect("torque_constant", 3, {"relative_error": 0.1}),
+        Effect("coulomb_friction", 3, {"coulomb_nm": 0.9}),
+    ]
+    kept = [
+        Effect("torque_ripple", 1, {"cosine_1_nm": 0.1}),
+        Effect("load_dependent_friction", 2, {}),
+    ]
+    robot = Robot(bare.core, [*old, *kept])
+    found = identify_logs(robot, logs[:2], consistent=True)
+    values = found.identified(SOURCE)
+    write_identified(robot, tmp_path / "r.toml", values)
+    back = {e.label: e for e in load_identified(tmp_path / "r.toml").effects}
+    for effect in old[:-1]:
+        neutral = Effect(effect.name, effect.axis).values()
+        assert effect.values() != neutral and back[effect.label].values() == neutral, effect.label
+    assert back["torque_ripple@1"].values() == kept[0].values()
+    coulomb = back["coulomb_friction@3"].parameters["coulomb_nm"]
+    assert coulomb == pytest.approx(0.4, rel=0.05)
+    (note,) = (x for x in values.provenance.notes.splitlines() if "set to neutral" in x)
+    for effect in old[:-1]:
+        assert effect.label in note
+    assert "load_dependent" not in note and "coulomb_friction@3" not in note
+    # Without a term for it friction stays what it was.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)
+        viscous = identify_logs(
+            robot, logs[:2], terms=DriveTerms(inertia="motor", viscous="motor"), consistent=True
+        )
+    assert "no term for motor inertias" not in viscous.identified(SOURCE).provenance.notes
+    labels = [e.label for e in viscous.identified(SOURCE).effects]
+    assert "stribeck_friction@1" not in labels and "quadratic_drag@2" in labels
+
+
+def test_links_that_hold_rotors_are_noted(robot, logs) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)
+        found = identify_logs(robot, logs[0], terms=DriveTerms(viscous="motor"), consistent=True)
+    assert (
+        "no term for motor inertias: links hold them" in found.identified(SOURCE).provenance.notes
+    )
+
+
+def test_bodies_that_can_exist_are_not_eliminated(robot, logs) -> None:
+    with pytest.raises(InputError, match="eliminate: expected none together with consistent"):
+        identify_logs(robot, logs[0], eliminate=0.3, consistent=True)
 
 
 def test_the_prior_share_says_how_near_to_the_file(logs) -> None:

@@ -121,6 +121,51 @@ def test_agrees_with_a_general_optimiser():
     assert found.loss < best * (1 + 1e-6)
 
 
+def test_known_values_are_those_of_the_regression_without_them():
+    """A coefficient goes to the target; a first moment held where it is changes nothing."""
+    rng = np.random.default_rng(4)
+    theta, _ = body(4)
+    factor = rng.normal(size=(14, 12))
+    target = factor @ np.append(theta, [-0.5, 0.3]) + rng.normal(0, 2.0, 14)
+    found = consistent_parameters(factor, target, links=[LINK], nonnegative=[10], known={11: 0.7})
+    less = consistent_parameters(
+        factor[:, :11], target - 0.7 * factor[:, 11], links=[LINK], nonnegative=[10]
+    )
+    assert found.status == less.status == "solved" and found.theta[11] == 0.7
+    # Tolerances of the solver are 1e-9 of the target; the condition number is near ten.
+    np.testing.assert_allclose(found.theta[:11], less.theta, atol=1e-6 * np.abs(theta).max())
+    assert found.loss_unconstrained == pytest.approx(less.loss_unconstrained, rel=1e-9)
+
+    free = consistent_parameters(factor, target, links=[LINK], nonnegative=[10])
+    at = float(free.theta[1])
+    held = consistent_parameters(factor, target, links=[LINK], nonnegative=[10], known={1: at})
+    assert held.status == free.status == "solved" and held.theta[1] == at
+    np.testing.assert_allclose(held.theta, free.theta, atol=1e-5 * np.abs(theta).max())
+    # Away from there it costs, and all the more the further.
+    losses = []
+    for step in (0.5, 1.0, 1.5):
+        away = consistent_parameters(
+            factor, target, links=[LINK], nonnegative=[10], known={1: at + step}
+        )
+        assert away.theta[1] == at + step and away.least_eigenvalue[0] > 0
+        losses.append(away.loss)
+    assert free.loss < losses[0] < losses[1] < losses[2]
+    # Convex.
+    assert losses[0] - free.loss < losses[1] - losses[0] < losses[2] - losses[1]
+
+
+def test_known_values_of_a_consistent_fit_and_of_none():
+    theta, _ = body(1)
+    factor = np.random.default_rng(0).normal(size=(14, 10))
+    found = consistent_parameters(factor, factor @ theta, links=[LINK], known={0: theta[0]})
+    assert found.status == "already_consistent" and found.theta[0] == theta[0]
+    assert np.abs(found.theta - theta).max() < 1e-9
+    # No body has a negative inertia.
+    none = consistent_parameters(factor, factor @ theta, links=[LINK], known={4: -1.0})
+    assert none.status == "failed" and np.isnan(none.theta).all()
+    assert "perhaps no body has them" in none.advice
+
+
 def test_prior_decides_what_data_leave_open():
     # Only three combinations are measured, exactly: those must hold, the rest is CAD.
     theta, _ = body(2)
@@ -194,6 +239,10 @@ def test_noisy_links_become_possible_and_come_nearer_to_the_truth():
         ({"links": [LINK * 1.0]}, "links: expected positions"),
         ({"nonnegative": [-1]}, "nonnegative: expected positions"),
         ({"nonnegative": [10, 10]}, "nonnegative: expected positions"),
+        ({"known": {11: 1.0}}, "known: expected positions"),
+        ({"known": {0.5: 1.0}}, "known: expected positions"),
+        ({"known": {0: np.nan}}, "known: expected finite"),
+        ({"known": {10: -1.0}}, "known: expected no negative number"),
         ({"prior": np.zeros(3)}, r"prior: expected shape \(11,\)"),
         ({"prior": np.full(11, np.inf)}, "prior: expected finite"),
         ({"prior_std": 0.0}, "prior_std: expected one positive"),
@@ -338,6 +387,8 @@ def test_misuse_of_a_motion_is_named(three_axes):
         ((q, v, a, torque), {"torque_std_nm": 0.0}, "torque_std_nm: expected positive"),
         ((q, v, a, torque), {"torque_std_nm": [1.0, 2.0]}, "torque_std_nm: expected positive"),
         ((q, v, a, torque), {"prior": np.zeros(4)}, "prior: expected shape"),
+        ((q, v, a, torque), {"known": {"axis9.mass": 1.0}}, "known: expected names"),
+        ((q, v, a, torque), {"known": {"axis1.mass": "x"}}, "known: expected a finite number"),
     ):
         with pytest.raises(InputError, match=message):
             identify_consistent(three_axes, *given, **options)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from axis_data import RATIO, SAMPLE_S, TRUTH, record
 from axisight import (
@@ -345,20 +346,26 @@ def test_a_calibrated_geometry_is_that_of_the_file(tmp_path: Path) -> None:
     write_identified(robot, tmp_path / "r.toml", done)
     back = load_identified(tmp_path / "r.toml")
     left = back.provenance.settings["no_place"]
+
+    def three(name: str) -> list[float]:
+        return [left[f"{name}{x}"]["value"] for x in "xyz"]
+
     again = nominal_geometry(
         back.robot,
-        tool_position_m=left["tool_position_m"],
-        tool_rotation=left["tool_rotation"],
-        base_position_m=left["base_position_m"],
-        base_rotation=left["base_rotation"],
+        tool_position_m=three("tool."),
+        # Positions alone do not show how the tool is turned.
+        tool_rotation=found.geometry.tool_rotation,
+        base_position_m=three("base."),
+        base_rotation=Rotation.from_rotvec(three("base.rotation_")).as_matrix(),
     )
+    assert "tool.rotation_x" not in left
     want = found.geometry
     np.testing.assert_array_equal(again.origin_m, want.origin_m)
     np.testing.assert_allclose(again.axis, want.axis, rtol=0, atol=1e-15)
     np.testing.assert_allclose(again.compliance_rad_nm, want.compliance_rad_nm, rtol=1e-9)
     assert np.abs(want.axis - found.nominal.axis).max() > 1e-4
     # With the offsets added by hand it is the calibrated machine.
-    offset = np.array([left["offset_rad"][name] for name in want.joint_names])
+    offset = np.array([left[f"{name}.offset"]["value"] for name in want.joint_names])
     q = configurations(5, 9)
     got = again.tool_location(q + offset)[1]
     np.testing.assert_allclose(got, want.tool_location(q)[1], rtol=0, atol=1e-12)
@@ -368,7 +375,12 @@ def test_a_calibrated_geometry_is_that_of_the_file(tmp_path: Path) -> None:
     for name in ("axis2.origin_x", "axis4.origin_z"):
         se = float(table["standard_error"].sel(parameter=name))
         assert np.isnan(errors[name]) if np.isinf(se) else np.isclose(errors[name], se)
-    assert "not written, no place in a robot file: offset_rad, tool_position_m" in (
+    for name in ("axis2.offset", "tool.y", "base.x"):
+        se = float(table["standard_error"].sel(parameter=name))
+        assert list(left[name]) == ["value", "standard_error", "unit", "meaning"]
+        assert left[name]["standard_error"] == (None if np.isinf(se) else pytest.approx(se))
+    assert (left["axis2.offset"]["unit"], left["tool.y"]["unit"]) == ("rad", "m")
+    assert "not written, no place in a robot file: axis1.offset, axis2.offset" in (
         back.provenance.notes
     )
     # The vertical axis holds nothing.
@@ -448,5 +460,44 @@ def test_a_compliance_without_a_spring_is_kept_beside_the_file() -> None:
     )
     done = identified_geometry(dataclasses.replace(found, nominal=rigid), SOURCE)
     assert "axis3.stiffness" not in done.names
-    left = done.provenance.settings["no_place"]["compliance_rad_nm"]
-    assert left == {"axis3": found.geometry.compliance_rad_nm[2]}
+    left = done.provenance.settings["no_place"]
+    assert list(left) == ["axis3.compliance"]
+    se = float(found.table["standard_error"].sel(parameter="axis3.compliance"))
+    assert left["axis3.compliance"] == {
+        "value": found.geometry.compliance_rad_nm[2],
+        "standard_error": pytest.approx(se),
+        "unit": "rad/Nm",
+        "meaning": "compliance of a rigid joint",
+    }
+
+
+def test_standard_errors_of_a_rotation_vector_against_finite_differences() -> None:
+    """A base that is turned by a radian: its vector does not move as the deviation does."""
+    _, found = calibration(("base",))
+    turned = Rotation.from_rotvec([0.3, -0.8, 0.5]).as_matrix()
+    start = dataclasses.replace(found.nominal, base_rotation=turned)
+    errors = errors_about(start, ("base",), rotation=False)
+    theta = np.array([0.0, 0.0, 0.0, 0.02, -0.05, 0.04])
+    root = np.random.default_rng(3).normal(size=(6, 6))
+    done = identified_geometry(
+        dataclasses.replace(
+            found,
+            nominal=start,
+            geometry=errors.geometry(theta),
+            table=found.table.assign(deviation=("parameter", theta)),
+            covariance=root @ root.T,
+        ),
+        SOURCE,
+    )
+
+    def vector(at):
+        return Rotation.from_matrix(errors.geometry(at).base_rotation).as_rotvec()
+
+    h = 1e-6
+    slope = np.array([(vector(theta + h * e) - vector(theta - h * e)) / (2 * h) for e in np.eye(6)])
+    want = np.sqrt(np.diag(slope.T @ root @ root.T @ slope))
+    left = done.provenance.settings["no_place"]
+    got = [left[f"base.rotation_{x}"] for x in "xyz"]
+    np.testing.assert_allclose([g["value"] for g in got], vector(theta), rtol=1e-12)
+    # Differences of h: errors of h^2 and of rounding over h.
+    np.testing.assert_allclose([g["standard_error"] for g in got], want, rtol=1e-8)

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from axisight.calibration.geometry import errors_about, left_jacobian
 from axisight.calibration.identify import Calibration
 from axisight.errors import InputError
 from axisight.robot_file import Identified, Provenance
+from axisight.robot_sidecar import known
 from axisight.robot_values import noted, values_of
 
 Array = NDArray[np.float64]
@@ -35,11 +37,12 @@ def identified_geometry(calibration: Calibration, provenance: Provenance) -> Ide
     ============== =====================================================================
 
     The file then has the calibrated geometry but for its offsets, which were found along with it:
-    add ``offset_rad`` of the settings' ``"no_place"`` to the joint angles, or offset over gear ratio
-    to the motor's zero, or angles are off by them. They cannot be put into the geometry, whose
+    add ``<joint>.offset`` of the settings' ``"no_place"`` to the joint angles, or offset over gear
+    ratio to the motor's zero, or angles are off by them. They cannot be put into the geometry, whose
     frames are parallel at angle zero, without turning every link beyond and its inertia.
-    Frames of tool and base stand there too, as positions and rotation matrices; and
-    compliances of joints that the file has no spring for.
+    Frames of tool and base stand there too, as positions ``tool.x`` to ``tool.z`` and rotation vectors
+    ``tool.rotation_x`` to ``_z``; and ``<joint>.compliance`` of joints that the file has no spring
+    for. Each has ``value``, ``standard_error`` (null: unknown), ``unit`` and ``meaning``.
 
     calibration
         Its deviations are written for all groups that were identified. Those that the
@@ -102,34 +105,56 @@ def _stiffness(calibration: Calibration, joint: int) -> float | None:
 
 
 def _unplaced(calibration: Calibration, groups: set[str]) -> dict[str, Any]:
-    """What was identified and has no place in a robot file."""
-    geometry = calibration.geometry
+    """What was identified and has no place in a robot file: value, standard error, unit, meaning."""
+    geometry, table = calibration.geometry, calibration.table
+    error = dict(
+        zip(table["parameter"].values, np.sqrt(np.diag(calibration.covariance)), strict=True)
+    )
+    unit = dict(zip(table["parameter"].values, table["unit"].values, strict=True))
     out: dict[str, Any] = {}
-    if "compliance" in groups:
-        stiff = {
-            name: float(value)
-            for name, value, before in zip(
-                geometry.joint_names,
-                geometry.compliance_rad_nm,
-                calibration.nominal.compliance_rad_nm,
-                strict=True,
-            )
-            if value and not before
+
+    def add(name: str, value: float, spread: float, meaning: str) -> None:
+        out[name] = {
+            "value": float(value),
+            "standard_error": known(float(spread)),
+            "unit": str(unit[name]),
+            "meaning": meaning,
         }
-        out |= {"compliance_rad_nm": stiff} if stiff else {}
-    if "offset" in groups:
-        out["offset_rad"] = {
-            name: float(value)
-            for name, value, driven in zip(
-                geometry.joint_names, geometry.offset_rad, geometry.driven, strict=True
-            )
-            if driven
-        }
+
+    for j, joint in enumerate(geometry.joint_names):
+        before = calibration.nominal.compliance_rad_nm[j]
+        if "compliance" in groups and geometry.compliance_rad_nm[j] and not before:
+            name = f"{joint}.compliance"
+            add(name, geometry.compliance_rad_nm[j], error[name], "compliance of a rigid joint")
+    for j, joint in enumerate(geometry.joint_names):
+        name = f"{joint}.offset"
+        if name in error:
+            add(name, geometry.offset_rad[j], error[name], "to be added to the joint angle")
     for frame in FRAMES:
-        if frame in groups:
-            out[f"{frame}_position_m"] = getattr(geometry, f"{frame}_position_m").tolist()
-            out[f"{frame}_rotation"] = getattr(geometry, f"{frame}_rotation").tolist()
+        for k, x in enumerate("xyz"):
+            name = f"{frame}.{x}"
+            if name in error:
+                add(name, getattr(geometry, f"{frame}_position_m")[k], error[name], "position")
+        if f"{frame}.rotation_x" in error:
+            vector, spread = _rotation_vector(calibration, frame)
+            for k, x in enumerate("xyz"):
+                add(f"{frame}.rotation_{x}", vector[k], spread[k], "rotation vector")
     return out
+
+
+def _rotation_vector(calibration: Calibration, frame: str) -> tuple[Array, Array]:
+    """Rotation vector (3,) of a frame, and its standard errors."""
+    names = [str(name) for name in calibration.table["parameter"].values]
+    own = [names.index(f"{frame}.rotation_{x}") for x in "xyz"]
+    matrix = getattr(calibration.geometry, f"{frame}_rotation")
+    vector = np.asarray(Rotation.from_matrix(matrix).as_rotvec(), dtype=np.float64)
+    # dR = [J(deviation) d(deviation)]x R = [J(vector) d(vector)]x R.
+    deviation = calibration.table["deviation"].values[own]
+    slope = np.linalg.solve(left_jacobian(vector), left_jacobian(deviation))
+    spread = calibration.covariance[np.ix_(own, own)]
+    if not np.isfinite(spread).all():
+        return vector, np.full(3, np.nan)
+    return vector, np.sqrt(np.diag(slope @ spread @ slope.T))
 
 
 def _groups(names: list[str]) -> set[str]:

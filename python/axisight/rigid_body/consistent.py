@@ -8,7 +8,7 @@ semidefinite cones; Clarabel (Goulart and Chen 2024) solves it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,7 +18,8 @@ from scipy import sparse
 
 from axisight import _core
 from axisight.errors import InputError
-from axisight.rigid_body.estimate import row_weights
+from axisight.rigid_body.base import free_columns
+from axisight.rigid_body.estimate import numbers, row_weights
 from axisight.rigid_body.regressor import TorqueModel, rows
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ _ADVICE: dict[str, str] = {
     ),
     "failed": (
         "the solver found no solution: check the target for NaN-like sizes, make `margin` "
-        "smaller, or give a prior for the links"
+        "smaller, give a prior for the links, or hold other values (`known`): perhaps no body has them"
     ),
 }
 
@@ -120,6 +121,7 @@ def consistent_parameters(
     *,
     links: Sequence[Sequence[int]] | NDArray[np.int64],
     nonnegative: Sequence[int] = (),
+    known: Mapping[int, float] | None = None,
     prior: ArrayLike | None = None,
     prior_std: ArrayLike | None = None,
     margin: float = 1e-6,
@@ -134,6 +136,7 @@ def consistent_parameters(
     links : for every link the positions in theta of its ten parameters, in the order of
         :func:`pseudo_inertia`.
     nonnegative : positions of rotor inertias and friction coefficients.
+    known : values to hold parameters at, by position.
     prior : (p,), say from CAD: what to stay close to; zeros by default.
     prior_std : standard deviation of the prior, one number or (p,), infinite for none; by
         default so wide that the prior decides only what the data leave open.
@@ -159,13 +162,14 @@ def consistent_parameters(
         or max_iterations < 1
     ):
         raise InputError(f"max_iterations: expected a positive integer, got {max_iterations!r}")
+    held = _held(known or {}, p, signs)
     before = np.zeros(p) if prior is None else _finite("prior", prior, 1)
     if before.shape != (p,):
         raise InputError(f"prior: expected shape ({p},), got {before.shape}")
     mass, length = _typical(before[where])
     scale = _scales(r, y, where, mass, length)
     weight = _prior_weight(prior_std, r * scale, scale)
-    problem = _Problem(r * scale, y, before / scale, weight, where, signs, margin, scale)
+    problem = _Problem(r * scale, y, before / scale, weight, where, signs, held, margin, scale)
     return problem.result(mass, length, max_iterations)
 
 
@@ -177,6 +181,7 @@ def identify_consistent(
     torque_nm: ArrayLike,
     *,
     torque_std_nm: ArrayLike = 1.0,
+    known: Mapping[str, float] | None = None,
     sample_weight: ArrayLike | None = None,
     prior: ArrayLike | None = None,
     prior_std: ArrayLike | None = None,
@@ -192,6 +197,7 @@ def identify_consistent(
     q, v, a, torque_nm : as for :func:`identify_rigid_body`.
     torque_std_nm : standard deviation of the residual of each row, one number or (n_rows,) [Nm],
         as ``residual_std_nm`` of an unconstrained estimate gives it.
+    known : parameters and the values to hold them at, by name.
     sample_weight : as for :func:`identify_rigid_body`.
     prior : (n_parameters,) what to stay close to; by default the values in the robot file.
     prior_std, margin, max_iterations : as for :func:`consistent_parameters`.
@@ -211,6 +217,8 @@ def identify_consistent(
             f"torque_std_nm: expected positive numbers, one or ({model.n_rows},), "
             f"got shape {std.shape}"
         )
+    held = numbers("known", known)
+    free_columns(model, held)
     p = model.n_parameters
     factors, _ = _core.regression_factors(
         model.robot.core,
@@ -231,6 +239,7 @@ def identify_consistent(
         both[:, p],
         links=link_positions(model),
         nonnegative=nonnegative_positions(model),
+        known={model.names.index(name): value for name, value in held.items()},
         prior=model.nominal if prior is None else prior,
         prior_std=prior_std,
         margin=margin,
@@ -289,18 +298,18 @@ class _Problem:
         weight: Array,
         links: NDArray[np.int64],
         signs: NDArray[np.int64],
+        known: Array,
         margin: float,
         scale: Array,
     ) -> None:
         self.factor, self.target, self.prior, self.weight = factor, target, prior, weight
         self.links, self.signs, self.margin, self.scale = links, signs, margin, scale
+        self.known, self.held = known, np.flatnonzero(np.isfinite(known))
 
     def result(self, mass: float, length: float, iterations: int) -> ConsistentParameters:
         stacked = np.concatenate([self.factor, np.diag(self.weight)])
-        free = np.linalg.lstsq(
-            stacked, np.concatenate([self.target, self.weight * self.prior]), rcond=None
-        )[0]
-        best: Array = np.linalg.lstsq(self.factor, self.target, rcond=None)[0].astype(np.float64)
+        free = self.fit(stacked, np.concatenate([self.target, self.weight * self.prior]))
+        best = self.fit(self.factor, self.target)
         status: Status = "already_consistent"
         z, count = free, 0
         if not self.feasible(free):
@@ -308,8 +317,11 @@ class _Problem:
         eigenvalue = self.eigenvalues(z)
         on = np.flatnonzero(eigenvalue < self.margin + _ON_BOUNDARY)
         zero = [int(k) for k in self.signs if z[k] < 1e-7 * max(1.0, np.abs(z).max())]
+        theta = z * self.scale
+        if status != "failed":
+            theta[self.held] = self.known[self.held]
         return ConsistentParameters(
-            theta=z * self.scale,
+            theta=theta,
             status=status,
             advice=_ADVICE[status],
             loss=self.loss(z),
@@ -321,6 +333,14 @@ class _Problem:
             length_m=length,
             iterations=count,
         )
+
+    def fit(self, matrix: Array, right: Array) -> Array:
+        """Least squares without cones; what is known stays."""
+        z = np.zeros(matrix.shape[1])
+        z[self.held] = self.known[self.held] / self.scale[self.held]
+        left = np.delete(np.arange(len(z)), self.held)
+        z[left] = np.linalg.lstsq(matrix[:, left], right - matrix @ z, rcond=None)[0]
+        return z
 
     def loss(self, z: Array) -> float:
         return float(np.sum((self.factor @ z - self.target) ** 2))
@@ -351,11 +371,9 @@ class _Problem:
         right = [self.target]
         cones: list[Any] = [clarabel.ZeroConeT(k)]
         if len(self.signs):
-            pick = sparse.csc_matrix(
-                (-np.ones(len(self.signs)), (np.arange(len(self.signs)), self.signs)),
-                shape=(len(self.signs), p + k),
-            )
-            blocks.append(pick)
+            pick = np.zeros((len(self.signs), p + k))
+            pick[np.arange(len(self.signs)), self.signs] = -1.0
+            blocks.append(sparse.csc_matrix(pick))
             right.append(np.zeros(len(self.signs)))
             cones.append(clarabel.NonnegativeConeT(len(self.signs)))
         for link in self.links:
@@ -369,11 +387,16 @@ class _Problem:
         settings.verbose = False
         settings.max_iter = iterations
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
+        # What is known goes to the right-hand side.
+        z = np.zeros(p + k)
+        z[self.held] = self.known[self.held] / self.scale[self.held]
+        left = np.delete(np.arange(p + k), self.held)
+        matrix = sparse.vstack(blocks, format="csc")
         solver = clarabel.DefaultSolver(
-            sparse.triu(quadratic / unit**2, format="csc"),
-            linear / unit**2,
-            sparse.vstack(blocks, format="csc"),
-            np.concatenate(right),
+            sparse.triu(quadratic[left][:, left] / unit**2, format="csc"),
+            linear[left] / unit**2,
+            matrix[:, left],
+            np.concatenate(right) - matrix @ z,
             cones,
             settings,
         )
@@ -385,7 +408,8 @@ class _Problem:
             status = "inaccurate"
         else:
             return np.full(p, np.nan), "failed", int(found.iterations)
-        return np.array(found.x[:p]), status, int(found.iterations)
+        z[left] = found.x
+        return z[:p], status, int(found.iterations)
 
 
 def _svec() -> tuple[Array, Array]:
@@ -438,6 +462,19 @@ def _prior_weight(prior_std: ArrayLike | None, scaled: Array, scale: Array) -> A
             f"got shape {std.shape}"
         )
     return np.asarray(scale / np.broadcast_to(std, (p,)), dtype=np.float64)
+
+
+def _held(known: Mapping[int, float], p: int, signs: NDArray[np.int64]) -> Array:
+    """Values (p,) to hold parameters at, NaN for those that are free."""
+    out = np.full(p, np.nan)
+    places = _positions("known", list(known), p, 0)
+    out[places] = _finite("known", list(known.values()), 1) if known else []
+    below = [int(k) for k in signs if out[k] < 0]
+    if below:
+        raise InputError(
+            f"known: expected no negative number for a rotor, friction or spring, got {out[below[0]]:g}"
+        )
+    return out
 
 
 def _finite(field: str, value: ArrayLike, ndim: int) -> Array:

@@ -116,28 +116,12 @@ def identify_rigid_body(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
     )
 
-    shares = reversals(model, base.columns, motion[1])
-    findings = reversal_findings(shares)
-    found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
-    if len(found.independent) < len(base):
-        message = rank_message(base, found, shares, motion)
-        if deficient == "raise":
-            raise IdentifiabilityError(message)
-        findings.append(IdentificationFinding(FindingKind.RANK, message))
-        base = regrouped(base, found.independent, found.matrix)
-        factors = factors.columns(found.independent)
-
+    base, factors, findings = _separated(base, factors, motion, deficient)
     floor = 1e-12 * np.sqrt((torque**2).mean()) * np.ones(model.n_rows)
     noise = _column_noise(base, column_noise, factors, torque) if method == "tls" else None
-    keep = np.arange(len(base))
-    while True:
-        now = factors.columns(keep)
-        solution = _solve(now, method, floor, None if noise is None else noise[keep])
-        covariance, freedom = block_covariance(now, solution)
-        worst = _least_certain(solution, covariance, eliminate)
-        if worst is None:
-            break
-        keep = np.delete(keep, worst)
+    keep, now, solution, (covariance, freedom) = _eliminated(
+        factors, method, floor, noise, eliminate
+    )
     if not solution.converged:
         text = "row weights did not settle in 50 iterations: a row may fit exactly; try method=ls"
         findings.append(IdentificationFinding(FindingKind.WEIGHTS, text))
@@ -168,6 +152,26 @@ def identify_rigid_body(
     return result.with_findings(findings)
 
 
+def _separated(
+    base: BaseParameters,
+    factors: Factors,
+    motion: tuple[Array, Array, Array],
+    deficient: Literal["raise", "group"],
+) -> tuple[BaseParameters, Factors, list[IdentificationFinding]]:
+    """Return what the data separate: the base parameters, or, if that is wanted, fewer."""
+    shares = reversals(base.model, base.columns, motion[1])
+    findings = reversal_findings(shares)
+    found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
+    if len(found.independent) == len(base):
+        return base, factors, findings
+    message = rank_message(base, found, shares, motion)
+    if deficient == "raise":
+        raise IdentifiabilityError(message)
+    findings.append(IdentificationFinding(FindingKind.RANK, message))
+    fewer = regrouped(base, found.independent, found.matrix)
+    return fewer, factors.columns(found.independent), findings
+
+
 def regrouped(base: BaseParameters, independent: NDArray[np.intp], matrix: Array) -> BaseParameters:
     """Return fewer base parameters: combinations that the data separate."""
     return BaseParameters(
@@ -181,6 +185,24 @@ def regrouped(base: BaseParameters, independent: NDArray[np.intp], matrix: Array
         rank_qr=base.rank_qr,
         gap=base.gap,
     )
+
+
+def _eliminated(
+    factors: Factors, method: Method, floor: Array, noise: Array | None, limit: float | None
+) -> tuple[NDArray[np.intp], Factors, Solution, tuple[Array, Array]]:
+    """Solve without the least certain parameter until all that are left are certain enough.
+
+    Returns what was kept, its factors, its solution, covariance and degrees of freedom.
+    """
+    keep = np.arange(factors.k)
+    while True:
+        now = factors.columns(keep)
+        solution = _solve(now, method, floor, None if noise is None else noise[keep])
+        spread = block_covariance(now, solution)
+        worst = _least_certain(solution, spread[0], limit)
+        if worst is None:
+            return keep, now, solution, spread
+        keep = np.delete(keep, worst)
 
 
 def _solve(factors: Factors, method: Method, floor: Array, noise: Array | None) -> Solution:

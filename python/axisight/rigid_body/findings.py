@@ -15,6 +15,8 @@ class FindingKind(StrEnum):
     """The regression is badly conditioned: small errors of the data become large ones."""
     REVERSAL = "reversal"
     """An axis hardly ever reverses: its Coulomb friction rests on little or nothing."""
+    LEFT_OUT = "left_out"
+    """Samples around reversals were left out; serious if it was less than intervals need."""
     GEAR_SIGN = "gear_sign"
     """An axis by itself wants a negative inertia: gear ratio or torque have the wrong sign."""
     NEGATIVE_FRICTION = "negative_friction"

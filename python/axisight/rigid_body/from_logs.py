@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -10,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.errors import InputError
+from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
 from axisight.rigid_body.base import base_parameters
 from axisight.rigid_body.consistent import (
@@ -24,6 +25,7 @@ from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
 from axisight.rigid_body.motion import MotionEstimate, estimate_motion
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.rigid_body.result import RigidBodyEstimate
+from axisight.rigid_body.reversal_window import reversal_weight
 from axisight.rigid_body.robot_values import identified_bodies
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance, identified
@@ -32,9 +34,6 @@ from axisight.robot_values import noted
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
-
-LEAST_KEPT = 0.05
-"""Share of an axis's samples that reversals have to leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +62,11 @@ class LogIdentification:
 
         What the motions do not show keeps the value it has in the file and is left out. Motor-side
         parameters that stand for themselves have standard errors (not with ``consistent``, which
-        mixes in a prior); of links only combinations have: the table of base parameters is in
-        the settings of ``provenance``, torque errors with it, findings in the notes. Raises RobotError
-        for masses no body has, which the estimate alone may lead to.
+        mixes in a prior), values that were given have zero and are noted; of links only
+        combinations have: the table of base parameters is in the settings of ``provenance``, torque
+        errors with it, findings in the notes. Effects that the values have taken up are set to
+        neutral (:func:`identified_bodies`). Raises RobotError for masses no body has, which the
+        estimate alone may lead to.
         """
         model = self.estimate.model
         theta = self.estimate.standard() if self.consistent is None else self.consistent.theta
@@ -73,24 +74,37 @@ class LogIdentification:
         if self.consistent is not None:
             notes.insert(0, f"bodies that can exist: {self.consistent.status}")
             notes += [self.consistent.advice] if self.consistent.advice else []
+        if not any(name.endswith(".motor_inertia") for name in model.names):
+            notes.append(
+                "no term for motor inertias: links hold them, and those of the file count on top; "
+                "hold them with `known` instead"
+            )
+        if self.estimate.known:
+            listed = ", ".join(
+                f"{name} = {value:.6g}" for name, value in self.estimate.known.items()
+            )
+            notes.append(f"held at given values: {listed}")
         settings = {**provenance.settings, "base_parameters": self._base_table()}
         settings["torque_error"] = self._error_table()
         source = noted(replace(provenance, settings=settings), notes)
-        found = identified_bodies(model, theta, source)
+        held = self.estimate.known
+        # What is made of given values alone has no variance.
+        free = np.diag([float(name not in held) for name in model.names])
+        found = identified_bodies(model, theta, source, covariance=free)
         before = identified_bodies(model, model.nominal, source).values
         size = np.abs(before).max(initial=1e-300)
         same = np.isclose(found.values, before, rtol=1e-9, atol=1e-12 * size)
-        errors = self._lone_errors()
+        errors = np.where(found.standard_errors == 0.0, 0.0, self._lone_errors())
         kept = [
             (name, float(value), float(error))
             for name, value, error, unchanged in zip(
                 found.names, found.values, errors, same, strict=True
             )
-            if "@" in name or np.isfinite(error) or not unchanged
+            if "@" in name or error > 0 or not unchanged
         ]
         return identified(
             {name: value for name, value, _ in kept},
-            source,
+            found.provenance,
             standard_errors={name: error for name, _, error in kept if np.isfinite(error)},
             effects=found.effects,
         )
@@ -168,12 +182,13 @@ def identify_logs(
     cutoff_hz : of the filter [Hz], well above the motion and well below the first resonance.
     reversal_s : how long before and after a motor turns back its torque is left out of the fit [s].
         The filter smears the step of Coulomb friction there, and the regressor has it sharp; default
-        half a period of the cutoff, 0 for none.
+        two periods of the cutoff, or less, with a warning, on axes where that would leave less
+        than a fifth of the samples; 0 for none.
     terms : of the drives, see :class:`DriveTerms`.
     coupling : of the motors; default the gear ratios of the robot.
     method, known, eliminate, deficient : as for :func:`identify_rigid_body`.
     consistent : also find bodies that can exist (:func:`identify_consistent`), with the values
-        of the robot as a prior.
+        of the robot as a prior; what is ``known`` is held there too, ``eliminate`` is refused.
     prior_share : standard deviation of that prior as a share of each link's size, see
         :func:`prior_spread`.
 
@@ -184,21 +199,19 @@ def identify_logs(
     given = [logs] if isinstance(logs, Log) else list(logs)
     if not given:
         raise InputError("logs: expected at least one, got none")
+    if consistent and eliminate is not None:
+        raise InputError(
+            "eliminate: expected none together with consistent, where the prior decides what the "
+            f"motions hardly show, got {eliminate!r}"
+        )
     model = TorqueModel(robot, terms=terms, side="motor", coupling=coupling)
     motions = [_estimate(log, robot, cutoff_hz) for log in given]
-    margin = 0.5 / cutoff_hz if reversal_s is None else reversal_s
-    if isinstance(margin, bool) or not (np.isfinite(margin) and margin >= 0):
-        raise InputError(f"reversal_s: expected a number not below zero, got {reversal_s!r}")
-    weight = np.concatenate([_away_from_reversals(motion, margin) for motion in motions])
-    _refuse_little(weight, margin)
+    weight, left_out = reversal_weight(motions, reversal_s, cutoff_hz)
     joint = [_joint_motion(model, motion) for motion in motions]
-    q, v, a, torque = (np.concatenate(parts) for parts in zip(*joint, strict=True))
+    stacked = [np.concatenate(parts) for parts in zip(*joint, strict=True)]
     estimate = identify_rigid_body(
         model,
-        q,
-        v,
-        a,
-        torque,
+        *stacked,
         sample_weight=weight,
         base=base_parameters(model, known=known or (), locked=True),
         method=method,
@@ -206,14 +219,16 @@ def identify_logs(
         eliminate=eliminate,
         deficient=deficient,
     )
+    estimate = estimate.with_findings([*estimate.findings, *left_out])
+    for finding in left_out:
+        if finding.serious:
+            warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     possible = None
     if consistent:
         possible = identify_consistent(
             model,
-            q,
-            v,
-            a,
-            torque,
+            *stacked,
+            known=known,
             sample_weight=weight,
             torque_std_nm=estimate.residual_std_nm,
             prior_std=prior_spread(model, prior_share),
@@ -250,27 +265,6 @@ def _joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
         parts.append(full)
     torque = np.zeros((0, 0)) if motion.torque_nm is None else motion.torque_nm
     return parts[0], parts[1], parts[2], torque
-
-
-def _away_from_reversals(motion: MotionEstimate, margin_s: float) -> Array:
-    """One, and zero within ``margin_s`` of a change of sign of the motor velocity, (n, n_axes)."""
-    out = np.ones_like(motion.velocity_rad_s)
-    if margin_s > 0:
-        reach = int(np.ceil(margin_s / motion.sample_time_s))
-        turns = np.diff(np.sign(motion.velocity_rad_s), axis=0) != 0
-        for row, axis in zip(*np.nonzero(turns), strict=True):
-            out[max(row + 1 - reach, 0) : row + 1 + reach, axis] = 0.0
-    return out
-
-
-def _refuse_little(weight: Array, margin_s: float) -> None:
-    kept = weight.mean(axis=0)
-    if kept.min() < LEAST_KEPT:
-        raise InputError(
-            f"reversal_s: expected less, got {margin_s:g} s: axis {int(kept.argmin()) + 1} turns back "
-            f"so often, or stands still, that {100 * kept.min():.2g} % of its samples are left; take a "
-            "longer log or a higher cutoff, or keep all with 0"
-        )
 
 
 def _errors(

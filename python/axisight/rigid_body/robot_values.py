@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.absorbed import absorbed_effects, absorbed_note
 from axisight.effects import Effect
 from axisight.errors import InputError, RobotError
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.robot_file import INERTIA, Identified, Provenance, identified
+from axisight.robot_values import noted
 
 Array = NDArray[np.float64]
 
@@ -17,6 +19,13 @@ LINK = 10
 EFFECTS = {
     "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
     "torque_offset": ("torque_offset", "offset_nm"),
+}
+# Terms by what they take up of effects that the robot has.
+TAKES_UP = {
+    "motor_inertia": "motor_inertia",
+    "viscous_friction": "viscous_friction",
+    "coulomb_friction": "dry_friction",
+    "torque_offset": "torque_offset",
 }
 ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -32,7 +41,10 @@ def identified_bodies(
 
     First moments become centres of mass and inertias about the link frame those about the
     centre of mass: I_c = I - (|h|^2 1 - h h^T) / m with h = m c. Coulomb friction and torque
-    offsets become effects.
+    offsets become effects. Effects of the robot whose torque the regression has taken up (see
+    `axisight.absorbed`) are set to neutral, and a note says so: a payload and balancers, which the
+    links now hold; errors of torque constants, in which all is measured; friction, offset and
+    rotor inertia of an axis by the terms of its drive.
 
     model
         On the motor side, where the robot file has its friction and rotor inertias.
@@ -78,7 +90,7 @@ def identified_bodies(
             raise InputError(f"covariance: expected shape {jacobian.shape}, got {given.shape}")
         spread = jacobian @ given @ jacobian.T
         spread = (spread + spread.T) / 2
-    effects = []
+    effects: list[Effect] = []
     for i, name in enumerate(names):
         joint, _, quantity = name.rpartition(".")
         if quantity in EFFECTS:
@@ -86,12 +98,25 @@ def identified_bodies(
             found = Effect(effect, _axis(model, joint), {parameter: float(out[i])})
             names[i] = f"{found.label}.{parameter}"
             effects.append(found)
+    replaced = _taken_up(model, effects)
     return identified(
         dict(zip(names, out.tolist(), strict=True)),
-        provenance,
+        noted(provenance, absorbed_note(replaced)),
         covariance=spread,
-        effects=effects,
+        effects=[*effects, *replaced],
     )
+
+
+def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
+    """Effects of the robot that links and drive terms of the model stand for now, neutral."""
+    own = model.robot.effects
+    out = absorbed_effects(own, ["links", "torque"], axis=None)
+    for name in model.names:
+        joint, _, quantity = name.rpartition(".")
+        if quantity in TAKES_UP:
+            axis = _axis(model, joint)
+            out += absorbed_effects(own, [TAKES_UP[quantity]], axis=axis, found=found)
+    return out
 
 
 def _axis(model: TorqueModel, joint: str) -> int:

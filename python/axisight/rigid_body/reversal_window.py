@@ -1,0 +1,90 @@
+"""Samples around reversals of a motor, which a filtered log has wrong and a fit leaves out.
+
+The filter smears the step of Coulomb friction in the torque, over some periods of its cutoff; the
+regressor has the step sharp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.rigid_body.findings import FindingKind, IdentificationFinding
+from axisight.rigid_body.motion import MotionEstimate
+
+Array = NDArray[np.float64]
+
+LEAST_KEPT = 0.05
+"""Share of an axis's samples that has to be left."""
+USUAL_PERIODS = (2.0, 1.5, 1.0, 0.5)
+"""Periods of the cutoff left out by default: the first that leaves enough of an axis."""
+USUAL_KEPT = 0.2
+"""Share of an axis's samples that is enough for that."""
+
+
+def reversal_weight(
+    motions: Sequence[MotionEstimate], reversal_s: float | None, cutoff_hz: float
+) -> tuple[Array, list[IdentificationFinding]]:
+    """Return weights (n, n_axes) of one, zero around reversals, of all motions, and what to say.
+
+    ``reversal_s`` is how long before and after a reversal samples are left out; by default two periods
+    of the cutoff, or less on axes that turn so often that hardly any sample would be left,
+    which is a serious finding. Raises InputError if too little is left.
+    """
+    given = reversal_s
+    if given is not None and (isinstance(given, bool) or not (np.isfinite(given) and given >= 0)):
+        raise InputError(f"reversal_s: expected a number not below zero, got {given!r}")
+    choices = [periods / cutoff_hz for periods in USUAL_PERIODS] if given is None else [given]
+    weights = [np.concatenate([_away(m, s) for m in motions]) for s in choices]
+    kept = np.array([weight.mean(axis=0) for weight in weights])
+    chosen = np.full(kept.shape[1], len(choices) - 1)
+    enough = kept >= USUAL_KEPT
+    chosen[enough.any(axis=0)] = enough.argmax(axis=0)[enough.any(axis=0)]
+    axes = np.arange(len(chosen))
+    margin, share = np.array(choices)[chosen], kept[chosen, axes]
+    _refuse_little(share, margin)
+    weight = np.stack([weights[k][:, axis] for axis, k in enumerate(chosen)], axis=1)
+    return weight, _findings(margin, share, cutoff_hz, short=bool(chosen.any()))
+
+
+def _away(motion: MotionEstimate, margin_s: float) -> Array:
+    """One, and zero within ``margin_s`` of a change of sign of the motor velocity, (n, n_axes)."""
+    out = np.ones_like(motion.velocity_rad_s)
+    if margin_s > 0:
+        reach = int(np.ceil(margin_s / motion.sample_time_s))
+        turns = np.diff(np.sign(motion.velocity_rad_s), axis=0) != 0
+        for row, axis in zip(*np.nonzero(turns), strict=True):
+            out[max(row + 1 - reach, 0) : row + 1 + reach, axis] = 0.0
+    return out
+
+
+def _refuse_little(kept: Array, margin_s: Array) -> None:
+    worst = int(kept.argmin())
+    if kept[worst] < LEAST_KEPT:
+        raise InputError(
+            f"reversal_s: expected less, got {margin_s[worst]:g} s: axis {worst + 1} turns back "
+            f"so often, or stands still, that {100 * kept[worst]:.2g} % of its samples are left; take a "
+            "longer log or a higher cutoff, or keep all with 0"
+        )
+
+
+def _findings(
+    margin_s: Array, kept: Array, cutoff_hz: float, *, short: bool
+) -> list[IdentificationFinding]:
+    if not (kept < 1).any():
+        return []
+    parts = [
+        f"{100 * (1 - share):.3g} % of axis {axis} (within {margin:.3g} s)"
+        for axis, (share, margin) in enumerate(zip(kept, margin_s, strict=True), 1)
+    ]
+    text = f"samples left out around reversals: {', '.join(parts)}"
+    if short:
+        usual = USUAL_PERIODS[0] / cutoff_hz
+        text += (
+            f"; the usual {usual:.3g} s would leave too little where it is less: Coulomb friction "
+            "is off by more than its standard error there, take slower motions or a higher cutoff"
+        )
+    return [IdentificationFinding(FindingKind.LEFT_OUT, text, short)]

@@ -1,0 +1,38 @@
+"""Which effects an identified quantity has taken up."""
+
+from axisight import Effect
+from axisight.absorbed import ABSORBED, absorbed_effects, absorbed_note
+from axisight.effects import effect_info
+
+
+def test_the_table_names_effects_once() -> None:
+    names = [name for taken in ABSORBED.values() for name in taken]
+    assert len(set(names)) == len(names)
+    for name in names:
+        # Every one of them has a neutral value, or it could not be set to it.
+        assert any(p.role == "amplitude" for p in effect_info(name).parameters)
+    # All friction of the motor has its place.
+    for name in ("coulomb_friction", "stribeck_friction", "presliding_friction"):
+        assert name in ABSORBED["dry_friction"]
+
+
+def test_effects_of_the_axis_become_neutral() -> None:
+    own = [
+        Effect("coulomb_friction", 1, {"coulomb_nm": 0.4, "smoothing_rad_s": 0.02}),
+        Effect("stribeck_friction", 1, {"excess_nm": 0.2}),
+        Effect("stribeck_friction", 2, {"excess_nm": 0.2}),
+        Effect("quadratic_drag", 1, {"drag_nm_s2_rad2": 0.0}),
+        Effect("payload", None, {"mass_kg": 3.0}),
+        Effect("backlash", 1, {"half_width_rad": 1e-4}),
+    ]
+    new = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})
+    quantities = ("dry_friction", "viscous_friction")
+    out = absorbed_effects(own, quantities, axis=1, found=[new])
+    assert [e.label for e in out] == ["stribeck_friction@1"]
+    assert out[0].values() == Effect("stribeck_friction", 1).values()
+    both = absorbed_effects(own, quantities, axis=1)
+    assert [e.label for e in both] == ["coulomb_friction@1", "stribeck_friction@1"]
+    assert [e.label for e in absorbed_effects(own, quantities, axis=2)] == ["stribeck_friction@2"]
+    assert [e.label for e in absorbed_effects(own, ["links"], axis=None)] == ["payload"]
+    assert absorbed_effects(own, [], axis=None) == []
+    assert "stribeck_friction@1" in absorbed_note(out)[0] and absorbed_note([]) == []
