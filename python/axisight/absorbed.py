@@ -20,6 +20,7 @@ ABSORBED: Mapping[str, tuple[str, ...]] = {
     "torque_offset": ("torque_offset",),
     "stiffness": ("joint_stiffness", "nonlinear_stiffness"),
     "damping": ("joint_damping",),
+    "backlash": ("backlash",),
     "torque": ("torque_constant",),
 }
 """What was identified: effects whose torque, in the data, is in it, wholly or in part.

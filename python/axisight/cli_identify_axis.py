@@ -15,16 +15,17 @@ from axisight.cli_identify_common import (
     Columns,
     Force,
     Out,
+    Unchecked,
     band,
     load_source,
     options,
     provenance,
+    read_logs,
     refuse_in_the_way,
     say,
     write_robot,
 )
 from axisight.errors import InputError
-from axisight.logs import read_log
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ def axis_command(
     open_loop: Annotated[
         bool, typer.Option("--open-loop", help="No controller was at work.")
     ] = False,
+    unchecked: Unchecked = False,
     force: Force = False,
 ) -> None:
     """One axis in three steps: rigid body and friction, flexibility, prediction-error fit.
@@ -105,9 +107,8 @@ def axis_command(
         if out is not None and machine is None:
             raise InputError("--out: expected the robot to write values into, in --robot")
         ratio = _ratio(machine, gear_ratio, axis)
-        n_axes = None if machine is None else machine.n_axes
         files = [slow, *broadband]
-        logs = [read_log(path, columns, n_axes=n_axes) for path in files]
+        logs = read_logs(files, columns, machine, unchecked=unchecked)
         found = axisight.graybox.identify_axis(
             logs[0],
             logs[1:],
@@ -133,6 +134,15 @@ def axis_command(
             plateau_from_hz=plateau_from_hz,
         )
         say(found.report())
+        if machine is not None:
+            against = axisight.graybox.compare_with_robot(found.fit, machine, axis)
+            for text in against.findings:
+                say(f"- {text}")
+            if out is not None and against.one_factor and not unchecked:
+                raise InputError(
+                    f"--out: nothing was written, for {against.findings[0]} (or write with "
+                    "--unchecked)"
+                )
         if out is not None and machine is not None:
             source = provenance("axis", files, options(ctx), columns)
             values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
@@ -144,6 +154,11 @@ def axis_command(
 
 def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
     if given is not None:
+        if not 0 < given <= 1:
+            raise InputError(
+                f"--gear-ratio: expected joint angle per motor angle, 1/224 for a gear of 224:1, "
+                f"got {given}"
+            )
         return given
     if machine is None:
         raise InputError("--gear-ratio: expected a number, or --robot that has it, got neither")

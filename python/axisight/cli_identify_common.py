@@ -11,6 +11,7 @@ import typer
 
 from axisight.cli_common import OUT, numbers
 from axisight.errors import InputError
+from axisight.logs import Log, check_log, read_log
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import (
     Identified,
@@ -31,6 +32,10 @@ Out = Annotated[
         "and settings.",
     ),
 ]
+Unchecked = Annotated[
+    bool,
+    typer.Option("--unchecked", help="Take logs in which `axisight check` finds errors."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
 
 
@@ -41,6 +46,39 @@ def load_source(robot: str) -> Robot:
         assert found is not None  # what is loaded has one
         return found
     return load_robot(robot)
+
+
+def read_logs(
+    paths: Sequence[Path], columns: Path | None, robot: Robot | None, *, unchecked: bool
+) -> list[Log]:
+    """Return logs that pass what ``axisight check`` looks at; warnings are printed.
+
+    Identification fits data in wrong units as well as any. Raises InputError for an error that the
+    check finds, unless ``unchecked``, and for an axis that turns where that of the robot slides.
+    """
+    logs = []
+    for path in paths:
+        for finding in check_log(path, columns).findings:
+            text = f"{path.name}: {finding.column}: {finding.message}"
+            if finding.severity == "error" and not unchecked:
+                raise InputError(
+                    f"{text} (put it right in a column map, or go on with --unchecked)"
+                )
+            if finding.severity != "ok":
+                say(f"{finding.severity}: {text}")
+        log = read_log(path, columns, n_axes=None if robot is None else robot.n_axes)
+        slides = [kind == "prismatic" for kind in log.axis_kinds]
+        if robot is not None and slides != list(robot.core.axis_is_prismatic):
+            raise InputError(
+                f"{path.name}: expected axes that {_kinds(robot.core.axis_is_prismatic)} as the "
+                f"robot's, got axes that {_kinds(slides)} by their units"
+            )
+        logs.append(log)
+    return logs
+
+
+def _kinds(slides: Sequence[bool]) -> str:
+    return ", ".join("slide" if one else "turn" for one in slides)
 
 
 def refuse_in_the_way(out: Path | None, force: bool) -> None:

@@ -16,17 +16,18 @@ from axisight.cli_identify_common import (
     Columns,
     Force,
     Out,
+    Unchecked,
     load_source,
     options,
     pairs,
     provenance,
+    read_logs,
     refuse_in_the_way,
     say,
     write_robot,
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
-from axisight.logs import read_log
 
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification
@@ -109,6 +110,7 @@ def rigid_body_command(
         float,
         typer.Option(help="How near, with --consistent: share of each link's own size."),
     ] = 1.0,
+    unchecked: Unchecked = False,
     force: Force = False,
 ) -> None:
     """Masses, inertias and friction from logs of motor angles and torques, by regression.
@@ -121,7 +123,7 @@ def rigid_body_command(
         refuse_in_the_way(out, force)
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
-        read = [read_log(path, columns, n_axes=machine.n_axes) for path in paths]
+        read = read_logs(paths, columns, machine, unchecked=unchecked)
         held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
             # They are among the notes that are printed.

@@ -145,15 +145,19 @@ def test_rotors_of_the_file_are_not_in_the_links_too(rigid, tmp_path: Path) -> N
         assert error.max() < 0.01
 
 
-def test_the_column_map_is_among_the_hashes(rigid, tmp_path: Path) -> None:
-    out, columns = tmp_path / "out.toml", tmp_path / "columns.toml"
+def column_map(position: str, torque: str) -> str:
     axes = [
-        f'[[axis]]\nposition = {{ name = "position_{i}", unit = "rad" }}\n'
-        f'torque = {{ name = "torque_cmd_{i}", unit = "Nm" }}\n'
+        f'[[axis]]\nposition = {{ name = "position_{i}", unit = "{position}" }}\n'
+        f'torque = {{ name = "torque_cmd_{i}", unit = "{torque}" }}\n'
         for i in (1, 2, 3)
     ]
     head = 'schema = "axisight.columns/1"\n[time]\nname = "time_s"\nunit = "s"\n'
-    columns.write_text(head + "".join(axes))
+    return head + "".join(axes)
+
+
+def test_the_column_map_is_among_the_hashes(rigid, tmp_path: Path) -> None:
+    out, columns = tmp_path / "out.toml", tmp_path / "columns.toml"
+    columns.write_text(column_map("rad", "Nm"))
     first = rigid / "run1.parquet"
     run("rigid-body", rigid / "robot.toml", first, "--consistent", "--columns", columns, "-o", out)
     found = load_identified(out).provenance
@@ -255,6 +259,35 @@ def test_axis_reports_and_writes(axis_logs, tmp_path: Path) -> None:
     assert back.provenance.settings["slow"] == axis_logs[0].name
 
 
+def scaled(path: Path, target: Path, column: str, factor: float) -> Path:
+    table = pd.read_parquet(path)
+    table[column] *= factor
+    table.to_parquet(target)
+    return target
+
+
+def test_wrong_units_are_not_written(axis_logs, tmp_path: Path) -> None:
+    """Degrees beside a reference in rad/s are seen by the check; torque in mNm by the robot."""
+    out = tmp_path / "axis.toml"
+    common = ("--robot", "two_mass_axis", *LINES, "-o", out)
+    degrees = [scaled(p, tmp_path / f"deg_{p.name}", "position_1", 57.3) for p in axis_logs]
+    text = run("axis", *degrees, *common, code=2)
+    assert "position in deg?" in text and "--unchecked" in text
+    torques = [scaled(p, tmp_path / f"mnm_{p.name}", "torque_cmd_1", 1000.0) for p in axis_logs]
+    text = run("axis", *torques, *common, code=2)
+    assert "1e+03 times those of the robot file" in text
+    assert not out.exists()
+    assert "written" in run("axis", *torques, *common, "--unchecked")
+
+
+def test_a_slide_is_no_turn(rigid, tmp_path: Path) -> None:
+    columns = tmp_path / "columns.toml"
+    columns.write_text(column_map("m", "N"))
+    arguments = (rigid / "robot.toml", rigid / "run1.parquet", "--columns", columns)
+    text = run("rigid-body", *arguments, code=2)
+    assert "expected axes that turn, turn, turn as the robot's" in text
+
+
 def test_axis_options_reach_the_fit(axis_logs) -> None:
     text = run(
         "axis", *axis_logs, "--gear-ratio", 1 / 224.3, *LINES, "--offset", "--fixed", "F_v",
@@ -268,7 +301,8 @@ def test_axis_options_reach_the_fit(axis_logs) -> None:
     ("arguments", "words"),
     [
         ([], ["--gear-ratio", "--robot"]),
-        (["--gear-ratio", "-2"], ["gear_ratio", "positive"]),
+        (["--gear-ratio", "-2"], ["--gear-ratio", "joint angle per motor angle"]),
+        (["--gear-ratio", "224.3"], ["--gear-ratio", "1/224", "got 224.3"]),
         (["--gear-ratio", "0.004", "-o", "x.toml"], ["--out", "--robot"]),
         (["--robot", "two_mass_axis", "--axis", "2"], ["--axis", "1 to 1", "2"]),
         (["--robot", "irb6600_like"], ["axis0.parquet", "3 axes"]),

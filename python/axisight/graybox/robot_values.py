@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.absorbed import absorbed_effects, absorbed_note
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
@@ -31,20 +32,16 @@ EXACT_SIGN_SMOOTHING_RAD_S = 0.01
 """What effects take for a sign that the fit followed exactly, as the preset of the thesis does."""
 MOST_RIPPLES = 3
 """Harmonics that the effect torque_ripple holds."""
-# Friction and gear springs: a fitted axis has its own; on top of it these would count twice.
-REPLACED = (
-    "viscous_friction",
-    "quadratic_drag",
-    "load_dependent_friction",
-    "coulomb_friction",
-    "asymmetric_friction",
-    "stribeck_friction",
-    "presliding_friction",
-    "joint_stiffness",
-    "nonlinear_stiffness",
-    "joint_damping",
-    "backlash",
+# What a fitted axis stands for, of the table of absorbed effects.
+STANDS_FOR = (
     "motor_inertia",
+    "viscous_friction",
+    "dry_friction",
+    "torque_offset",
+    "stiffness",
+    "damping",
+    "backlash",
+    "torque",
 )
 
 
@@ -83,8 +80,8 @@ def identified_axis(
         the robot's, k1, d, J_a by (r_fit / r_robot)^2, k3 by the fourth power, b by the inverse:
         the motor moves alike.
     robot
-        Where they will be written. Effects of friction and gear spring of the axis (`REPLACED`)
-        that it has already and the fit has not are set to neutral: the fit stands in their place.
+        Where they will be written. Effects of friction and gear of the axis that it has already
+        and the fit has not are set to neutral: the fit stands in their place.
     provenance
         Where they come from.
     axis
@@ -110,13 +107,11 @@ def identified_axis(
     effects, owner = _effects(fit, values, axis, width)
     names, held = _places(fit, robot, joint, values, slopes, owner)
     unplaced = _unplaced(fit, values, slopes, spread, {*QUANTITIES, *owner})
-    replaced = _replaced(robot, axis, effects)
+    replaced = absorbed_effects(robot.effects, STANDS_FOR, axis=axis, found=effects)
     notes = [kind, *_notes(fit, robot, joint, ratio, unplaced)]
     if held:
         notes.append(f"held in the fit: {', '.join(held)}")
-    if replaced:
-        what = ", ".join(effect.label for effect in replaced)
-        notes.append(f"set to neutral, the fit stands in their place: {what}")
+    notes += absorbed_note(replaced)
     if not fit.model.friction_smoothing_rad_s and any("F_" in n for n in owner):
         notes.append(f"the exact sign of the fit's friction is smoothed over {width:g} rad/s")
     return values_of(
@@ -167,16 +162,6 @@ def _places(
             held.append(name)
         names[name] = place
     return names, held
-
-
-def _replaced(robot: Robot, axis: int, effects: list[Effect]) -> list[Effect]:
-    """Effects of the robot that the fit stands in for, at their neutral values."""
-    labels = [effect.label for effect in effects]
-    return [
-        Effect(e.name, axis, {})
-        for e in robot.effects
-        if e.axis == axis and e.name in REPLACED and e.label not in labels
-    ]
 
 
 def _same_ratio(own: float, ratio: float) -> bool:
