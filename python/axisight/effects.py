@@ -100,6 +100,16 @@ class Effect:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
         return self.name if self.axis is None else f"{self.name}@{self.axis}"
 
+    @property
+    def acts(self) -> bool:
+        """Whether any amplitude is off its neutral value: otherwise the effect changes nothing."""
+        given = self.parameters or {}
+        return any(
+            given.get(p.name, p.neutral) != p.neutral
+            for p in effect_info(self.name).parameters
+            if p.role == "amplitude"
+        )
+
     def values(self) -> list[float]:
         """Return the parameter values in the order of the table."""
         given = self.parameters or {}
