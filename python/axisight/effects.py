@@ -116,6 +116,12 @@ class Effect:
         return [given.get(p.name, p.neutral) for p in effect_info(self.name).parameters]
 
 
+def without(effects: Iterable[Effect], replaced_by: Iterable[Effect]) -> list[Effect]:
+    """Return those effects that have none of the same name and axis in ``replaced_by``."""
+    labels = {effect.label for effect in replaced_by}
+    return [effect for effect in effects if effect.label not in labels]
+
+
 def core_effects(effects: Iterable[Effect]) -> list[EffectTuple]:
     """Return effects as the compiled core takes them."""
     return [(e.name, e.axis, e.values()) for e in effects]

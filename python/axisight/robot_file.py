@@ -27,7 +27,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
 from axisight import _core
-from axisight.effects import Effect
+from axisight.effects import Effect, without
 from axisight.errors import InputError, RobotError
 from axisight.fitting import Fitted
 from axisight.presets import PRESETS
@@ -242,8 +242,7 @@ def write_identified(
         axisight_version=found.provenance.axisight_version or version("axisight"),
     )
     # What the simulator models already has no place in the robot file either.
-    labels = {effect.label for effect in found.effects}
-    kept = [effect for effect in robot.effects if effect.label not in labels]
+    kept = without(robot.effects, found.effects)
     found = replace(found, provenance=stamped, effects=(*found.effects, *kept))
     text = render(robot, found, sidecar.name)
     report = Sidecar.of(found, robot, text, path.name)
@@ -536,8 +535,7 @@ def load_with_effects(
         unused = ", ".join(Effect(e.name, e.axis, e.parameters).label for e in report.effects)
         text = f"{Path(source).name} was changed after {sidecar} was written: its effects are not"
         return robot, f"{text} used ({unused})" if unused else ""
-    labels = {effect.label for effect in given}
-    effects = [effect for effect in _effects(report, robot) if effect.label not in labels]
+    effects = without(_effects(report, robot), given)
     named = ", ".join(effect.label for effect in effects if effect.acts)
     line = f"with the effects in {sidecar}: {named}" if named else ""
     return Robot(robot.core, effects), line

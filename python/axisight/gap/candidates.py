@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,30 @@ def all_candidates(
             candidate = _axis_candidate(robot, logs, at, info.name, axis)
             if candidate is not None:
                 out.append(candidate)
-    return out
+    own = {effect.label: effect for effect in robot.effects if effect.acts}
+    return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
+    """Return the candidate that begins where the simulator has the same effect already."""
+    values = dict(
+        zip((p.name for p in effect_info(own.name).parameters), own.values(), strict=True)
+    )
+    bounds = {
+        name: (min(low, values[name]), max(high, values[name]))
+        for name, (low, high) in candidate.bounds.items()
+    }
+    free = candidate.free
+    if own.name in _HARMONIC:
+        found = [v for k, v in (candidate.effect.parameters or {}).items() if k.startswith("order")]
+        mine = [v for k, v in values.items() if k.startswith("order")]
+        new = iter(order for order in found if order and order not in mine)
+        unit = "nm" if own.name == "torque_ripple" else "rad"
+        for k in range(1, _N_ORDERS + 1):
+            values[f"order_{k}"] = values[f"order_{k}"] or next(new, 0.0)
+        used = [k for k in range(1, _N_ORDERS + 1) if values[f"order_{k}"]]
+        free = tuple(f"{part}_{k}_{unit}" for k in used for part in ("cosine", "sine"))
+    return replace(candidate, effect=Effect(own.name, own.axis, values), bounds=bounds, free=free)
 
 
 def _has_gravity(robot: Robot) -> bool:
