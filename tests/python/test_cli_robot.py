@@ -1,6 +1,7 @@
 """Effects that identification put beside a robot file: which commands use them, and what they say."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ file = "log.parquet"
 role = "estimation"
 
 [[log]]
-file = "log.parquet"
+file = "log2.parquet"
 role = "validation"
 """
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
@@ -186,6 +187,7 @@ def test_diagnose_does_without_when_told(axis: Path, log: Path, monkeypatch) -> 
     # A case brings its own robot, which may have a sidecar too.
     case = axis.parent / "case.toml"
     case.write_text(CASE)
+    shutil.copy(log, log.with_name("log2.parquet"))
     assert "with the effects in" in run("diagnose", axis.parent, code=2)
     assert seen == [(COULOMB, SPRING, NEUTRAL), (), (COULOMB, SPRING, NEUTRAL)]
 
