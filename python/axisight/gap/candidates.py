@@ -106,14 +106,16 @@ def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
     }
     free = candidate.free
     if own.name in _HARMONIC:
-        found = [v for k, v in (candidate.effect.parameters or {}).items() if k.startswith("order")]
-        mine = [v for k, v in values.items() if k.startswith("order")]
-        new = iter(order for order in found if order and order not in mine)
         unit = "nm" if own.name == "torque_ripple" else "rad"
-        for k in range(1, _N_ORDERS + 1):
-            values[f"order_{k}"] = values[f"order_{k}"] or next(new, 0.0)
-        used = [k for k in range(1, _N_ORDERS + 1) if values[f"order_{k}"]]
-        free = tuple(f"{part}_{k}_{unit}" for k in used for part in ("cosine", "sine"))
+        parts = {k: (f"cosine_{k}_{unit}", f"sine_{k}_{unit}") for k in range(1, _N_ORDERS + 1)}
+        # A place without amplitude is empty, whatever its order.
+        mine = {k: values[f"order_{k}"] for k in parts if any(values[p] for p in parts[k])}
+        given = candidate.effect.parameters or {}
+        found = [given[f"order_{k}"] for k in parts]
+        new = iter(order for order in found if order and order not in mine.values())
+        for k in parts:
+            values[f"order_{k}"] = mine.get(k) or next(new, 0.0)
+        free = tuple(p for k in parts if values[f"order_{k}"] for p in parts[k])
     return replace(candidate, effect=Effect(own.name, own.axis, values), bounds=bounds, free=free)
 
 
