@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from axisight.cli_excite import excite_command
 from axisight.cli_identify import identify_app
 from axisight.cli_montecarlo import montecarlo_command
 from axisight.cli_reproduce import reproduce_command
+from axisight.cli_robot import IdentifiedEffects, load_simulator
 from axisight.cli_simulate import simulate_command
 from axisight.demo import write_demo_case
 from axisight.effects import effect_table
@@ -95,6 +97,7 @@ def diagnose_command(
         typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
     ] = None,
     columns: Columns = None,
+    identified_effects: IdentifiedEffects = True,
     json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
     tolerance: Annotated[
@@ -106,7 +109,8 @@ def diagnose_command(
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     with _errors():
         settings = replace(_tolerances(tolerance or []), seed=seed)
-        inputs = read_inputs(case_or_logs, model, validation or [], columns)
+        load = partial(load_simulator, identified=identified_effects)
+        inputs = read_inputs(case_or_logs, model, validation or [], columns, load)
         with _progress() as progress:
             found = diagnose(
                 name=inputs.name,

@@ -8,9 +8,11 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli_common import OUT, errors, numbers
+from axisight.cli_robot import IdentifiedEffects, load_simulator
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.plots import plot_references, plot_signal
+from axisight.robot import load_robot
 
 
 def excite_command(
@@ -60,6 +62,7 @@ def excite_command(
             help="Also draw the signal here, and the references in NAME-references (.png, .pdf)."
         ),
     ] = None,
+    identified_effects: IdentifiedEffects = True,
     force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
@@ -83,7 +86,12 @@ def excite_command(
         _replace(data, "limits", **limits)
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
         data |= {name: value for name, value in top.items() if value is not None}
-        made = excite(read_design(data, "options" if design is None else str(design)))
+        checked = read_design(data, "options" if design is None else str(design))
+        machine = load_robot(checked.robot)
+        # Without limits or a controller nothing is simulated.
+        if checked.limits is not None and machine.core.controller_kind != "none":
+            machine = load_simulator(checked.robot, identified=identified_effects)
+        made = excite(checked, machine)
         _show(made)
         if made.report is not None and not made.report.ok and not force:
             OUT.print("nothing was written; --force writes in spite of limits")

@@ -12,12 +12,12 @@ import typer
 from axisight.cli_common import OUT, numbers
 from axisight.errors import InputError
 from axisight.logs import Log, check_log, read_log
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 from axisight.robot_file import (
     Identified,
     Provenance,
     hash_file,
-    load_identified,
+    load_with_effects,
     sidecar_path,
     write_identified,
 )
@@ -41,11 +41,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace files that exist."
 
 def load_source(robot: str) -> Robot:
     """Return a preset or the robot of a file, with the effects that an earlier command found."""
-    if Path(robot).is_file() and sidecar_path(robot).is_file():
-        found = load_identified(robot).robot
-        assert found is not None  # what is loaded has one
-        return found
-    return load_robot(robot)
+    return load_with_effects(robot, check=True)[0]
 
 
 def read_logs(

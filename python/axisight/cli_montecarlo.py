@@ -15,7 +15,10 @@ from rich.table import Table
 
 from axisight import montecarlo
 from axisight.cli_common import ERR, OUT, errors
+from axisight.cli_robot import IdentifiedEffects, load_simulator
+from axisight.effects import Effect
 from axisight.montecarlo.progress import Progress, Report
+from axisight.robot import load_robot
 
 
 def montecarlo_command(
@@ -34,12 +37,14 @@ def montecarlo_command(
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads here. Default: all processors.")
     ] = None,
+    identified_effects: IdentifiedEffects = True,
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
+        design = _with_effects(montecarlo.read_study(study), identified=identified_effects)
         with _bar() as progress:
             result = montecarlo.run(
-                study,
+                design,
                 runs=runs,
                 seed=seed,
                 out=out,
@@ -60,6 +65,19 @@ def montecarlo_command(
         OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
         if counted == 0:
             raise typer.Exit(1)
+
+
+def _with_effects(study: montecarlo.Study, *, identified: bool) -> montecarlo.Study:
+    """Return the study with the effects in the sidecar of its robot among its own."""
+    given = [Effect(e.name, e.axis, e.parameters) for e in study.effect]
+    robot = load_simulator(study.robot, given, identified=identified)
+    own = {effect.label for effect in load_robot(study.robot).effects}
+    added = [
+        montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=dict(e.parameters or {}))
+        for e in robot.effects
+        if e.label not in own
+    ]
+    return study.model_copy(update={"effect": [*study.effect, *added]})
 
 
 @contextmanager

@@ -12,10 +12,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.cli_common import OUT, errors, numbers
+from axisight.cli_robot import IdentifiedEffects, load_simulator
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.logs import Log, read_log
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 from axisight.simulation import Method, Model, simulate
 from axisight.storage import write_bytes
 
@@ -40,9 +41,11 @@ def simulate_command(
         typer.Option(
             metavar="NAME@AXIS:PARAM=VALUE,...",
             help="Further effect (repeatable), e.g. coulomb_friction@2:coulomb_nm=0.5; the whole "
-            "arm without @AXIS, neutral values for parameters left out.",
+            "arm without @AXIS, neutral values for parameters left out. It takes the place of an "
+            "identified one of that name and axis.",
         ),
     ] = None,
+    identified_effects: IdentifiedEffects = True,
     start: Annotated[
         str | None,
         typer.Option(
@@ -71,12 +74,13 @@ def simulate_command(
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
-        machine = load_robot(robot)
+        added = [parse_effect(text) for text in effect or []]
+        machine = load_simulator(robot, added, identified=identified_effects)
         inputs = _inputs(read_log(log, columns, n_axes=machine.n_axes), machine, torque=torque)
         result = simulate(
             machine,
             **inputs,
-            effects=[parse_effect(text) for text in effect or []],
+            effects=added,
             start_rad=None if start is None else numbers("--start", start),
             model=cast(Model, model),
             method=cast(Method, method),

@@ -100,10 +100,26 @@ class Effect:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
         return self.name if self.axis is None else f"{self.name}@{self.axis}"
 
+    @property
+    def acts(self) -> bool:
+        """Whether any amplitude is off its neutral value: otherwise the effect changes nothing."""
+        given = self.parameters or {}
+        return any(
+            given.get(p.name, p.neutral) != p.neutral
+            for p in effect_info(self.name).parameters
+            if p.role == "amplitude"
+        )
+
     def values(self) -> list[float]:
         """Return the parameter values in the order of the table."""
         given = self.parameters or {}
         return [given.get(p.name, p.neutral) for p in effect_info(self.name).parameters]
+
+
+def without(effects: Iterable[Effect], replaced_by: Iterable[Effect]) -> list[Effect]:
+    """Return those effects that have none of the same name and axis in ``replaced_by``."""
+    labels = {effect.label for effect in replaced_by}
+    return [effect for effect in effects if effect.label not in labels]
 
 
 def core_effects(effects: Iterable[Effect]) -> list[EffectTuple]:

@@ -14,7 +14,7 @@ import hashlib
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -27,9 +27,10 @@ from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
 from axisight import _core
-from axisight.effects import Effect
+from axisight.effects import Effect, without
 from axisight.errors import InputError, RobotError
 from axisight.fitting import Fitted
+from axisight.presets import PRESETS
 from axisight.robot import Robot, load_robot
 from axisight.robot_file_checks import check_agreement, check_effects, checked_covariance
 from axisight.robot_sidecar import Sidecar, first_fault, text_hash
@@ -43,6 +44,7 @@ __all__ = [
     "identified",
     "identified_by_fit",
     "load_identified",
+    "load_with_effects",
     "sidecar_path",
     "write_identified",
 ]
@@ -240,8 +242,7 @@ def write_identified(
         axisight_version=found.provenance.axisight_version or version("axisight"),
     )
     # What the simulator models already has no place in the robot file either.
-    labels = {effect.label for effect in found.effects}
-    kept = [effect for effect in robot.effects if effect.label not in labels]
+    kept = without(robot.effects, found.effects)
     found = replace(found, provenance=stamped, effects=(*found.effects, *kept))
     text = render(robot, found, sidecar.name)
     report = Sidecar.of(found, robot, text, path.name)
@@ -474,25 +475,14 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     """
     given = Path(path)
     sidecar = given if given.name.endswith(".identified.json") else sidecar_path(given)
-    try:
-        text = sidecar.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"path: expected the sidecar {sidecar}: {error}") from error
-    try:
-        report = Sidecar.model_validate_json(text)
-    except ValidationError as error:
-        raise InputError(f"{sidecar}: {first_fault(error)}") from None
+    report = _read_sidecar(sidecar)
     if Path(report.robot).name != report.robot:
         raise InputError(f"{sidecar}: robot: expected a file beside it, got {report.robot!r}")
     robot = load_robot(sidecar.with_name(report.robot))
     if check and text_hash(robot.core.toml) != report.robot_sha256:
-        raise InputError(
-            f"{sidecar}: the robot {report.robot} was changed after it was written: identify again, "
-            "or pass check=False to take both as they are"
-        )
+        raise InputError(_changed(sidecar, report.robot))
     source = report.provenance
-    effects = tuple(Effect(e.name, e.axis, e.parameters) for e in report.effects)
-    check_effects(effects, robot.n_axes)
+    effects = _effects(report, robot)
     names = tuple(p.name for p in report.parameters)
     values = np.array([p.value for p in report.parameters])
     errors = [np.nan if p.standard_error is None else p.standard_error for p in report.parameters]
@@ -514,6 +504,66 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
             source.notes,
         ),
     )
+
+
+def load_with_effects(
+    source: Path | str, given: Iterable[Effect] = (), *, check: bool = False
+) -> tuple[Robot, str]:
+    """Return a robot with the effects that its sidecar knows of, and one line about them.
+
+    source
+        A robot file or the name of a preset, as for `load_robot`.
+    given
+        Effects that the caller adds himself: those of the sidecar on the same axis with the
+        same name are left out.
+    check
+        Raise InputError for a robot file that was edited since its sidecar was written.
+
+    The line names the effects and the sidecar. It is empty where a sidecar has nothing to add: for
+    presets, for files without one, and where no effect in it does anything. Effects of a sidecar
+    that was written with another text of the robot are not used, and the line says so. Raises
+    InputError for a sidecar of another schema, RobotError for the robot and impossible effects.
+    """
+    robot = load_robot(source)
+    sidecar = sidecar_path(source)
+    if (isinstance(source, str) and source in PRESETS) or not sidecar.is_file():
+        return robot, ""
+    report = _read_sidecar(sidecar)
+    if text_hash(robot.core.toml) != report.robot_sha256:
+        if check:
+            raise InputError(_changed(sidecar, Path(source).name))
+        unused = ", ".join(Effect(e.name, e.axis, e.parameters).label for e in report.effects)
+        text = f"{Path(source).name} was changed after {sidecar} was written: its effects are not"
+        return robot, f"{text} used ({unused})" if unused else ""
+    effects = without(_effects(report, robot), given)
+    named = ", ".join(effect.label for effect in effects if effect.acts)
+    line = f"with the effects in {sidecar}: {named}" if named else ""
+    return Robot(robot.core, effects), line
+
+
+def _read_sidecar(sidecar: Path) -> Sidecar:
+    try:
+        text = sidecar.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"path: expected the sidecar {sidecar}: {error}") from error
+    try:
+        return Sidecar.model_validate_json(text)
+    except ValidationError as error:
+        raise InputError(f"{sidecar}: {first_fault(error)}") from None
+
+
+def _changed(sidecar: Path, robot: str) -> str:
+    return (
+        f"{sidecar}: the robot {robot} was changed after it was written: identify again, "
+        "or pass check=False to take both as they are"
+    )
+
+
+def _effects(report: Sidecar, robot: Robot) -> tuple[Effect, ...]:
+    """Return the effects in a sidecar, checked for its robot."""
+    effects = tuple(Effect(e.name, e.axis, e.parameters) for e in report.effects)
+    check_effects(effects, robot.n_axes)
+    return effects
 
 
 def _created(text: str, sidecar: Path) -> datetime:

@@ -143,10 +143,13 @@ def load_design(path: Path | str) -> dict[str, Any]:
     return data
 
 
-def excite(design: ExcitationDesign) -> Excited:
-    """Carry a design out; raises InputError naming the field."""
+def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
+    """Carry a design out; raises InputError naming the field.
+
+    ``robot`` stands for the one that the design names, with effects of its own for example.
+    """
     instance("design", design, ExcitationDesign)
-    robot = load_robot(design.robot)
+    robot = load_robot(design.robot) if robot is None else instance("robot", robot, Robot)
     signal, search = _signal(design.signal, robot.sample_time_s)
     wave = design.square
     made = references(

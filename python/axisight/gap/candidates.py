@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,32 @@ def all_candidates(
             candidate = _axis_candidate(robot, logs, at, info.name, axis)
             if candidate is not None:
                 out.append(candidate)
-    return out
+    own = {effect.label: effect for effect in robot.effects if effect.acts}
+    return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
+    """Return the candidate that begins where the simulator has the same effect already."""
+    values = dict(
+        zip((p.name for p in effect_info(own.name).parameters), own.values(), strict=True)
+    )
+    bounds = {
+        name: (min(low, values[name]), max(high, values[name]))
+        for name, (low, high) in candidate.bounds.items()
+    }
+    free = candidate.free
+    if own.name in _HARMONIC:
+        unit = "nm" if own.name == "torque_ripple" else "rad"
+        parts = {k: (f"cosine_{k}_{unit}", f"sine_{k}_{unit}") for k in range(1, _N_ORDERS + 1)}
+        # A place without amplitude is empty, whatever its order.
+        mine = {k: values[f"order_{k}"] for k in parts if any(values[p] for p in parts[k])}
+        given = candidate.effect.parameters or {}
+        found = [given[f"order_{k}"] for k in parts]
+        new = iter(order for order in found if order and order not in mine.values())
+        for k in parts:
+            values[f"order_{k}"] = mine.get(k) or next(new, 0.0)
+        free = tuple(p for k in parts if values[f"order_{k}"] for p in parts[k])
+    return replace(candidate, effect=Effect(own.name, own.axis, values), bounds=bounds, free=free)
 
 
 def _has_gravity(robot: Robot) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,22 +26,23 @@ def read_inputs(
     model: str | None,
     validation: Sequence[Path],
     columns: Path | None,
+    load: Callable[[Path | str], Robot] = load_robot,
 ) -> Inputs:
-    """Read a case folder, or logs with a model.
+    """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     Without ``validation`` the last of several logs is held out. Raises
     InputError when nothing is left to hold out or the model is missing.
     """
     if len(paths) == 1 and paths[0].is_dir():
         case = read_case(paths[0], columns)
-        robot = load_robot(model if model is not None else case.robot_path)
+        robot = load(model if model is not None else case.robot_path)
         extra = tuple(read_log(p, columns, n_axes=robot.n_axes) for p in validation)
         return Inputs(case.name, robot, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         raise InputError(
             "--model: expected a robot.toml or a preset when logs are given, got nothing"
         )
-    robot = load_robot(model)
+    robot = load(model)
     logs = [read_log(p, columns, n_axes=robot.n_axes) for p in paths]
     held = [read_log(p, columns, n_axes=robot.n_axes) for p in validation]
     if not held:

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects
+from axisight.effects import Effect, core_effects, without
 from axisight.fitting import FitOptions, Parameter, Weighting, core_spec
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
@@ -76,7 +76,7 @@ def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     changed = robot.core.with_parameters(list(variant.robot_values.items()))
     result = _core.fit_inverse_dynamics(
         changed,
-        core_effects([*robot.effects, *variant.effects]),
+        core_effects([*without(robot.effects, variant.effects), *variant.effects]),
         [],
         [at],
         Weighting.flat(robot.n_axes).core(),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects
+from axisight.effects import Effect, core_effects, without
 from axisight.fitting import (
     FitOptions,
     Parameter,
@@ -110,11 +110,12 @@ class ModelFitter(ABC):
         if name is None:
             return False
         tolerance = self.tolerances.get(name.rsplit(".", 1)[1], 0.0)
-        values = effect.parameters or {}
-        if "relative_change" in values:
-            return abs(values["relative_change"]) < 3 * tolerance
-        nominal = robot_parameters(self.robot)[name]
-        return abs(values["viscous_nm_s_rad"]) < 3 * tolerance * nominal
+        change = effect.values()[0]
+        for own in self.robot.effects:
+            if own.label == effect.label:
+                change -= own.values()[0]
+        nominal = 1.0 if effect.name in _RELATIVE else robot_parameters(self.robot)[name]
+        return abs(change) < 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
         """Whether a robot parameter matters to this error."""
@@ -141,6 +142,7 @@ class ModelFitter(ABC):
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
+        An effect that the robot has itself is replaced by the free one of its label.
         The simulator's parameters begin at ``robot_values``, else where
         ``start`` ended, else at their nominal values; ``lazy`` takes their
         sensitivities from ``start`` instead of computing them.
@@ -148,8 +150,11 @@ class ModelFitter(ABC):
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
-        effects = [*self.robot.effects, *(f.effect for f in free)]
-        first = len(self.robot.effects)
+        tried = [f.effect for f in free]
+        # One that the simulator has itself is tried with other values, not a second time.
+        own_effects = without(self.robot.effects, tried)
+        effects = [*own_effects, *tried]
+        first = len(own_effects)
         same = {_same_quantity(self.robot, f.effect) for f in free}
         own = [
             replace(p, frozen=True)
@@ -198,6 +203,9 @@ _SAME = {
     "motor_inertia": "motor_inertia",
     "viscous_friction": "viscous_friction",
 }
+
+
+_RELATIVE = ("joint_stiffness", "joint_damping", "motor_inertia")
 
 
 def _same_quantity(robot: Robot, effect: Effect) -> str | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
+from axisight.effects import Effect, without
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Variant:
-    """A simulator: the robot's parameters, some replaced, and the effects added."""
+    """A simulator: the robot's parameters, some replaced, and effects added to or replacing its own."""
 
     robot_values: Mapping[str, float]
     effects: tuple[Effect, ...] = ()
@@ -35,7 +35,8 @@ def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
     """
     if log.velocity_ref_rad_s is None:
         raise InputError(f"log {log.name!r}: expected velocity references")
-    changed = Robot(robot.core.with_parameters(list(variant.robot_values.items())), robot.effects)
+    core = robot.core.with_parameters(list(variant.robot_values.items()))
+    changed = Robot(core, without(robot.effects, variant.effects))
     out = simulate(changed, log.velocity_ref_rad_s, effects=variant.effects, method="rk4")
     torque = np.full(log.torque_nm.shape, np.nan)
     values = out["torque_cmd_nm"].values

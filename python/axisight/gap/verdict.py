@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from axisight.effects import effect_info
+from axisight.effects import Effect, effect_info
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, inseparable
 from axisight.gap.model import Evidence
@@ -38,8 +38,14 @@ class Conclusion:
     ranking: tuple[Candidate, ...]
     checks: tuple[str, ...]
 
-    def headline(self, gap: Gap, causes: Sequence[Cause], where: Sequence[Where]) -> str:
-        """Return the finding in one or two plain sentences."""
+    def headline(
+        self,
+        gap: Gap,
+        causes: Sequence[Cause],
+        where: Sequence[Where],
+        own: Sequence[Effect] = (),
+    ) -> str:
+        """Return the finding in one or two plain sentences; ``own``: effects of the simulator."""
         if self.verdict == "none":
             return (
                 f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
@@ -51,7 +57,12 @@ class Conclusion:
                 f"The simulator misses something that no known effect explains well: "
                 f"{_percent(gap.before)} of the torque is unexplained, {_percent(gap.floor)} would be noise.{place}"
             )
-        named = " and ".join(_spoken(c.effect, c.axis) for c in causes)
+        present = {(e.name, e.axis) for e in own if e.acts}
+        named = " and ".join(
+            ("the machine's values of " if (c.effect, c.axis) in present else "")
+            + _spoken(c.effect, c.axis)
+            for c in causes
+        )
         shrinks = (
             f"adding it shrinks the gap on held-out data from {_percent(gap.before)} to {_percent(gap.after)} "
             f"of the torque (noise alone: {_percent(gap.floor)})."

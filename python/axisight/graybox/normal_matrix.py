@@ -22,8 +22,10 @@ def pseudo_inverse(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
     """Return the pseudo-inverse, the condition number, and which parameters data do not show.
 
     Directions count as not shown by the matrix scaled to unit diagonal; the condition is then
-    infinite.
+    infinite. A matrix that is not finite, where a model all but diverges, shows nothing.
     """
+    if not np.isfinite(matrix).all():
+        return np.full_like(matrix, np.inf), np.inf, np.ones(len(matrix), bool)
     size = np.sqrt(np.diag(matrix))
     size[size == 0] = 1.0
     unit = matrix / np.outer(size, size)
