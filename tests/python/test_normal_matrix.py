@@ -10,8 +10,10 @@ def test_full_rank_is_the_inverse_whatever_the_units() -> None:
     rows = rng.normal(size=(30, 4)) * [1e-6, 1.0, 1e5, 1e9]
     matrix = rows.T @ rows
     inverse, condition = inverse_normal(matrix)
-    np.testing.assert_allclose(inverse @ matrix, np.eye(4), atol=1e-9 * 1e15**0.5)
-    scaled = rows / np.sqrt(np.diag(matrix))
+    size = np.sqrt(np.diag(matrix))
+    scaled = rows / size
+    wanted = np.linalg.inv(scaled.T @ scaled)
+    np.testing.assert_allclose(inverse * np.outer(size, size), wanted, rtol=1e-9)
     assert np.isclose(condition, np.linalg.cond(scaled) ** 2, rtol=1e-9)
 
 
