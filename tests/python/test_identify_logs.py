@@ -337,6 +337,49 @@ def test_drive_parameters_that_stand_alone_have_their_errors(logs) -> None:
     assert "axis1.com_z" not in errors
 
 
+def one_axis(**drive: float) -> Robot:
+    """A turntable: its torque shows the rotor and the arm as J_m + r^2 J_a only."""
+    joint = {
+        "name": "axis1",
+        "kind": "driven",
+        "origin": [0.0, 0.0, 0.0],
+        "axis": [0.0, 0.0, 1.0],
+        "link": {"mass": 40.0, "com": [0.0, 0.0, 0.0], "inertia": [4.0, 4.0, 6.0, 0.0, 0.0, 0.0]},
+        "drive": {"gear_ratio": 0.01, "motor_inertia": 9e-4, "viscous_friction": 5e-3} | drive,
+    }
+    return robot_of(description([joint], [0.0, 0.0, -9.81]))
+
+
+def test_what_shows_only_as_a_sum_is_split_by_the_file(tmp_path: Path) -> None:
+    """J_m + r^2 J_a a fifth larger than in the file: nothing says which, so both are."""
+    robot = one_axis()
+    log = motor_log(robot, 3)
+    model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
+    inertia = model.matrix([[0.0]], [[0.0]], [[1.0]])[0, 0] @ model.nominal
+    more = (
+        0.2
+        * inertia
+        * model.coupling.joint_motion(
+            np.gradient(np.gradient(log.position_rad, STEP, axis=0), STEP, axis=0)
+        )
+    )
+    log.torque_nm[:] += more
+    found = identify_logs(robot, log)
+    theta = found.estimate.standard()
+    grown = {n: b / a for n, a, b in zip(model.names, model.nominal, theta, strict=True) if a}
+    # Rotor 9e-4 and arm 6e-4 of 15e-4: steps are relative, so in proportion to the share.
+    jm, ja = 9e-4, 6e-4
+    unit = 0.2 * (jm + ja) / (jm**2 + ja**2)
+    assert grown["axis1.motor_inertia"] == pytest.approx(1 + unit * jm, abs=0.01)
+    assert grown["axis1.inertia_zz"] == pytest.approx(1 + unit * ja, abs=0.01)
+    values = found.identified(SOURCE)
+    errors = dict(zip(values.names, values.standard_errors, strict=True))
+    assert np.isnan(errors["axis1.motor_inertia"]) and np.isnan(errors["axis1.inertia_zz"])
+    assert "only the combination axis1.inertia_zz + 1e+04 axis1.motor_inertia determined" in (
+        values.provenance.notes
+    )
+
+
 def test_misuse_is_named(robot, logs) -> None:
     other = load_robot("two_mass_axis")
     for call, words in (
@@ -349,6 +392,8 @@ def test_misuse_is_named(robot, logs) -> None:
         (lambda: identify_logs(robot, logs, reversal_s=5.0), "reversal_s: expected less, got 5"),
         (lambda: identify_logs(robot, logs, held_out=[1]), "logs: expected Logs, got int"),
         (lambda: identify_logs(robot, logs, known={"axis1.colour": 1.0}), "known: expected names"),
+        (lambda: identify_logs(robot, logs, known={"axis3.motor_inertia": -5.0}), "axis3.motor_i"),
+        (lambda: identify_logs(robot, logs, known={"axis3.mass": -5.0}), "axis3.mass not below"),
         (lambda: identify_logs(robot, logs, prior_share=0.0, consistent=True), "share: expected"),
     ):
         with pytest.raises(InputError, match=words):

@@ -99,22 +99,43 @@ class BaseParameters:
     def to_standard(self, base: ArrayLike, prior: ArrayLike | None = None) -> Array:
         """Return standard parameters with these base parameters, shape (n_parameters,).
 
-        Of the infinitely many, the one nearest to ``prior`` (default: the robot's
-        nominal values), distances measured in units of the prior's entries or, where they
-        are zero, of the average of its kind. Known parameters keep their prior value. The
-        result gives the same torques but need not be a set of links that can exist.
+        Of the infinitely many, the one nearest to ``prior`` (default: the robot's nominal values).
+        Distances are relative: in units of the prior's entries, those of a link at least of the
+        average of their unit in that link, and where all this is zero of what has as large a share
+        in the torque as the others of its combination. So what a combination has more than by the
+        prior goes to all its parts, the more the larger their share in the torque.
+        Known parameters keep their prior value. The result gives the same torques but need not be
+        a set of links that can exist.
         """
         base = vector("base", base, len(self))
         start = self.model.nominal if prior is None else prior
         start = vector("prior", start, self.model.n_parameters)
-        units = np.array(self.model.units)
-        scale = np.abs(start)
-        for unit in np.unique(units):
-            of = units == unit
-            scale[of] = np.maximum(scale[of], scale[of].mean() or 1.0)
-        scaled = self.matrix * scale
-        step, *_ = np.linalg.lstsq(scaled, base - self.matrix @ start, rcond=None)
+        scaled = self.matrix * (scale := self._scale(start))
+        # Rows alike, or small combinations were lost beside large ones.
+        size = np.linalg.norm(scaled, axis=1)
+        missing = (base - self.matrix @ start) / size
+        step, *_ = np.linalg.lstsq(scaled / size[:, None], missing, rcond=None)
         return np.asarray(start + scale * step, dtype=np.float64)
+
+    def _scale(self, start: Array) -> Array:
+        """Size of a change of each parameter (n_parameters,) that counts as one, all positive."""
+        scale = np.abs(start)
+        links = np.array([column.extra is None for column in self.model.columns])
+        joints = np.array([name.rpartition(".")[0] for name in self.model.names])
+        units = np.array(self.model.units)
+        for joint, unit in {
+            (j, u) for j, u, link in zip(joints, units, links, strict=True) if link
+        }:
+            of = links & (joints == joint) & (units == unit)
+            scale[of] = np.maximum(scale[of], scale[of].mean())
+        weight = np.abs(self.matrix)
+        sized = np.where(scale > 0, weight, 0.0)
+        count = np.count_nonzero(sized, axis=1)
+        share = np.divide(sized @ scale, count, out=np.ones(len(self)), where=count > 0)
+        for i in np.flatnonzero(scale == 0):
+            rows = weight[:, i] > 0
+            scale[i] = (share[rows] / weight[rows, i]).min(initial=np.inf)
+        return np.where(np.isfinite(scale), scale, 1.0)
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
         """Return the regressor of the base parameters, shape (n, n_rows, n_base).

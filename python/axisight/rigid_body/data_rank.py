@@ -76,7 +76,9 @@ def _advice(base: BaseParameters, shares: dict[str, float], motion: tuple[Array,
     _, v, a = motion
     names = base.model.robot.joint_names
     advice = []
-    still = [names[j] for j in np.flatnonzero(np.ptp(v, axis=0) == 0)]
+    # Only what has a motor can be moved.
+    driven = base.model.robot.core.axis_joints
+    still = [names[j] for j in driven if np.ptp(v[:, j]) == 0]
     if still:
         advice.append(f"move {', '.join(still)} at changing speeds")
     one_way = [name.split(".")[0] for name, share in shares.items() if share < LEAST_REVERSED]

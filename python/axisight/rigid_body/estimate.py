@@ -39,6 +39,12 @@ DATA_TOLERANCE = 1e-9
 # Default number of blocks: enough for their scatter, few enough to be longer than the
 # correlation of residuals.
 BLOCKS = 30
+NOT_NEGATIVE = frozenset(
+    ("mass", "inertia_xx", "inertia_yy", "inertia_zz", "motor_inertia", "joint_rotor_inertia")
+    + ("viscous_friction", "joint_viscous_friction", "coulomb_friction", "joint_coulomb_friction")
+    + ("stiffness", "damping")
+)
+"""Quantities that cannot be negative."""
 
 
 def identify_rigid_body(
@@ -74,7 +80,8 @@ def identify_rigid_body(
         standard deviation of its residual, iterated; ``"tls"``: total least squares with the
         row weights of ``"wls"``, for regressors with errors of their own.
     base : base parameters found before, with the same known ones; default: found here.
-    known : parameters and the values to hold them at, by name.
+    known : parameters and the values to hold them at, by name; negative masses, inertias,
+        frictions and springs are refused.
     sample_weight : (n,) or (n, n_rows) weights of the residuals, not negative; zero leaves a
         sample out.
     column_noise : for ``"tls"``: standard deviation of the error of each base parameter's
@@ -103,7 +110,7 @@ def identify_rigid_body(
     if eliminate is not None and not (np.isfinite(eliminate) and eliminate > 0):
         raise InputError(f"eliminate: expected a positive number, got {eliminate!r}")
     model = as_model(robot, terms, side, coupling)
-    known = numbers("known", known)
+    known = known_values(known)
     base = known_base(model, base, known)
     motion = model.motion(q, v, a)
     torque = rows("torque_nm", torque_nm, model.n_rows)
@@ -318,6 +325,15 @@ def numbers(field: str, values: Mapping[str, float] | None) -> dict[str, float]:
         if not np.isfinite(out[name]):
             raise InputError(f"{field}: expected a finite number for {name}, got {value!r}")
     return out
+
+
+def known_values(values: Mapping[str, float] | None) -> dict[str, float]:
+    """Return known parameters as finite floats; refuse what no body, rotor or spring has."""
+    known = numbers("known", values)
+    for name, value in known.items():
+        if value < 0 and name.rpartition(".")[2] in NOT_NEGATIVE:
+            raise InputError(f"known: expected {name} not below zero, got {value:g}")
+    return known
 
 
 def row_weights(value: ArrayLike | None, shape: tuple[int, int]) -> Array | None:

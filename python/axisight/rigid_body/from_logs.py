@@ -60,7 +60,9 @@ class LogIdentification:
     def identified(self, provenance: Provenance) -> Identified:
         """Return the values for a robot file, those of bodies that can exist where there are.
 
-        What the motions do not show keeps the value it has in the file and is left out. Motor-side
+        What the motions do not show keeps the value it has in the file and is left out; what they
+        show only in combinations is split by the values in the file, without standard errors, and
+        noted. Motor-side
         parameters that stand for themselves have standard errors (not with ``consistent``, which
         mixes in a prior), values that were given have zero and are noted; of links only
         combinations have: the table of base parameters is in the settings of ``provenance``, torque
@@ -79,6 +81,7 @@ class LogIdentification:
                 "no term for motor inertias: links hold them, and those of the file count on top; "
                 "hold them with `known` instead"
             )
+        notes += self._undetermined()
         if self.estimate.known:
             listed = ", ".join(
                 f"{name} = {value:.6g}" for name, value in self.estimate.known.items()
@@ -126,6 +129,28 @@ class LogIdentification:
             if drive and np.count_nonzero(row) == 1 and name not in estimate.eliminated:
                 out[column] = error
         return out
+
+    def _undetermined(self) -> list[str]:
+        """Return a note on what shows only in combinations, by name where a drive is part of one."""
+        base = self.estimate.base
+        mixed = [
+            (text, any(base.model.columns[i].extra is not None for i in np.flatnonzero(row)))
+            for text, row in zip(base.combinations, base.matrix, strict=True)
+            if np.count_nonzero(row) > 1
+        ]
+        if not mixed:
+            return []
+        named = [text for text, drive in mixed if drive]
+        links = len(mixed) - len(named)
+        parts = [f"the combination {text}" for text in named]
+        if links:
+            parts.append(
+                f"{links} combinations of link parameters (base_parameters in the settings)"
+            )
+        return [
+            f"only {'; '.join(parts)} determined, not what they are made of: the parts written have "
+            "no standard error and follow the values in the robot file"
+        ]
 
     def _base_table(self) -> list[dict[str, Any]]:
         found = self.estimate
