@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
 from axisight.rigid_body.base import base_parameters
+from axisight.rigid_body.bending import bending
 from axisight.rigid_body.consistent import (
     ConsistentParameters,
     identify_consistent,
@@ -22,6 +23,7 @@ from axisight.rigid_body.consistent import (
 from axisight.rigid_body.coupling import MotorCoupling
 from axisight.rigid_body.estimate import Method, identify_rigid_body
 from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
+from axisight.rigid_body.log_checks import few_samples, misfit, refuse_repeated
 from axisight.rigid_body.motion import MotionEstimate, estimate_motion
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.rigid_body.result import RigidBodyEstimate
@@ -50,12 +52,16 @@ class LogIdentification:
         ``rms_nm`` [Nm] and ``relative_error`` (rms over that of the torque) over
         (parameters: ``estimate`` and, where asked for, ``consistent``; log; axis, from 1). The
         coordinate ``held_out`` (log) tells which logs took no part.
+    samples_kept
+        Filtered samples of each axis (n_axes,) that were fitted; the rest lie around reversals.
+        Residuals of ``estimate`` are over these, ``errors`` over all.
     """
 
     estimate: RigidBodyEstimate
     consistent: ConsistentParameters | None
     motions: tuple[MotionEstimate, ...]
     errors: xr.Dataset
+    samples_kept: NDArray[np.intp]
 
     def identified(self, provenance: Provenance) -> Identified:
         """Return the values for a robot file, those of bodies that can exist where there are.
@@ -185,6 +191,7 @@ def identify_logs(
     held_out: Sequence[Log] = (),
     cutoff_hz: float = 10.0,
     reversal_s: float | None = None,
+    torque_held: bool = True,
     terms: DriveTerms = USUAL_TERMS,
     coupling: MotorCoupling | None = None,
     method: Method = "wls",
@@ -209,6 +216,9 @@ def identify_logs(
         The filter smears the step of Coulomb friction there, and the regressor has it sharp; default
         two periods of the cutoff, or less, with a warning, on axes where that would leave less
         than a fifth of the samples; 0 for none.
+    torque_held : torques are commands u_k that hold from sample k to the next, as in the conventions:
+        at sample k acts the mean of u_(k-1) and u_k, or friction were off by half a sample, a
+        viscous one by -J w^2 T / 2. False for torques measured at the samples.
     terms : of the drives, see :class:`DriveTerms`.
     coupling : of the motors; default the gear ratios of the robot.
     method, known, eliminate, deficient : as for :func:`identify_rigid_body`.
@@ -229,25 +239,28 @@ def identify_logs(
             "eliminate: expected none together with consistent, where the prior decides what the "
             f"motions hardly show, got {eliminate!r}"
         )
+    if not isinstance(torque_held, bool | np.bool_):
+        raise InputError(f"torque_held: expected True or False, got {torque_held!r}")
     model = TorqueModel(robot, terms=terms, side="motor", coupling=coupling)
-    motions = [_estimate(log, robot, cutoff_hz) for log in given]
+    held = bool(torque_held)
+    motions = [_estimate(log, robot, cutoff_hz, held) for log in given]
+    others = [_estimate(log, robot, cutoff_hz, held) for log in held_out]
+    refuse_repeated(given, held_out)
     weight, left_out = reversal_weight(motions, reversal_s, cutoff_hz)
     joint = [_joint_motion(model, motion) for motion in motions]
     stacked = [np.concatenate(parts) for parts in zip(*joint, strict=True)]
+    base = base_parameters(model, known=known or (), locked=True)
+    left_out += few_samples(base, (stacked[0], stacked[1], stacked[2]), weight)
     estimate = identify_rigid_body(
         model,
         *stacked,
         sample_weight=weight,
-        base=base_parameters(model, known=known or (), locked=True),
+        base=base,
         method=method,
         known=known,
         eliminate=eliminate,
         deficient=deficient,
     )
-    estimate = estimate.with_findings([*estimate.findings, *left_out])
-    for finding in left_out:
-        if finding.serious:
-            warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     possible = None
     if consistent:
         possible = identify_consistent(
@@ -258,24 +271,37 @@ def identify_logs(
             torque_std_nm=estimate.residual_std_nm,
             prior_std=prior_spread(model, prior_share),
         )
-    joint += [_joint_motion(model, _estimate(log, robot, cutoff_hz)) for log in held_out]
+    joint += [_joint_motion(model, motion) for motion in others]
     thetas = {"estimate": estimate.standard()}
     if possible is not None:
         thetas["consistent"] = possible.theta
     names = [log.name for log in (*given, *held_out)]
+    errors = _errors(model, thetas, joint, names, len(given))
+    seen = [*left_out, *bending(estimate, given, stacked[0], cutoff_hz), *misfit(errors)]
+    for finding in seen:
+        if finding.serious:
+            warnings.warn(str(finding), IdentificationWarning, stacklevel=2)
     return LogIdentification(
-        estimate, possible, tuple(motions), _errors(model, thetas, joint, names, len(given))
+        estimate.with_findings([*estimate.findings, *seen]),
+        possible,
+        tuple(motions),
+        errors,
+        np.count_nonzero(weight, axis=0),
     )
 
 
-def _estimate(log: Log, robot: Robot, cutoff_hz: float) -> MotionEstimate:
+def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> MotionEstimate:
     if not isinstance(log, Log):
         raise InputError(f"logs: expected Logs, got {type(log).__name__}")
     if log.n_axes != robot.n_axes:
         raise InputError(f"{log.name}: expected {robot.n_axes} axes, got {log.n_axes}")
+    torque = log.torque_nm
+    if torque_held:
+        # Of the sample before the first nothing is known; the filter drops it anyway.
+        torque = np.concatenate([torque[:1], 0.5 * (torque[1:] + torque[:-1])])
     try:
         return estimate_motion(
-            log.position_rad, log.torque_nm, sample_time_s=log.sample_time_s, cutoff_hz=cutoff_hz
+            log.position_rad, torque, sample_time_s=log.sample_time_s, cutoff_hz=cutoff_hz
         )
     except InputError as error:
         raise InputError(f"{log.name}: {error}") from None

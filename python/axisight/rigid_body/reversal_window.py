@@ -47,7 +47,8 @@ def reversal_weight(
     margin, share = np.array(choices)[chosen], kept[chosen, axes]
     _refuse_little(share, margin)
     weight = np.stack([weights[k][:, axis] for axis, k in enumerate(chosen)], axis=1)
-    return weight, _findings(margin, share, cutoff_hz, short=bool(chosen.any()))
+    found = _findings(margin, share, len(weight), cutoff_hz, short=bool(chosen.any()))
+    return weight, found
 
 
 def _away(motion: MotionEstimate, margin_s: float) -> Array:
@@ -72,7 +73,7 @@ def _refuse_little(kept: Array, margin_s: Array) -> None:
 
 
 def _findings(
-    margin_s: Array, kept: Array, cutoff_hz: float, *, short: bool
+    margin_s: Array, kept: Array, n: int, cutoff_hz: float, *, short: bool
 ) -> list[IdentificationFinding]:
     if not (kept < 1).any():
         return []
@@ -80,7 +81,8 @@ def _findings(
         f"{100 * (1 - share):.3g} % of axis {axis} (within {margin:.3g} s)"
         for axis, (share, margin) in enumerate(zip(kept, margin_s, strict=True), 1)
     ]
-    text = f"samples left out around reversals: {', '.join(parts)}"
+    counts = ", ".join(f"{n * share:.0f}" for share in kept)
+    text = f"samples left out around reversals: {', '.join(parts)}; {counts} of {n} are kept"
     if short:
         usual = USUAL_PERIODS[0] / cutoff_hz
         text += (
