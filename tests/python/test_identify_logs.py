@@ -1,12 +1,14 @@
 """Rigid bodies from motor logs: all steps in one call, and its values in a robot file."""
 
 import warnings
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from axisight import Effect, InputError, Log, Robot, load_robot
+from axisight import Effect, InputError, Log, Robot, load_robot, rigid_body
 from axisight.errors import IdentifiabilityError, IdentificationWarning, RobotError
 from axisight.rigid_body import (
     USUAL_TERMS,
@@ -14,7 +16,6 @@ from axisight.rigid_body import (
     TorqueModel,
     base_parameters,
     estimate_motion,
-    identify_logs,
     identify_rigid_body,
 )
 from axisight.rigid_body.findings import FindingKind
@@ -22,6 +23,8 @@ from axisight.robot_file import Provenance, load_identified, write_identified
 from rigid_body_data import description, drive_values, parse, robot_of, smooth_motion, three_axes
 
 STEP = 1e-3
+# Most logs here hold the torques at the samples.
+identify_logs = partial(rigid_body.identify_logs, torque_held=False)
 SOURCE = Provenance("test", settings={"a": 1})
 
 
@@ -149,7 +152,12 @@ def test_what_reversals_leave_out_is_said(robot, logs) -> None:
     (said,) = (f for f in found.findings if f.kind == FindingKind.LEFT_OUT)
     assert f"{100 * out.mean():.3g} % of axis 2 (within 0.2 s)" in said.message
     # At 4 Hz two periods would leave next to nothing.
-    with pytest.warns(IdentificationWarning, match="samples left out .* take slower motions"):
+    with (
+        pytest.warns(IdentificationWarning, match="samples left out .* take slower motions"),
+        pytest.warns(
+            IdentificationWarning, match=r"expected 10 or more samples per parameter, got 5\.3"
+        ),
+    ):
         short = identify_logs(robot, logs[:2], cutoff_hz=4.0).estimate
     (said,) = (f for f in short.findings if f.kind == FindingKind.LEFT_OUT)
     assert said.serious and "the usual 0.5 s" in said.message
@@ -289,8 +297,10 @@ def test_elastic_joints_count_as_locked() -> None:
     free = base_parameters(TorqueModel(elastic, terms=USUAL_TERMS, side="motor"))
     assert len(free) > len(got)
     runs = [motor_log(elastic, seed, noise=0.01) for seed in (1, 2)]
-    found = identify_logs(elastic, runs)
-    twin = identify_logs(rigid, runs)
+    with pytest.warns(IdentificationWarning, match="the arm bends"):
+        found = identify_logs(elastic, runs)
+    with pytest.warns(IdentificationWarning, match="the arm bends"):
+        twin = identify_logs(rigid, runs)
     np.testing.assert_allclose(found.estimate.values, twin.estimate.values, rtol=1e-6)
 
 
@@ -337,7 +347,7 @@ def test_drive_parameters_that_stand_alone_have_their_errors(logs) -> None:
     assert "axis1.com_z" not in errors
 
 
-def one_axis(**drive: float) -> Robot:
+def one_axis(**spring: float) -> Robot:
     """A turntable: its torque shows the rotor and the arm as J_m + r^2 J_a only."""
     joint = {
         "name": "axis1",
@@ -345,8 +355,8 @@ def one_axis(**drive: float) -> Robot:
         "origin": [0.0, 0.0, 0.0],
         "axis": [0.0, 0.0, 1.0],
         "link": {"mass": 40.0, "com": [0.0, 0.0, 0.0], "inertia": [4.0, 4.0, 6.0, 0.0, 0.0, 0.0]},
-        "drive": {"gear_ratio": 0.01, "motor_inertia": 9e-4, "viscous_friction": 5e-3} | drive,
-    }
+        "drive": {"gear_ratio": 0.01, "motor_inertia": 9e-4, "viscous_friction": 5e-3},
+    } | spring
     return robot_of(description([joint], [0.0, 0.0, -9.81]))
 
 
@@ -378,6 +388,143 @@ def test_what_shows_only_as_a_sum_is_split_by_the_file(tmp_path: Path) -> None:
     assert "only the combination axis1.inertia_zz + 1e+04 axis1.motor_inertia determined" in (
         values.provenance.notes
     )
+
+
+def commanded(robot: Robot, step: float, seed: int) -> tuple[Log, np.ndarray, np.ndarray]:
+    """A log of a turntable under torques held between samples, exactly; velocity, acceleration."""
+    model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
+    one = np.ones((1, 1))
+    inertia = float(model.matrix(0 * one, 0 * one, one)[0, 0] @ model.nominal)
+    viscous = 5e-3
+    rng = np.random.default_rng(seed)
+    time = step * np.arange(6000)
+    torque = 0.3 * sum(np.sin(2 * np.pi * f * time + p) for f, p in rng.uniform(0.4, 1.6, (5, 2)))
+    inertia *= float(model.coupling.position[0, 0]) ** -1
+    # J w' + f w = u: over one step w decays by e^(-f T / J), and so does its integral.
+    decay = np.exp(-viscous * step / inertia)
+    speed, angle = np.zeros(len(time)), np.zeros(len(time))
+    for k, u in enumerate(torque[:-1]):
+        end = u / viscous
+        speed[k + 1] = end + (speed[k] - end) * decay
+        angle[k + 1] = angle[k] + end * step + (speed[k] - end) * (1 - decay) * inertia / viscous
+    noisy = torque + 1e-3 * rng.normal(size=len(time))
+    log = Log(
+        name=f"held{seed}",
+        sample_time_s=step,
+        time_s=time,
+        torque_nm=noisy[:, None],
+        position_rad=angle[:, None],
+        source=Path("held"),
+    )
+    return log, speed, (torque - viscous * speed) / inertia
+
+
+def test_a_held_torque_acts_half_a_sample_later(robot) -> None:
+    """Viscous friction without bias; taken as measured it is off by -J <w'^2> / <w^2> T / 2."""
+    turntable, step = one_axis(), 5e-3
+    terms = DriveTerms(inertia="motor", viscous="motor")
+    log, speed, rate = commanded(turntable, step, 1)
+    found = {}
+    for held in (True, False):
+        estimate = rigid_body.identify_logs(
+            turntable, log, torque_held=held, terms=terms, reversal_s=0.0
+        ).estimate
+        i = estimate.names.index("axis1.viscous_friction")
+        found[held] = estimate.values[i], estimate.standard_error[i]
+    value, error = found[True]
+    assert abs(value - 5e-3) < 4 * error and error < 2e-5
+    bias = -1.5e-3 * np.mean(rate**2) / np.mean(speed**2) * step / 2
+    # A tenth for what the filter drops at the ends and these means have.
+    assert found[False][0] - 5e-3 == pytest.approx(bias, rel=0.1)
+    assert abs(bias) > 10 * error
+    with pytest.raises(InputError, match="torque_held: expected True or False"):
+        rigid_body.identify_logs(turntable, log, torque_held=1)
+
+
+def elastic_log(stiffness: float, seed: int = 1) -> tuple[Robot, Log, float]:
+    """A turntable behind a spring, in steady state; expected bias of J_a by least squares."""
+    table = one_axis(stiffness=stiffness, damping=0.0)
+    jm, ja, ratio, time = 9e-4, 6.0, 0.01, STEP * np.arange(12000)
+    w = 2 * np.pi * np.array([0.31, 0.57, 0.83, 1.07])[:, None]
+    phase = np.random.default_rng(seed).uniform(0, 6, w.shape)
+    angle = 20.0 / w * np.sin(w * time + phase)
+    felt = ja / (1 - w**2 * ja / stiffness)
+    torque = ((jm + ratio**2 * felt) * -(w**2) * angle).sum(axis=0) + 5e-3 * (
+        20.0 * np.cos(w * time + phase)
+    ).sum(axis=0)
+    bias = ((felt / ja - 1) * w**2).sum() / (w**2).sum()
+    log = Log(
+        name="elastic",
+        sample_time_s=STEP,
+        time_s=time,
+        torque_nm=torque[:, None],
+        position_rad=angle.sum(axis=0)[:, None],
+        source=Path("elastic"),
+    )
+    return table, log, float(bias)
+
+
+def test_arms_that_bend_are_told_by_how_much() -> None:
+    """The closed form of J_a / (1 - (w / w_n)^2), w_n = 6 Hz, is the oracle of both."""
+    terms = DriveTerms(inertia="motor", viscous="motor")
+    table, log, bias = elastic_log(6.0 * (2 * np.pi * 6.0) ** 2)
+    log.position_rad[:] += np.random.default_rng(0).normal(0, 1e-4, log.position_rad.shape)
+    with pytest.warns(IdentificationWarning, match="the arm bends: with its motors held it swin"):
+        found = identify_logs(table, log, terms=terms, cutoff_hz=8.0, reversal_s=0.0).estimate
+    # inertia_zz + 1e4 motor_inertia, of which the arm has 6.
+    assert (found.values[0] - 15.0) / 6.0 == pytest.approx(bias, rel=0.1)
+    above, said = (f for f in found.findings if f.kind == FindingKind.BENDING)
+    assert not above.serious and "cutoff_hz: 8 Hz is above 6 Hz" in above.message
+    told = float(said.message.split("axis 1 about ")[1].split(" %")[0]) / 100
+    assert bias > 0.02 and told == pytest.approx(bias, rel=0.15)
+    # Ten times as fast a spring: a hundredth of the bias, and the cutoff is below.
+    stiff, log, bias = elastic_log(6.0 * (2 * np.pi * 60.0) ** 2)
+    log.torque_nm[:] += 0.02 * np.random.default_rng(0).normal(size=log.torque_nm.shape)
+    found = identify_logs(stiff, log, terms=terms, cutoff_hz=8.0).estimate
+    assert not [f for f in found.findings if f.kind == FindingKind.BENDING]
+
+
+def test_logs_that_are_not_explained_are_told(robot, logs) -> None:
+    found = identify_logs(robot, logs[:2], held_out=logs[2:], cutoff_hz=20.0).estimate
+    assert not [f for f in found.findings if f.kind == FindingKind.MISFIT]
+    turned = replace(logs[2], torque_nm=logs[2].torque_nm * [1.0, -1.0, 1.0])
+    with pytest.warns(
+        IdentificationWarning, match=r"run3 \(held out\): torque errors are 20.* 2 o"
+    ):
+        identify_logs(robot, logs[:2], held_out=[turned], cutoff_hz=20.0)
+    scaled = replace(logs[2], torque_nm=logs[2].torque_nm * [1.0, 1.0, 1.2])
+    with pytest.warns(IdentificationWarning, match=r"axis 3: torque errors of 1.* on run3 \(held"):
+        identify_logs(robot, logs[:2], held_out=[scaled], cutoff_hz=20.0)
+    again = replace(logs[0], name="copy")
+    with pytest.raises(InputError, match=r"logs: expected different logs, got copy with .* run1"):
+        identify_logs(robot, [*logs[:2], again])
+    with pytest.raises(InputError, match="held_out: expected logs that nothing else uses, got co"):
+        identify_logs(robot, logs[:2], held_out=[again])
+
+
+def test_too_few_samples_for_an_axis_are_refused(robot, logs) -> None:
+    """Weights by residuals would follow the axis that fits all but exactly."""
+    with pytest.raises(
+        InputError, match=r"expected 5 or more samples per parameter, got 2.* axis 2"
+    ):
+        identify_logs(robot, logs[0], cutoff_hz=4.0)
+    found = identify_logs(robot, logs[:2])
+    (said,) = (f for f in found.estimate.findings if f.kind == FindingKind.LEFT_OUT)
+    n = sum(m.n_samples for m in found.motions)
+    counts = ", ".join(str(x) for x in found.samples_kept)
+    assert said.message.endswith(f"; {counts} of {n} are kept")
+
+
+def test_only_joints_with_motors_are_to_be_moved() -> None:
+    elastic = load_robot("irb6600_like")
+    still = motor_log(elastic, 1)
+    still.position_rad[:, 2] = 0.0
+    with (
+        warnings.catch_warnings(),
+        pytest.raises(IdentifiabilityError, match="move axis3 at changing speeds"),
+    ):
+        warnings.simplefilter("ignore")
+        identify_logs(elastic, still, reversal_s=0.0)
 
 
 def test_misuse_is_named(robot, logs) -> None:

@@ -40,9 +40,11 @@ DATA_TOLERANCE = 1e-9
 # correlation of residuals.
 BLOCKS = 30
 NOT_NEGATIVE = frozenset(
-    ("mass", "inertia_xx", "inertia_yy", "inertia_zz", "motor_inertia", "joint_rotor_inertia")
-    + ("viscous_friction", "joint_viscous_friction", "coulomb_friction", "joint_coulomb_friction")
-    + ("stiffness", "damping")
+    {
+        *("mass", "inertia_xx", "inertia_yy", "inertia_zz", "motor_inertia"),
+        *("joint_rotor_inertia", "viscous_friction", "joint_viscous_friction"),
+        *("coulomb_friction", "joint_coulomb_friction", "stiffness", "damping"),
+    }
 )
 """Quantities that cannot be negative."""
 

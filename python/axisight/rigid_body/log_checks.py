@@ -75,13 +75,15 @@ def few_samples(
     worst = int(per.argmin())
     if per[worst] >= USUAL_PER_PARAMETER:
         return []
+    refused = per[worst] < LEAST_PER_PARAMETER
+    least = LEAST_PER_PARAMETER if refused else USUAL_PER_PARAMETER
     text = (
-        f"expected {USUAL_PER_PARAMETER:g} or more samples per parameter, got {per[worst]:.2g} on "
+        f"expected {least:g} or more samples per parameter, got {per[worst]:.2g} on "
         f"axis {worst + 1} ({kept[worst]} samples outside reversals for its share of "
         f"{parameters[worst]:.2g} parameters): the fit would follow their noise; take longer or more "
         "logs, a higher cutoff, or a smaller reversal_s"
     )
-    if per[worst] < LEAST_PER_PARAMETER:
+    if refused:
         raise InputError(f"logs: {text}")
     return [IdentificationFinding(FindingKind.FEW_SAMPLES, text)]
 
