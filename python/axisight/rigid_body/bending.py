@@ -27,6 +27,8 @@ LEAST_BIAS = 0.01
 CLEARLY = 3.0
 """Standard errors of the inertia from which the bias is worth a note."""
 POSES = 20
+ABOVE_NOISE = 10.0
+"""Power over that of the noise from which a line counts: noise passes it once in e^10."""
 
 
 def bending(
@@ -103,8 +105,8 @@ def _link_inertia(robot: Robot, q: Array) -> Array:
 def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Array:
     """Root mean square frequency (n_axes,) of the acceleration of the joints below the cutoff [Hz].
 
-    Spectra of second differences of the logs, less what noise of the angles would have, by their
-    upper half; zero where nothing is left.
+    Spectra of second differences of the logs, where they stand out of what noise of the angles would
+    have, by their upper half; zero where nothing does.
     """
     power, moment = np.zeros(model.robot.n_axes), np.zeros(model.robot.n_axes)
     for log in logs:
@@ -117,13 +119,12 @@ def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Arr
         above = f > max(cutoff_hz, 0.25 / step)
         floor = (density[above] / gain[above, None]).mean(axis=0) if above.any() else 0.0
         band = f <= cutoff_hz
-        left = density[band] - floor * gain[band, None]
+        left = np.where(density[band] > ABOVE_NOISE * floor * gain[band, None], density[band], 0.0)
         # Energies, so that long logs count for more.
         scale = step / len(second) * step
         power += scale * left.sum(axis=0)
         moment += scale * (f[band, None] ** 2 * left).sum(axis=0)
-    usable = (power > 0) & (moment > 0)
-    return np.sqrt(np.divide(moment, power, out=np.zeros_like(power), where=usable))
+    return np.sqrt(np.divide(moment, power, out=np.zeros_like(power), where=power > 0))
 
 
 def _certainty(estimate: RigidBodyEstimate, q: Array) -> tuple[Array, Array]:

@@ -41,9 +41,9 @@ DATA_TOLERANCE = 1e-9
 BLOCKS = 30
 NOT_NEGATIVE = frozenset(
     {
-        *("mass", "inertia_xx", "inertia_yy", "inertia_zz", "motor_inertia"),
-        *("joint_rotor_inertia", "viscous_friction", "joint_viscous_friction"),
-        *("coulomb_friction", "joint_coulomb_friction", "stiffness", "damping"),
+        *("mass", "motor_inertia", "joint_rotor_inertia", "stiffness", "damping"),
+        *("viscous_friction", "joint_viscous_friction"),
+        *("coulomb_friction", "joint_coulomb_friction"),
     }
 )
 """Quantities that cannot be negative."""
@@ -82,7 +82,7 @@ def identify_rigid_body(
         standard deviation of its residual, iterated; ``"tls"``: total least squares with the
         row weights of ``"wls"``, for regressors with errors of their own.
     base : base parameters found before, with the same known ones; default: found here.
-    known : parameters and the values to hold them at, by name; negative masses, inertias,
+    known : parameters and the values to hold them at, by name; negative masses, rotors,
         frictions and springs are refused.
     sample_weight : (n,) or (n, n_rows) weights of the residuals, not negative; zero leaves a
         sample out.
@@ -334,7 +334,7 @@ def known_values(values: Mapping[str, float] | None) -> dict[str, float]:
     known = numbers("known", values)
     for name, value in known.items():
         if value < 0 and name.rpartition(".")[2] in NOT_NEGATIVE:
-            raise InputError(f"known: expected {name} not below zero, got {value:g}")
+            raise InputError(f"known: expected no negative {name}, got {value:g}")
     return known
 
 
