@@ -465,7 +465,7 @@ def elastic_log(stiffness: float, seed: int = 1) -> tuple[Robot, Log, float]:
 
 
 def percent_told(message: str) -> float:
-    return float(message.split("axis 1 about ")[1].split(" %")[0]) / 100
+    return float(message.split("axis 1 about ")[1].split(" %", maxsplit=1)[0]) / 100
 
 
 def test_arms_that_bend_are_told_by_how_much() -> None:

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 LEAST_BIAS = 0.01
 """Share of an arm inertia from which its bias is a warning."""
+NOTED_BIAS = 0.001
+"""Share below which it is not worth a word."""
 CLEARLY = 3.0
 """Standard errors of the inertia from which the bias is worth a note."""
 POSES = 20
@@ -61,7 +63,8 @@ def bending(
     bias = (2 * np.pi * rms_hz) ** 2 * felt / arm
     share, error = _certainty(estimate, at)
     large = bias > LEAST_BIAS
-    chosen = np.flatnonzero(large | (bias * share > CLEARLY * error))
+    clear = (bias > NOTED_BIAS) & (bias * share > CLEARLY * error)
+    chosen = np.flatnonzero(large | clear)
     if len(chosen):
         told = ", ".join(
             f"axis {i + 1} about {100 * bias[i]:.2g} % at {rms_hz[i]:.2g} Hz" for i in chosen
