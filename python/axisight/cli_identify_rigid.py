@@ -80,6 +80,13 @@ def rigid_body_command(
             "Coulomb friction there. Default: two periods of the cutoff."
         ),
     ] = None,
+    torque_measured: Annotated[
+        bool,
+        typer.Option(
+            "--torque-measured",
+            help="The torque is measured at the samples, not a command held from each to the next.",
+        ),
+    ] = False,
     method: Annotated[
         str, typer.Option(help="ls, wls (axes weighted by their residuals) or tls.")
     ] = "wls",
@@ -134,6 +141,7 @@ def rigid_body_command(
                 held_out=read[len(logs) :],
                 cutoff_hz=cutoff_hz,
                 reversal_s=reversal_s,
+                torque_held=not torque_measured,
                 terms=_terms(friction, dead_band_rad_s),
                 method=cast("Method", method),
                 known=held,

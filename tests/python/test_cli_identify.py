@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import axisight
 from axisight import Robot, excitation, load_robot, robot_parameters, simulate
 from axisight.cli import app
 from axisight.frequency_fit import model_response
@@ -175,6 +176,20 @@ def test_rigid_body_options_reach_the_regression(rigid) -> None:
     for name in ("coulomb", "offset", "motor_inertia", "axis3.mass_x"):
         assert name not in text
     assert "set to zero" in run("rigid-body", rigid / "robot.toml", first, "--eliminate", 0.01)
+
+
+def test_measured_torques_are_not_shifted(rigid, monkeypatch) -> None:
+    seen = []
+    whole = axisight.rigid_body.identify_logs
+
+    def spy(*args, **options):
+        seen.append(options["torque_held"])
+        return whole(*args, **options)
+
+    monkeypatch.setattr(axisight.rigid_body, "identify_logs", spy)
+    for flags in ((), ("--torque-measured",)):
+        run("rigid-body", rigid / "robot.toml", rigid / "run1.parquet", *flags)
+    assert seen == [True, False]
 
 
 @pytest.mark.parametrize(
