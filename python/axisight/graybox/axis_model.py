@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -118,7 +119,7 @@ class AxisModel:
     @property
     def parameters(self) -> tuple[AxisParameter, ...]:
         """The parameters of this structure, in the order of the fit."""
-        return tuple(p for p, used in self._table() if used)
+        return tuple(p for p, used in self._table if used)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -132,7 +133,8 @@ class AxisModel:
         springs = [f"deflection{_later(i)}" for i in range(self.n_masses - 1)]
         return ("angle_m", *springs, *[f"speed_{m}" for m in masses])
 
-    def _table(self) -> list[tuple[AxisParameter, bool]]:
+    @cached_property
+    def _table(self) -> tuple[tuple[AxisParameter, bool], ...]:
         """Every place of the core's parameter vector, and whether this structure uses it."""
         n, cubic = self.n_masses, self.cubic or ()
         springs = range(n - 1)
@@ -190,7 +192,7 @@ class AxisModel:
                 meaning = f"{wave} of ripple order {order:g}"
                 name = f"{letter}_{order:g}"
                 out.append((AxisParameter(name, "Nm", meaning, signed, neutral=0), True))
-        return out
+        return tuple(out)
 
     def core(self) -> CoreModel:
         """Return the structure as the compiled core takes it."""
@@ -235,12 +237,12 @@ class AxisModel:
     def vector(self, values: Mapping[str, float], gains: Sequence[float] = ()) -> list[float]:
         """Return the core's vector of all shared parameters and innovations gains."""
         unused = {"b": 0.0, "F_s": 0.0, "v_s": 1.0, "F_a": 0.0, "u_0": 0.0}
-        theta = [values.get(p.name, unused.get(p.name, 0.0)) for p, _ in self._table()]
+        theta = [values.get(p.name, unused.get(p.name, 0.0)) for p, _ in self._table]
         return [*theta, *(gains or [0.0] * self.n_gains())]
 
     def places(self) -> dict[str, int]:
         """Return where each parameter of this structure stands in the core's vector."""
-        return {p.name: i for i, (p, used) in enumerate(self._table()) if used}
+        return {p.name: i for i, (p, used) in enumerate(self._table) if used}
 
     def simulate(
         self,
