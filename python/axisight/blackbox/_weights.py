@@ -13,7 +13,6 @@ from axisight.blackbox._data import Complex, Real
 from axisight.errors import InputError
 from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import (
-    FEW_FREEDOM,
     OwnWeights,
     check_neighbours,
     neighbours_for,
@@ -45,13 +44,6 @@ class UsableLines:
         if self.variance is None or self.neighbours:
             return OwnWeights()
         return OwnWeights.of(self.degrees_of_freedom)
-
-    @property
-    def few(self) -> bool:
-        """Whether lines are weighed by their own variance of few degrees of freedom."""
-        freedom = self.degrees_of_freedom
-        own = self.variance is not None and not self.neighbours
-        return own and freedom is not None and freedom - 1 < FEW_FREEDOM
 
     def weights(self, magnitude: Real) -> tuple[Real, Real]:
         """Return weights and the variance of weighted residuals (real and imaginary part each).

@@ -219,11 +219,13 @@ class RationalModel:
         statistic = 2 * n * np.sum((np.stack(related) / power) ** 2, axis=0)
         shape = (self.n_out, self.n_in)
         reduced = self.reduced_loss
-        chance = self._chance(reduced) if self.weighting == "variance" else np.nan
+        known = self.weighting == "variance"
+        chance = self._chance(reduced) if known else np.nan
+        scale = np.sqrt(self.loss_scale) if known else self.noise_scale
         return xr.Dataset(
             {
                 "whiteness_p": (DIMS[1:], stats.chi2.sf(statistic, 2 * most).reshape(shape)),
-                "largest": (DIMS[1:], (np.abs(r).max(axis=1) / self.noise_scale).reshape(shape)),
+                "largest": (DIMS[1:], (np.abs(r).max(axis=1) / scale).reshape(shape)),
             },
             coords={"output": np.arange(1, shape[0] + 1), "input": np.arange(1, shape[1] + 1)},
             attrs={
@@ -481,7 +483,7 @@ def _doubts(model: RationalModel) -> list[str]:
             f"the residuals are {model.reduced_loss:.3g} times what the variance explains: raise "
             "the order, or the variance is too small; standard errors are too small"
         )
-    if model.used.few and model.variance_freedom is not None:
+    if model.used.own.few and model.variance_freedom is not None:
         out.append(
             f"{few_words(model.variance_freedom)}; standard errors are uncertain, NaN where they "
             "have no bound"
@@ -541,7 +543,7 @@ def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: obje
             continue
         count = model.degrees_of_freedom + model.n_parameters
         level = model.loss / model.loss_scale
-        if model.weighting != "variance":
+        if model.weighting != "variance" or np.isnan(model.loss_scale):
             level = count * float(np.log(max(model.loss, 1e-300) / count))
         d = model.n_parameters
         values = (model.loss, model.reduced_loss, d, level + 2 * d)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.frequency_fit.measured import MeasuredResponse
-from axisight.frf.pooled import FEW_FREEDOM, MISFIT_EXPLAINED, OwnWeights, few_words
+from axisight.frf.pooled import MISFIT_EXPLAINED, OwnWeights, few_words
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -78,16 +78,10 @@ def trust(
     residuals of all responses, ``misfit`` their mean square, degrees of freedom counted.
     """
     known = all(one.variance is not None or one.covariance is not None for one in data)
-    own = [
-        one
-        for one, weights in zip(data, weighing, strict=True)
-        if weights is None and one.degrees_of_freedom is not None
-    ]
     few = [
         one.degrees_of_freedom
-        for one in own
-        if one.degrees_of_freedom is not None
-        and one.degrees_of_freedom - one.elements_weighed_together < FEW_FREEDOM
+        for one, weights in zip(data, weighing, strict=True)
+        if weights is None and one.degrees_of_freedom is not None and _own(one).few
     ]
     values: Complex = residual[:, 0] + 1j * residual[:, 1]
     return Trust(

@@ -82,11 +82,12 @@ class OwnWeights:
     """What weights from a line's own estimated variance do to a fit.
 
     ``misfit``: mean square of whitened residuals. ``variance``: factor on the covariance of the
-    parameters that the weights claim. NaN where they have no bound.
+    parameters that the weights claim. NaN where they have no bound; both are uncertain if ``few``.
     """
 
     misfit: float = 1.0
     variance: float = 1.0
+    few: bool = False
 
     @classmethod
     def of(cls, degrees_of_freedom: float | None, elements: int = 1) -> OwnWeights:
@@ -100,6 +101,7 @@ class OwnWeights:
         return cls(
             misfit=nu / left if left > 0 else np.nan,
             variance=nu**2 / (left**2 - 1) if left > 1 else np.nan,
+            few=left < FEW_FREEDOM,
         )
 
 

@@ -45,7 +45,7 @@ def bending(
     if not len(springs):
         return []
     at = np.ascontiguousarray(q[:: max(1, len(q) // POSES)])
-    mass = _link_inertia(robot, at)
+    mass = robot.inertia_matrix(at)
     root = np.sqrt(compliance)
     inside = mass[:, springs[:, None], springs] * root[:, None] * root
     lowest = 0.5 / np.pi / np.sqrt(np.linalg.eigvalsh(inside).max())
@@ -91,18 +91,6 @@ def _springs(robot: Robot) -> tuple[NDArray[np.intp], Array]:
     ]
     found = [1.0 / stiffness[f"{robot.joint_names[joint]}.stiffness"] for joint in joints]
     return np.array(joints, dtype=np.intp), np.array(found)
-
-
-def _link_inertia(robot: Robot, q: Array) -> Array:
-    """Inertia matrices (n, n_joints, n_joints) of the links of the robot file, without rotors."""
-    links = TorqueModel(robot, side="joint")
-    zero = np.zeros_like(q)
-    still = links.matrix(q, zero, zero) @ links.nominal
-    columns = [
-        links.matrix(q, zero, np.broadcast_to(unit, q.shape).copy()) @ links.nominal - still
-        for unit in np.eye(robot.n_joints)
-    ]
-    return np.stack(columns, axis=2)
 
 
 def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Array:

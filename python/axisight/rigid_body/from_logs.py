@@ -68,11 +68,10 @@ class LogIdentification:
 
         What the motions do not show keeps the value it has in the file and is left out; what they
         show only in combinations is split by the values in the file, without standard errors, and
-        noted. Motor-side
-        parameters that stand for themselves have standard errors (not with ``consistent``, which
-        mixes in a prior), values that were given have zero and are noted; of links only
-        combinations have: the table of base parameters is in the settings of ``provenance``, torque
-        errors with it, findings in the notes. Effects that the values have taken up are set to
+        noted. Motor-side parameters that stand for themselves have standard errors (not with
+        ``consistent``, which mixes in a prior), values that were given have zero and are noted; of
+        links only combinations have: the table of base parameters is in the settings of
+        ``provenance``, torque errors with it, findings in the notes. Effects that the values have taken up are set to
         neutral (:func:`identified_bodies`). Raises RobotError for masses no body has, which the
         estimate alone may lead to.
         """
