@@ -1,6 +1,6 @@
 //! Batched inversion of small complex matrices, one core: 1,000 at a time, in cache.
 
-use axisight_core::signal::{SmallSolver, Threads, invert_batch};
+use axisight_numerics::{SmallSolver, Threads, invert_batch};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Complex;
 use std::hint::black_box;

@@ -4,8 +4,8 @@
 
 use axisight_benches::{preset, reference};
 use axisight_core::robot::{Plant, RigidBody, equilibrium};
-use axisight_core::scalar::{Dual, Lanes, Scalar};
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
+use axisight_scalar::{Dual, Lanes, Scalar};
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 

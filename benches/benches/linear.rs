@@ -6,10 +6,10 @@
 use axisight_benches::linear_loop::PlainLoop;
 use axisight_benches::{preset, reference, table_8_1};
 use axisight_core::robot::RobotDescription;
-use axisight_core::scalar::{Lanes, Scalar};
 use axisight_core::simulation::{
     Drive, LinearPlant, Method, Run, Status, measurement_noise, simulate_linear,
 };
+use axisight_scalar::{Lanes, Scalar};
 use criterion::{Criterion, Throughput, criterion_group};
 use std::hint::black_box;
 use std::time::Instant;

@@ -2,7 +2,7 @@
 
 use crate::convert::{array1, array2};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
-use axisight_graybox::axis::{
+use axisight_fit::axis::{
     AxisError, AxisModel, AxisProblem, AxisSet, Hold, Output, SearchOptions, SearchParameter,
     SearchResult, SearchStatus, search,
 };

@@ -2,10 +2,10 @@
 
 use crate::convert::{array1, array2};
 use crate::entry::{CancelToken, detached, flag, input_error};
-use axisight_core::excitation::crest::{
+use axisight_spectra::excitation::crest::{
     Budget, Clipping, CrestProblem, LpRefinement, Start, peak, search,
 };
-use axisight_core::excitation::{self as core, Square};
+use axisight_spectra::excitation::{self as core, Square};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

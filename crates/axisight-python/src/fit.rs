@@ -5,12 +5,12 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use crate::robot::Robot;
 use crate::simulation::method;
-use axisight_core::identification::{
+use axisight_core::robot::{Parameter, RobotDescription};
+use axisight_fit::identification::{
     Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
     ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
-use axisight_core::robot::{Parameter, RobotDescription};
-use axisight_core::signal::Weighting;
+use axisight_numerics::Weighting;
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

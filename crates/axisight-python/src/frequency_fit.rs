@@ -4,13 +4,13 @@ use crate::convert::{array1, array2, array3, matrix};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use crate::robot::Robot;
-use axisight_core::identification::Loss;
 use axisight_core::robot::Parameter;
-use axisight_graybox::frequency::{
+use axisight_fit::frequency::{
     Criterion, DesignOptions, FrequencyFit, FrequencyFitError, FrequencyOptions,
     FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, SearchStatus,
     Uncertainty, minimize,
 };
+use axisight_fit::identification::Loss;
 use numpy::{
     Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };
@@ -299,7 +299,7 @@ pub fn frequency_response<'py>(
     frequency_hz: Vec<f64>,
     sampled: bool,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    use axisight_graybox::frequency::{Linearizer, SecondOrderError, evaluate};
+    use axisight_fit::frequency::{Linearizer, SecondOrderError, evaluate};
     let sample_time = robot.description.sample_time;
     let hold = if sampled {
         Hold::ZeroOrder(sample_time)
@@ -336,7 +336,7 @@ pub fn design_poses<'py>(
     gap_tolerance: f64,
     max_iterations: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
-    use axisight_graybox::frequency::{InformationMatrix, design};
+    use axisight_fit::frequency::{InformationMatrix, design};
     let view = information.as_array();
     let p = view.shape()[1];
     let square = |values: Vec<f64>| InformationMatrix::from_row_slice(p, p, &values);

@@ -6,8 +6,8 @@
 //! [`in_place`].
 
 use crate::entry::{AxisightError, InputError, detached, in_place, input_error};
-use axisight_core::frf::{self, Channels, Extent, Layout, LineSpectra};
-use axisight_core::signal::{Threads, invert_batch, right_divide_batch};
+use axisight_numerics::{Threads, invert_batch, right_divide_batch};
+use axisight_spectra::frf::{self, Channels, Extent, Layout, LineSpectra};
 use numpy::{
     Complex64, Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray3, PyReadonlyArray4, PyReadwriteArray3, PyUntypedArrayMethods,

@@ -1,7 +1,7 @@
 //! Frequency responses by local models.
 
 use crate::entry::{detached, input_error};
-use axisight_core::frf::{
+use axisight_spectra::frf::{
     LocalEstimate, LocalModel, LocalModelError, Records, local_polynomial_periodic, local_rational,
 };
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray3};

@@ -4,13 +4,13 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use crate::simulation::method;
-use axisight_core::ensemble::{Moments, QuantileSketch, STATISTICS};
-use axisight_core::excitation::{Grid, Multisine, Square, directions};
-use axisight_core::frf::Output;
-use axisight_core::montecarlo::{
+use axisight_montecarlo::{
     Block, BlockError, Distribution, Ensemble, FailureKind, Model, Spread, SpreadTarget, Study,
     StudySettings, Summary, run_block,
 };
+use axisight_spectra::ensemble::{Moments, QuantileSketch, STATISTICS};
+use axisight_spectra::excitation::{Grid, Multisine, Square, directions};
+use axisight_spectra::frf::Output;
 use numpy::{
     Complex64, Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray2,

@@ -3,9 +3,7 @@
 use crate::convert::{array1, array2, array3, rows};
 use crate::entry::{detached, input_error};
 use crate::robot::Robot;
-use axisight_graybox::regressor::{
-    Extra, FactorRequest, Motion, Regressor, Signal, link_parameters,
-};
+use axisight_fit::regressor::{Extra, FactorRequest, Motion, Regressor, Signal, link_parameters};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray2,
 };

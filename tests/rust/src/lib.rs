@@ -3,8 +3,8 @@
 #![allow(clippy::panic, missing_docs)]
 
 use axisight_core::robot::{EffectSetting, Plant, RobotDescription, read_robot};
-use axisight_core::scalar::Scalar;
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
+use axisight_scalar::Scalar;
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
 pub const PRESET: &str = include_str!("../../../python/axisight/presets/irb6600_like.toml");

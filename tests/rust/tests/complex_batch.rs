@@ -1,6 +1,6 @@
 //! Batched complex inversion and division: residuals, singular matrices, every size.
 
-use axisight_core::signal::{Threads, invert_batch, right_divide_batch};
+use axisight_numerics::{Threads, invert_batch, right_divide_batch};
 use nalgebra::{Complex, DMatrix};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 

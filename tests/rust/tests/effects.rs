@@ -4,8 +4,8 @@
 
 use axisight_core::effects::{Acts, EFFECTS, EffectInfo, Role, Scope, build};
 use axisight_core::robot::{EffectSetting, Plant, RobotDescription, equilibrium};
-use axisight_core::scalar::{Dual, Scalar};
 use axisight_core::simulation::{Drive, Method, Status};
+use axisight_scalar::{Dual, Scalar};
 use axisight_tests::{PRESET, Trace, effect, plant, relative, robot, sines, trace};
 
 const SAMPLES: usize = 120;

@@ -1,7 +1,8 @@
 //! Without damping, friction and drive the plant conserves energy.
 
-use axisight_core::robot::{Plant, RigidBody, RobotDescription, linearize, modes};
+use axisight_core::robot::{Plant, RigidBody, RobotDescription, linearize};
 use axisight_core::simulation::{Drive, Method};
+use axisight_fit::frequency::modes;
 use axisight_tests::{ARM, PRESET, largest, plant, robot, trace};
 
 const SAMPLES: usize = 500;

@@ -1,9 +1,9 @@
 //! Accumulators, small complex systems, the DFT convention.
 
-use axisight_core::ensemble::{Moments, Purpose, QuantileSketch, generator};
-use axisight_core::excitation::{Grid, Multisine, Square, directions};
-use axisight_core::frf::{Output, Spectra, response};
-use axisight_core::signal::{Dft, DftScratch, SmallSolver};
+use axisight_numerics::{Dft, DftScratch, SmallSolver};
+use axisight_spectra::ensemble::{Moments, Purpose, QuantileSketch, generator};
+use axisight_spectra::excitation::{Grid, Multisine, Square, directions};
+use axisight_spectra::frf::{Output, Spectra, response};
 use axisight_tests::Random;
 use nalgebra::{Complex, DMatrix};
 

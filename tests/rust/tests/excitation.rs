@@ -1,11 +1,11 @@
 //! Line transforms and the search for low crest factors.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use axisight_core::excitation::crest::{
+use axisight_numerics::LineTransform;
+use axisight_spectra::excitation::crest::{
     Budget, Clipping, CrestProblem, LpRefinement, Start, peak, search,
 };
-use axisight_core::excitation::random_phases;
-use axisight_core::signal::LineTransform;
+use axisight_spectra::excitation::random_phases;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;

@@ -1,12 +1,12 @@
 //! Fits find what was put in, and say how well they know it.
 
-use axisight_core::identification::{
+use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription, equilibrium};
+use axisight_core::simulation::{Drive, Method, measurement_noise};
+use axisight_fit::identification::{
     Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
     ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
-use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription, equilibrium};
-use axisight_core::signal::Weighting;
-use axisight_core::simulation::{Drive, Method, measurement_noise};
+use axisight_numerics::Weighting;
 use axisight_tests::{ARM, PRESET, effect, largest, plant, robot, sines, trace};
 use nalgebra::{DMatrix, DVector};
 

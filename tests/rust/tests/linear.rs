@@ -1,11 +1,11 @@
 //! The linear plant in the sampled loop: exactness, order of the ripple, and the nonlinear plant.
 
 use axisight_core::robot::{Controller, EffectSetting, RobotDescription, linearize};
-use axisight_core::scalar::{Lanes, Scalar};
 use axisight_core::simulation::{
     Drive, LinearPlant, LinearPlantError, Method, Run, SimulationError, Status, measurement_noise,
     simulate_linear,
 };
+use axisight_scalar::{Lanes, Scalar};
 use axisight_tests::{
     ARM, PRESET, ROTOR, Trace, effect, largest, plant, relative, robot, sines, trace,
 };

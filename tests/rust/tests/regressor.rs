@@ -2,9 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use axisight_core::robot::{RigidBody, RobotDescription};
-use axisight_graybox::regressor::{
-    Extra, FactorRequest, Motion, Regressor, Signal, link_parameters,
-};
+use axisight_fit::regressor::{Extra, FactorRequest, Motion, Regressor, Signal, link_parameters};
 use axisight_tests::{ARM, PRESET, Random, largest, relative, robot};
 
 fn identity(n: usize) -> Vec<f64> {

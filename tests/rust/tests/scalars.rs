@@ -1,8 +1,8 @@
 //! One model, several scalars: the same numbers whichever carries them.
 
 use axisight_core::robot::EffectSetting;
-use axisight_core::scalar::{Dual, Lanes, Scalar};
 use axisight_core::simulation::{Drive, Method, Status, measurement_noise};
+use axisight_scalar::{Dual, Lanes, Scalar};
 use axisight_tests::{PRESET, Trace, effect, plant, robot, sines, trace};
 
 const SAMPLES: usize = 150;

@@ -1,7 +1,7 @@
 //! Finite bandwidth of the current loop.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "actuator_bandwidth",

@@ -1,7 +1,7 @@
 //! Coulomb friction that differs between the two directions of motion.
 
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "asymmetric_friction",

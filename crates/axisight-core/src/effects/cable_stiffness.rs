@@ -1,7 +1,7 @@
 //! Stiffness of cables and hoses along the joint.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "cable_stiffness",

@@ -1,7 +1,7 @@
 //! Coulomb friction.
 
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "coulomb_friction",

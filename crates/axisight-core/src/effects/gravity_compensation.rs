@@ -1,7 +1,7 @@
 //! Torque of a gravity balancer on the joint.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "gravity_compensation",

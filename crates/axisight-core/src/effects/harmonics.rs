@@ -1,6 +1,6 @@
 //! Sums of harmonics of the motor angle, shared by the ripple effects.
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// `sum_i c_i cos(n_i phi) + s_i sin(n_i phi)`.
 #[derive(Debug, Clone)]

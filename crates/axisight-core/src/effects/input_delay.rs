@@ -1,7 +1,7 @@
 //! Transport delay between commanded and applied torque.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "input_delay",

@@ -1,7 +1,7 @@
 //! Gear stiffness other than the simulator's.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "joint_stiffness",

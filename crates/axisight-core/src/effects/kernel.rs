@@ -1,7 +1,7 @@
 //! What an effect is: its description and the points where it may act.
 
 use crate::robot::Chain;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// Whether an effect belongs to one driven axis or to the arm as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ pub use kernel::{
     Acts, EffectError, EffectInfo, Kernel, Motor, ParameterInfo, PlantParameters, Role, Scope,
 };
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 macro_rules! effect_table {
     ($($module:ident),* $(,)?) => {

@@ -1,7 +1,7 @@
 //! Gear stiffness that changes with load.
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "nonlinear_stiffness",

@@ -2,7 +2,7 @@
 
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
 use crate::robot::Body;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 const fn coordinate(name: &'static str, neutral: f64) -> ParameterInfo {
     ParameterInfo {

@@ -1,7 +1,7 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "presliding_friction",

@@ -1,7 +1,7 @@
 //! Drag that grows with the square of the speed.
 
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "quadratic_drag",

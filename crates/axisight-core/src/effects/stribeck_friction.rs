@@ -1,7 +1,7 @@
 //! Stribeck friction: Coulomb friction with an excess at low speed.
 
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "stribeck_friction",

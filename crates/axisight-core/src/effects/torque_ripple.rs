@@ -2,7 +2,7 @@
 
 use super::harmonics::{Harmonics, harmonic_parameters};
 use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_ripple",

@@ -3,7 +3,7 @@
 use super::description::RobotDescription;
 use super::parameters::Parameter;
 use crate::effects::Kernel;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 
 use super::description::{Joint, Link, Motion, RobotDescription};
 use super::vector::{Mat3, Vec3, rotation};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// Mass properties of one link, differentiable.
 #[derive(Debug, Clone, Copy)]

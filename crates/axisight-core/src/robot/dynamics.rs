@@ -15,7 +15,7 @@ use super::chain::{Body, Chain, ChainJoint};
 use super::description::Motion;
 use super::linear_algebra::solve_symmetric;
 use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::array::from_fn;
 
 /// How a joint moves its link, coordinate axes told apart because they cost a third.

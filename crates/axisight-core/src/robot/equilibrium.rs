@@ -1,7 +1,7 @@
 //! Static equilibrium: elastic joints settled under gravity, motors holding.
 
 use super::plant::Plant;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// A plant at rest.
 #[derive(Debug, Clone)]

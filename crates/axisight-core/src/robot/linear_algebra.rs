@@ -1,6 +1,6 @@
 //! Small symmetric solves over any scalar.
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// Solve `a x = b` in place for a symmetric positive definite `a` (upper triangle
 /// read, destroyed).

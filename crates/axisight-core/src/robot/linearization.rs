@@ -3,7 +3,7 @@
 use super::description::RobotDescription;
 use super::equilibrium::{Equilibrium, EquilibriumError, equilibrium};
 use super::plant::{EffectSetting, Plant, PlantError};
-use crate::scalar::{Dual, Scalar};
+use axisight_scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 
 /// Seeds per pass; eight partials fill two vector registers.

@@ -2,7 +2,7 @@
 
 use super::chain::Chain;
 use super::description::RobotDescription;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// One physical parameter; names are `<joint name>.<quantity>`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

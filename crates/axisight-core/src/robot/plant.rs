@@ -12,7 +12,7 @@ use super::dynamics::{Dynamics, DynamicsScratch, MOST_JOINTS, sized};
 use super::linear_algebra::{factorize, solve_factorized};
 use super::parameters::Parameter;
 use crate::effects::{self, EffectError, EffectInfo, Kernel, Motor, PlantParameters, Scope};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::sync::Arc;
 
 /// An effect with its place and parameters.

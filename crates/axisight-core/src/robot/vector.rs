@@ -1,6 +1,6 @@
 //! Three-vectors, rotations and inertias over any scalar.
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Sub};
 

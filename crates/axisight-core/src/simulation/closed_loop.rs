@@ -5,7 +5,7 @@ use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effects::EffectError;
 use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What drives a run; arrays are row-major `(n_samples, n_axes)`, one per lane.

@@ -1,7 +1,7 @@
 //! The sampled controllers of `axisight.robot/1`.
 
 use crate::robot::Controller;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// A controller with its memory; commands are motor torques [Nm].
 pub(super) struct ControlLoop<S> {

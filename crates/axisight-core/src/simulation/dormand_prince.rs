@@ -2,7 +2,7 @@
 
 use super::method::{Interval, Stepper};
 use super::torque_path::Line;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// Stages, the last one for the error estimate only.
 pub(super) const STAGES: usize = 7;

@@ -2,7 +2,7 @@
 
 use super::method::{Interval, Stepper};
 use super::torque_path::Line;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 
 /// One step of length `h` [s].
 pub(super) fn step<S: Scalar>(

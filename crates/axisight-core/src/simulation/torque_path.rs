@@ -9,7 +9,7 @@
 
 use crate::effects::Kernel;
 use crate::robot::Axis;
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::sync::Arc;
 
 /// Torque over a sub-step: `mean + slope (s - 1/2)` for `s` from 0 to 1.

@@ -1,7 +1,7 @@
 //! Exact Jacobian of the plant by dual numbers.
 
 use crate::robot::{DynamicsScratch, EffectSetting, Plant, PlantError, RobotDescription};
-use crate::scalar::{Dual, Scalar};
+use axisight_scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 
 /// Seeds per pass; eight partials fill two vector registers.

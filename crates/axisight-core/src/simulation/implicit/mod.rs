@@ -8,7 +8,7 @@ mod rosenbrock;
 use super::method::{Effort, Interval, Method, Stepper};
 use super::torque_path::{Line, SampleTorque};
 use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use jacobian::JacobianPlant;
 use nalgebra::DMatrix;
 use radau_iia::RadauIia;

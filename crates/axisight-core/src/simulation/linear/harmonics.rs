@@ -6,7 +6,7 @@
 //! product, order `n` is good to about `n * 5e-16` (4e-14 for 72), whatever the
 //! angle; the sine of the rounded product `n phi` is off by `1e-16 n phi`.
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::collections::{BTreeMap, HashSet};
 
 /// `powers[next] = powers[left] * powers[right]`, the right one conjugated or not.
@@ -345,7 +345,7 @@ fn one_product_away(reached: &[u32]) -> BTreeMap<u32, Product> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scalar::Lanes;
+    use axisight_scalar::Lanes;
 
     /// Orders and triples of the thesis, Table 8.1.
     const TABLE: [u32; 8] = [2, 3, 10, 12, 18, 36, 48, 72];

@@ -7,7 +7,7 @@ use crate::robot::{
     EffectSetting, Linearization, LinearizationError, Plant, PlantError, RobotDescription,
     linearize,
 };
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -4,13 +4,13 @@ use super::harmonics::Ripple;
 use super::plant::LinearPlant;
 use super::propagator::Propagator;
 use super::tiles::Tiles;
-use crate::scalar::Scalar;
 use crate::simulation::closed_loop::{
     Run, Sample, Signals, SimulationError, Status, check, lane_value,
 };
 use crate::simulation::controller::ControlLoop;
 use crate::simulation::method::Method;
 use crate::simulation::torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};
+use axisight_scalar::Scalar;
 use std::borrow::Cow;
 use std::sync::atomic::Ordering;
 

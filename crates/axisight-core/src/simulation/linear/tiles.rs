@@ -1,6 +1,6 @@
 //! Products of a small constant matrix with lanes of vectors.
 
-use crate::scalar::Scalar;
+use axisight_scalar::Scalar;
 use nalgebra::DMatrix;
 
 /// Rows computed together. Eight independent sums of two-register lanes cover the latency

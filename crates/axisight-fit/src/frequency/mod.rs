@@ -1,0 +1,28 @@
+//! The linearized robot fitted to frequency responses (thesis section 3.4.2).
+
+mod checks;
+mod design;
+mod direct;
+mod hold;
+mod minimize;
+mod modal;
+mod modes;
+mod problem;
+mod residuals;
+mod response;
+mod second_order;
+mod weighting;
+
+pub use design::{Design, DesignError, DesignOptions, design};
+pub use hold::Hold;
+pub use minimize::{FrequencyFit, SearchOptions, SearchStatus, minimize};
+pub use modes::{Mode, ModesError, modes};
+pub use problem::{
+    FrequencyFitError, FrequencyOptions, FrequencyParameter, FrequencyProblem, Normal, Scatter,
+};
+pub use response::{Columns, evaluate};
+pub use second_order::{Linearizer, SecondOrder, SecondOrderDerivative, SecondOrderError};
+pub use weighting::{Criterion, PoseResponse, Uncertainty};
+
+/// Information on the parameters, symmetric.
+pub type InformationMatrix = nalgebra::DMatrix<f64>;

@@ -1,0 +1,404 @@
+//! Residuals of all operating points and their normal equations.
+
+use super::checks::{check_parameters, check_pose, invalid};
+use super::hold::Hold;
+use super::residuals::Residuals;
+use super::response::{Columns, evaluate};
+use super::second_order::{Linearizer, SecondOrderError};
+use super::weighting::{Criterion, PoseResponse, Whitening, whitening};
+use crate::identification::Loss;
+use axisight_core::robot::{EffectSetting, Parameter, RobotDescription};
+use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+type C = Complex<f64>;
+
+/// One number to fit; bounds, start and prior in its own unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrequencyParameter {
+    /// What it is.
+    pub parameter: Parameter,
+    /// Where the search starts.
+    pub initial: f64,
+    /// Lower bound.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+    /// Searched over its logarithm; start and bounds are positive.
+    pub logarithmic: bool,
+    /// Mean and standard deviation of what is known beforehand.
+    pub prior: Option<(f64, f64)>,
+    /// Kept at its initial value.
+    pub frozen: bool,
+}
+
+/// Why responses cannot be fitted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrequencyFitError {
+    /// Misuse.
+    #[error("{field}: expected {expected}, got {got}")]
+    Invalid {
+        /// Argument.
+        field: String,
+        /// What it should be.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// A weighted criterion without uncertainty.
+    #[error(
+        "response {pose}: expected a variance or covariance for a weighted criterion, got none"
+    )]
+    NoVariance {
+        /// Operating point, from 1.
+        pose: usize,
+    },
+    /// A covariance that is none.
+    #[error("response {pose}: expected a positive definite covariance at line {line}")]
+    Covariance {
+        /// Operating point, from 1.
+        pose: usize,
+        /// Line, from 1.
+        line: usize,
+    },
+    /// The robot cannot be linearized.
+    #[error("operating point {pose}: {source}")]
+    Robot {
+        /// Operating point, from 1.
+        pose: usize,
+        /// Why.
+        source: SecondOrderError,
+    },
+    /// A response of the model is not finite or, for a logarithm, zero.
+    #[error(
+        "operating point {pose}: expected a finite response that is not zero at {frequency_hz} Hz \
+         from axis {input} to axis {output}; leave the element out if the axes do not couple"
+    )]
+    NotFinite {
+        /// Operating point, from 1.
+        pose: usize,
+        /// Line [Hz].
+        frequency_hz: f64,
+        /// Axis, from 1.
+        output: usize,
+        /// Axis, from 1.
+        input: usize,
+    },
+    /// Another thread asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What a fit is made of.
+pub struct FrequencyProblem {
+    pub(super) parameters: Vec<FrequencyParameter>,
+    pub(super) free: Vec<usize>,
+    robot: RobotDescription,
+    settings: Vec<EffectSetting<f64>>,
+    hold: Hold,
+    criterion: Criterion,
+    loss: Loss,
+    poses: Vec<Prepared>,
+    block_lines: usize,
+    cancel: Arc<AtomicBool>,
+}
+
+struct Prepared {
+    data: PoseResponse,
+    whitening: Whitening,
+    /// Variance that the response's uncertainty makes a residual have, per element.
+    expected: Option<Vec<f64>>,
+}
+
+/// Settings of [`FrequencyProblem::new`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrequencyOptions {
+    /// How the torque reaches the plant.
+    pub hold: Hold,
+    /// What is compared.
+    pub criterion: Criterion,
+    /// Weigh by the response's uncertainty.
+    pub weighted: bool,
+    /// Loss of the magnitude of a complex residual.
+    pub loss: Loss,
+    /// Lines in a row whose residuals may depend on each other, for the sandwich covariance.
+    pub block_lines: usize,
+}
+
+/// Loss and normal equations of the free parameters (logarithms where searched so).
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// Sum of losses.
+    pub loss: f64,
+    /// `J^T W J`.
+    pub matrix: DMatrix<f64>,
+    /// `J^T W r`.
+    pub gradient: DVector<f64>,
+}
+
+/// What the end of a fit reports besides [`Normal`].
+#[derive(Debug, Clone)]
+pub struct Scatter {
+    /// Covariance of `J^T W r` by the response's uncertainty; `None` if unknown.
+    pub expected: Option<DMatrix<f64>>,
+    /// Sum over blocks of lines of the squared gradient.
+    pub blocks: DMatrix<f64>,
+    /// Complex residuals of all poses, `(line, output, input)` one after the other.
+    pub residual: Vec<C>,
+    /// Residuals that count.
+    pub count: usize,
+}
+
+impl FrequencyProblem {
+    /// Check and whiten.
+    ///
+    /// # Errors
+    /// [`FrequencyFitError`] for misuse.
+    pub fn new(
+        robot: RobotDescription,
+        settings: Vec<EffectSetting<f64>>,
+        parameters: Vec<FrequencyParameter>,
+        poses: Vec<PoseResponse>,
+        options: FrequencyOptions,
+        cancel: Arc<AtomicBool>,
+    ) -> Result<Self, FrequencyFitError> {
+        check_parameters(&parameters, &robot)?;
+        if poses.is_empty() {
+            return Err(invalid("responses", "at least one operating point", "none"));
+        }
+        let mut prepared = Vec::with_capacity(poses.len());
+        for (number, data) in poses.into_iter().enumerate() {
+            check_pose(&data, robot.n_axes(), number, options)?;
+            let (whitening, expected) =
+                whitening(&data, options.criterion, options.weighted, number)?;
+            prepared.push(Prepared {
+                data,
+                whitening,
+                expected,
+            });
+        }
+        let free = (0..parameters.len())
+            .filter(|i| !parameters[*i].frozen)
+            .collect();
+        Ok(Self {
+            free,
+            parameters,
+            robot,
+            settings,
+            hold: options.hold,
+            criterion: options.criterion,
+            loss: options.loss,
+            poses: prepared,
+            block_lines: options.block_lines.max(1),
+            cancel,
+        })
+    }
+
+    /// Values of all parameters in their own units; `theta` are those of the search.
+    pub fn values(&self, theta: &[f64]) -> Vec<f64> {
+        let natural = |(p, x): (&FrequencyParameter, &f64)| match (p.frozen, p.logarithmic) {
+            (true, _) => p.initial,
+            (false, true) => x.exp(),
+            (false, false) => *x,
+        };
+        self.parameters.iter().zip(theta).map(natural).collect()
+    }
+
+    /// Loss at `theta`, with the normal equations if `derivatives`.
+    ///
+    /// # Errors
+    /// [`FrequencyFitError`] where the model does not hold.
+    pub fn evaluate(&self, theta: &[f64], derivatives: bool) -> Result<Normal, FrequencyFitError> {
+        let parts = self.each_pose(theta, derivatives, |_, residuals| residuals.normal())?;
+        let n = if derivatives { self.free.len() } else { 0 };
+        let mut sum = Normal {
+            loss: 0.0,
+            matrix: DMatrix::zeros(n, n),
+            gradient: DVector::zeros(n),
+        };
+        for part in parts {
+            sum.loss += part.loss;
+            sum.matrix += part.matrix;
+            sum.gradient += part.gradient;
+        }
+        Ok(sum)
+    }
+
+    /// Normal matrix of every pose at `theta`: the information it gives.
+    ///
+    /// # Errors
+    /// [`FrequencyFitError`] where the model does not hold.
+    pub fn information(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, FrequencyFitError> {
+        self.each_pose(theta, true, |_, residuals| residuals.normal().matrix)
+    }
+
+    /// What the residuals at `theta` say of the covariance.
+    ///
+    /// # Errors
+    /// [`FrequencyFitError`] where the model does not hold.
+    pub fn scatter(&self, theta: &[f64]) -> Result<Scatter, FrequencyFitError> {
+        let parts = self.each_pose(theta, true, |pose, residuals| {
+            let lines = pose.data.frequency_hz.len();
+            (
+                pose.expected.as_ref().map(|v| residuals.expected(v, lines)),
+                residuals.blocks(lines, self.block_lines),
+                residuals.complex(lines),
+                pose.n_used(),
+            )
+        })?;
+        let n = self.free.len();
+        let mut out = Scatter {
+            expected: Some(DMatrix::zeros(n, n)),
+            blocks: DMatrix::zeros(n, n),
+            residual: Vec::new(),
+            count: 0,
+        };
+        for (expected, blocks, residual, count) in parts {
+            out.expected = out.expected.zip(expected).map(|(sum, part)| sum + part);
+            out.blocks += blocks;
+            out.residual.extend(residual);
+            out.count += 2 * count;
+        }
+        Ok(out)
+    }
+
+    fn each_pose<T: Send>(
+        &self,
+        theta: &[f64],
+        derivatives: bool,
+        take: impl Fn(&Prepared, Residuals) -> T + Sync,
+    ) -> Result<Vec<T>, FrequencyFitError> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(FrequencyFitError::Cancelled);
+        }
+        let values = self.values(theta);
+        let parameters = self.parameters.iter().map(|p| p.parameter);
+        let overrides: Vec<_> = parameters.zip(values.iter().copied()).collect();
+        let seeds: &[usize] = if derivatives { &self.free } else { &[] };
+        let linearizer = Linearizer::new(&self.robot, &self.settings, &overrides, seeds)
+            .map_err(|source| FrequencyFitError::Robot { pose: 1, source })?;
+        let slope = |i: &usize| {
+            if self.parameters[*i].logarithmic {
+                values[*i]
+            } else {
+                1.0
+            }
+        };
+        let slopes: Vec<f64> = seeds.iter().map(slope).collect();
+        let one = |(number, pose): (usize, &Prepared)| {
+            let residuals = self.residuals(number, pose, &linearizer, &slopes)?;
+            Ok(take(pose, residuals))
+        };
+        self.poses.par_iter().enumerate().map(one).collect()
+    }
+
+    fn residuals(
+        &self,
+        number: usize,
+        pose: &Prepared,
+        linearizer: &Linearizer<'_>,
+        slopes: &[f64],
+    ) -> Result<Residuals, FrequencyFitError> {
+        let failed = |source| FrequencyFitError::Robot {
+            pose: number + 1,
+            source,
+        };
+        let (model, derivatives) = linearizer.at(&pose.data.joint_angle).map_err(failed)?;
+        let columns = evaluate(&model, &derivatives, &pose.data.frequency_hz, self.hold)
+            .ok_or(failed(SecondOrderError::Mass))?;
+        let mut residuals = self.compare(pose, &columns, slopes);
+        if let Some(bad) = residuals.values.iter().position(|r| !r.is_finite()) {
+            let lines = pose.data.frequency_hz.len();
+            let (element, m) = (bad / (2 * lines), self.robot.n_axes());
+            return Err(FrequencyFitError::NotFinite {
+                pose: number + 1,
+                frequency_hz: pose.data.frequency_hz[bad % lines],
+                output: element / m + 1,
+                input: element % m + 1,
+            });
+        }
+        if let Whitening::Lines(matrices) = &pose.whitening {
+            residuals.whiten(matrices);
+        }
+        residuals.weigh(self.loss, pose.data.frequency_hz.len());
+        Ok(residuals)
+    }
+
+    /// Deviations and their derivatives, whitened where elements stand alone.
+    fn compare(&self, pose: &Prepared, columns: &Columns, slopes: &[f64]) -> Residuals {
+        let (lines, m) = (pose.data.frequency_hz.len(), self.robot.n_axes());
+        let size = 2 * lines * m * m;
+        let mut values = vec![0.0; size];
+        let mut jacobian = vec![vec![0.0; size]; slopes.len()];
+        let powers: Vec<C> = pose
+            .data
+            .frequency_hz
+            .iter()
+            .map(|f| power(*f, pose.data.order))
+            .collect();
+        let mut factor = vec![C::default(); lines];
+        for element in 0..m * m {
+            let (a, b) = (element / m, element % m);
+            let (re, im) = columns.parts(0, a, b);
+            let place = element * 2 * lines;
+            let (out_re, out_im) = values[place..place + 2 * lines].split_at_mut(lines);
+            for line in 0..lines {
+                let k = line * m * m + element;
+                let weight = match &pose.whitening {
+                    Whitening::Elements(factors) => factors[k],
+                    Whitening::Lines(_) => 1.0,
+                };
+                if weight == 0.0 {
+                    factor[line] = C::default();
+                    continue;
+                }
+                let model = C::new(re[line], im[line]) * powers[line];
+                let (deviation, slope) = match self.criterion {
+                    Criterion::Linear => (model - pose.data.response[k], powers[line]),
+                    // The ratio has the phase difference as its angle, wherever either phase is.
+                    Criterion::Logarithmic => {
+                        ((model / pose.data.response[k]).ln(), powers[line] / model)
+                    }
+                };
+                (out_re[line], out_im[line]) = (weight * deviation.re, weight * deviation.im);
+                factor[line] = slope * weight;
+            }
+            for (p, (column, slope)) in jacobian.iter_mut().zip(slopes).enumerate() {
+                let (re, im) = columns.parts(p + 1, a, b);
+                let (out_re, out_im) = column[place..place + 2 * lines].split_at_mut(lines);
+                for line in 0..lines {
+                    let f = factor[line] * *slope;
+                    out_re[line] = f.re * re[line] - f.im * im[line];
+                    out_im[line] = f.re * im[line] + f.im * re[line];
+                }
+            }
+        }
+        Residuals {
+            values,
+            weight: Vec::new(),
+            loss: 0.0,
+            jacobian,
+        }
+    }
+}
+
+/// `(i w)^order`.
+fn power(frequency_hz: f64, order: u8) -> C {
+    let w = std::f64::consts::TAU * frequency_hz;
+    match order {
+        0 => C::new(1.0, 0.0),
+        1 => C::new(0.0, w),
+        _ => C::new(-w * w, 0.0),
+    }
+}
+
+impl Prepared {
+    fn n_used(&self) -> usize {
+        match &self.whitening {
+            Whitening::Elements(factors) => factors.iter().filter(|f| **f > 0.0).count(),
+            Whitening::Lines(_) => self.data.response.len(),
+        }
+    }
+}

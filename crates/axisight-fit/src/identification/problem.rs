@@ -1,0 +1,109 @@
+//! What a fit needs to know of a problem.
+
+use super::gram::Block;
+use axisight_core::robot::{EffectSetting, Parameter};
+use axisight_scalar::Scalar;
+
+/// What a fitted number is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A parameter of the robot.
+    Robot(Parameter),
+    /// A parameter of an effect: position in the list of effects, then in its table.
+    Effect(usize, usize),
+}
+
+/// One number to fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitParameter {
+    /// What it is.
+    pub target: Target,
+    /// Where the search starts.
+    pub initial: f64,
+    /// Lower bound.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+    /// Natural size of a change; makes parameters of any unit comparable.
+    pub scale: f64,
+    /// Mean and standard deviation of what is known beforehand.
+    pub prior: Option<(f64, f64)>,
+    /// Kept at its initial value.
+    pub frozen: bool,
+    /// Its sensitivity changes little: computed once, or taken from an earlier fit,
+    /// and refreshed only when asked for.
+    pub nuisance: bool,
+}
+
+/// Residuals and some columns of their Jacobian.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    /// Whitened residuals, model minus measurement.
+    pub residual: Vec<f64>,
+    /// Derivatives of the residuals, one vector per requested parameter.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Why a problem cannot be evaluated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// The model does not hold at these parameters (unstable, too stiff, no equilibrium).
+    #[error("the simulation failed: {0}")]
+    Failed(String),
+    /// Another thread asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// Misuse, also at the first evaluation.
+    #[error("{field}: expected {expected}, got {got}")]
+    Invalid {
+        /// Argument.
+        field: String,
+        /// What it should be.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+}
+
+/// A nonlinear least-squares problem over logs.
+pub trait Problem: Sync {
+    /// Residuals at `theta` and their derivatives with respect to the parameters `columns`.
+    ///
+    /// # Errors
+    /// [`ProblemError::Failed`] where the model does not hold.
+    fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError>;
+    /// How the residual vector is cut into blocks.
+    fn blocks(&self) -> Vec<Block>;
+}
+
+/// Parameters of a plant at `theta`, those in `seeds` carrying derivatives.
+pub(super) fn seeded<S: Scalar>(
+    parameters: &[FitParameter],
+    effects: &[EffectSetting<f64>],
+    theta: &[f64],
+    seeds: &[usize],
+) -> (Vec<(Parameter, S)>, Vec<EffectSetting<S>>) {
+    let mut overrides = Vec::new();
+    let mut settings: Vec<EffectSetting<S>> = effects
+        .iter()
+        .map(|e| EffectSetting {
+            name: e.name.clone(),
+            axis: e.axis,
+            parameters: e.parameters.iter().map(|p| S::constant(*p)).collect(),
+        })
+        .collect();
+    for (i, (parameter, value)) in parameters.iter().zip(theta).enumerate() {
+        let constant = S::constant(*value);
+        let seed = seeds.iter().position(|s| *s == i);
+        let number = seed.map_or(constant, |s| constant.seeded(s));
+        match parameter.target {
+            Target::Robot(p) => overrides.push((p, number)),
+            Target::Effect(e, j) => {
+                if let Some(slot) = settings.get_mut(e).and_then(|s| s.parameters.get_mut(j)) {
+                    *slot = number;
+                }
+            }
+        }
+    }
+    (overrides, settings)
+}

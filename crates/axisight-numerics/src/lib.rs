@@ -1,0 +1,34 @@
+//! Numerics with concrete types: Fourier transforms, eigenvalues, small complex systems in
+//! batches, weighting of residuals over frequency.
+//!
+//! A crate of its own because generic libraries are compiled where they are used with a type:
+//! rustfft and faer are used here and nowhere else, so that a change anywhere above builds
+//! neither of them again.
+
+// Kernels are generic over the scalar and must be inlined to become vector code.
+#![allow(clippy::inline_always)]
+
+mod adjugate;
+mod ahead;
+mod complex_batch;
+mod complex_solve;
+mod dense;
+mod dft;
+mod lane_fft;
+mod line_dft;
+mod line_plans;
+mod line_transform;
+mod lockstep_lu;
+mod pair;
+mod pseudo_inverse;
+mod weighting;
+
+pub use complex_batch::{BatchShapeError, Threads, invert_batch, right_divide_batch};
+pub use complex_solve::SmallSolver;
+pub use dense::{eigen, solve_positive};
+pub use dft::{Dft, DftScratch};
+pub use line_dft::{LineDft, LineDftScratch};
+pub use line_plans::line_plan;
+pub use line_transform::{GridNumber, LineGrid, LineTransform};
+pub use pseudo_inverse::PseudoInverse;
+pub use weighting::{Weighter, Weighting, WeightingError};

@@ -1,0 +1,109 @@
+//! Random-phase multisines, Wernholt (2004), (7.5).
+
+use super::{ExcitationError, whole_samples};
+use crate::ensemble::{Purpose, generator};
+use axisight_numerics::Dft;
+use rand::Rng;
+
+/// Which lines of the band are excited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Grid {
+    /// All of them.
+    All,
+    /// Odd harmonics of the period only, which keeps even nonlinear distortion off the lines.
+    Odd,
+}
+
+/// A multisine with flat amplitude spectrum, scaled to its largest sample.
+#[derive(Debug, Clone)]
+pub struct Multisine {
+    dft: Dft,
+    lines: Vec<usize>,
+    peak: f64,
+}
+
+impl Multisine {
+    /// Period `period_s`, lines from `band_hz.0` to `band_hz.1` inclusive, largest absolute
+    /// sample `peak` (in the unit of the signal).
+    ///
+    /// # Errors
+    /// [`ExcitationError`] if the period is no whole number of samples, the band holds no
+    /// line or reaches the Nyquist frequency, or the peak is not a positive number.
+    pub fn new(
+        period_s: f64,
+        band_hz: (f64, f64),
+        grid: Grid,
+        peak: f64,
+        sample_time: f64,
+    ) -> Result<Self, ExcitationError> {
+        let n = whole_samples("multisine.period_s", period_s, sample_time)?;
+        let (low, high) = band_hz;
+        let nyquist = 0.5 / sample_time;
+        if !(low > 0.0 && high >= low && high < nyquist) {
+            let expected = format!("0 < low <= high < {nyquist} Hz (Nyquist)");
+            let got = format!("{low} to {high}");
+            return Err(ExcitationError::new("multisine.band_hz", expected, got));
+        }
+        if !(peak > 0.0 && peak.is_finite()) {
+            let expected = "a positive number";
+            return Err(ExcitationError::new("multisine.peak_rad_s", expected, peak));
+        }
+        // A line on the edge of the band belongs to it, whatever the rounding.
+        let near = 1e-9 * high * period_s;
+        let inside = |k: &usize| {
+            let x = *k as f64;
+            x >= low * period_s - near && x <= high * period_s + near
+        };
+        let lines: Vec<usize> = (1..n.div_ceil(2))
+            .filter(inside)
+            .filter(|k| grid == Grid::All || k % 2 == 1)
+            .collect();
+        if lines.is_empty() {
+            let expected = format!("a band that holds a multiple of 1/{period_s} Hz");
+            let got = format!("{low} to {high}");
+            return Err(ExcitationError::new("multisine.band_hz", expected, got));
+        }
+        Ok(Self {
+            dft: Dft::new(n),
+            lines,
+            peak,
+        })
+    }
+
+    /// Excited lines, as multiples of one over the period.
+    pub fn lines(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// Transform of one period.
+    pub fn dft(&self) -> &Dft {
+        &self.dft
+    }
+
+    /// Phases of `run` [rad], uniform over the circle.
+    pub fn phases(&self, seed: u64, run: u64) -> Vec<f64> {
+        random_phases(self.lines.len(), seed, run)
+    }
+
+    /// One period with the given phases, scaled to the peak.
+    ///
+    /// The peak is that of the samples; between them the signal may be higher by
+    /// `1 - cos(pi f_max T)` at most to leading order, 0.2 % at 50 samples per period.
+    pub fn period(&self, phases: &[f64]) -> Vec<f64> {
+        let flat = vec![1.0; self.lines.len()];
+        let mut x = self.dft.sum_of_sines(&self.lines, &flat, phases);
+        let largest = x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let scale = self.peak / largest;
+        for v in &mut x {
+            *v *= scale;
+        }
+        x
+    }
+}
+
+/// `n` phases [rad], uniform over the circle, of realization `run`.
+pub fn random_phases(n: usize, seed: u64, run: u64) -> Vec<f64> {
+    let mut rng = generator(seed, Purpose::Phases, run);
+    let turn = std::f64::consts::TAU;
+    (0..n).map(|_| rng.random::<f64>() * turn).collect()
+}
