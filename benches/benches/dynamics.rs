@@ -3,7 +3,8 @@
 //! Times of lane types are per call, that is for all lanes together.
 
 use axisight_benches::{preset, reference};
-use axisight_core::robot::{Plant, RigidBody, equilibrium};
+use axisight_core::plant::{Plant, equilibrium};
+use axisight_core::robot::RigidBody;
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
 use axisight_scalar::{Dual, Lanes, Scalar};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -30,7 +31,7 @@ fn right_hand_side<S: Scalar>(c: &mut Criterion, label: &str) {
     let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5]) else {
         return;
     };
-    let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+    let mut x = plant.state_at_rest(&rest);
     for (i, rate) in x.iter_mut().skip(10).enumerate() {
         *rate = S::constant(0.1 * i as f64 - 0.4).seeded(i % 4);
     }

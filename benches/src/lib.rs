@@ -3,7 +3,8 @@
 
 pub mod linear_loop;
 
-use axisight_core::robot::{EffectSetting, RobotDescription, read_robot};
+use axisight_core::robot::{EffectSetting, Place, RobotDescription};
+use axisight_core::robot_file::read_robot;
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
 pub fn preset() -> RobotDescription {
@@ -45,7 +46,7 @@ pub fn table_8_1(n_axes: usize) -> Vec<EffectSetting<f64>> {
     };
     let setting = |axis, name: &str, parameters| EffectSetting {
         name: name.to_owned(),
-        axis: Some(axis),
+        place: Place::Axis(axis),
         parameters,
     };
     let both = |axis| {

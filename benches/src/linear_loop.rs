@@ -6,7 +6,8 @@
 //! propagated exactly, angles in the middle and at the end predicted with the straight line
 //! through value and slope at the start.
 
-use axisight_core::robot::{Controller, EffectSetting, RobotDescription, linearize};
+use axisight_core::plant::linearize;
+use axisight_core::robot::{Controller, EffectSetting, Place, RobotDescription};
 
 const N: usize = 20;
 const M: usize = 3;
@@ -67,7 +68,7 @@ impl PlainLoop {
             })
         });
         let terms = |axis: usize, name: &str| -> Option<Vec<Term>> {
-            let mine = |s: &&EffectSetting<f64>| s.axis == Some(axis) && s.name == name;
+            let mine = |s: &&EffectSetting<f64>| s.place == Place::Axis(axis) && s.name == name;
             let setting = ripple.iter().find(mine)?;
             Some(
                 setting

@@ -2,7 +2,8 @@
 
 use super::record::Recorder;
 use super::study::{Study, StudyError};
-use axisight_core::robot::{EffectSetting, Plant, RobotDescription, equilibrium};
+use axisight_core::plant::{Plant, equilibrium};
+use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{
     Drive, LinearPlant, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
     simulate_linear,

@@ -49,12 +49,8 @@ impl SpreadTarget {
         robot: &RobotDescription,
         settings: &[EffectSetting<f64>],
     ) -> Result<Self, StudyError> {
-        let label = |s: &EffectSetting<f64>| match s.axis {
-            Some(axis) => format!("{}@{}", s.name, axis.wrapping_add(1)),
-            None => s.name.clone(),
-        };
         if let Some((head, tail)) = name.rsplit_once('.')
-            && let Some(index) = settings.iter().position(|s| label(s) == head)
+            && let Some(index) = settings.iter().position(|s| s.label() == head)
         {
             let info = effects::info(&settings[index].name)
                 .map_err(|e| StudyError::field("spread.parameter", "an effect", e))?;
@@ -65,7 +61,7 @@ impl SpreadTarget {
             });
         }
         Parameter::parse(name, robot).map(Self::Robot).map_err(|e| {
-            let labels: Vec<_> = settings.iter().map(label).collect();
+            let labels: Vec<_> = settings.iter().map(EffectSetting::label).collect();
             let expected = format!(
                 "one of {}, or a parameter of an effect of the study ({})",
                 e.expected,

@@ -2,9 +2,8 @@
 
 use super::simulate::{GroupPlant, Model};
 use super::spread::Spread;
-use axisight_core::robot::{
-    Controller, EffectSetting, EquilibriumError, PlantError, RobotDescription,
-};
+use axisight_core::plant::{EquilibriumError, PlantError};
+use axisight_core::robot::{Controller, EffectSetting, RobotDescription};
 use axisight_core::simulation::{LinearPlantError, coloured_noise, measurement_noise};
 use axisight_numerics::SmallSolver;
 use axisight_spectra::excitation::{ExcitationError, Multisine, Square};

@@ -1,23 +1,47 @@
 //! The effect table and effect settings.
 
-use axisight_core::effects::{Acts, EFFECTS, EffectInfo, Role, Scope};
-use axisight_core::robot::EffectSetting;
+use axisight_core::effects::{EFFECTS, EffectInfo, Linear};
+use axisight_core::robot::{EffectSetting, Place};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// An effect as Python hands it over: name, 1-based axis or None, parameters in table order.
-pub type EffectTuple = (String, Option<usize>, Vec<f64>);
+/// Where an effect acts as Python says it: 1-based axis, two of them, or neither for the arm.
+#[derive(FromPyObject, IntoPyObject)]
+pub enum AxisNumber {
+    /// One axis.
+    One(usize),
+    /// Two axes.
+    Two(usize, usize),
+}
+
+/// An effect as Python hands it over: name, axis or axes or None, parameters in table order.
+pub type EffectTuple = (String, Option<AxisNumber>, Vec<f64>);
 
 /// Core settings; axes become 0-based (axis 0 stays out of range and is refused by the core).
 pub fn settings(effects: Vec<EffectTuple>) -> Vec<EffectSetting<f64>> {
-    effects
-        .into_iter()
-        .map(|(name, axis, parameters)| EffectSetting {
-            name,
-            axis: axis.map(|a| a.wrapping_sub(1)),
-            parameters,
-        })
-        .collect()
+    let place = |axis| match axis {
+        None => Place::Arm,
+        Some(AxisNumber::One(i)) => Place::Axis(usize::wrapping_sub(i, 1)),
+        Some(AxisNumber::Two(i, j)) => {
+            Place::Axes(usize::wrapping_sub(i, 1), usize::wrapping_sub(j, 1))
+        }
+    };
+    let setting = |(name, axis, parameters)| EffectSetting {
+        name,
+        place: place(axis),
+        parameters,
+    };
+    effects.into_iter().map(setting).collect()
+}
+
+/// A core setting as Python has it.
+pub fn tuple(setting: &EffectSetting<f64>) -> EffectTuple {
+    let axis = match setting.place {
+        Place::Arm => None,
+        Place::Axis(i) => Some(AxisNumber::One(i.wrapping_add(1))),
+        Place::Axes(i, j) => Some(AxisNumber::Two(i.wrapping_add(1), j.wrapping_add(1))),
+    };
+    (setting.name.clone(), axis, setting.parameters.clone())
 }
 
 /// Every effect with its description and parameters, as plain dictionaries.
@@ -32,36 +56,28 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("summary", info.summary)?;
     out.set_item("equation", info.equation)?;
     out.set_item("source", info.source)?;
-    out.set_item(
-        "scope",
-        if info.scope == Scope::Axis {
-            "axis"
-        } else {
-            "arm"
-        },
-    )?;
-    let acts = match info.acts {
-        Acts::TorquePath => "torque_path",
-        Acts::Motor => "motor",
-        Acts::Transmission => "transmission",
-        Acts::Joint => "joint",
-        Acts::Arm => "arm",
-        Acts::Sensor => "sensor",
+    out.set_item("scope", word(&info.scope))?;
+    out.set_item("acts", word(&info.acts))?;
+    out.set_item("family", word(&info.family))?;
+    out.set_item("contains", info.contains.to_vec())?;
+    out.set_item("parts", info.parts.to_vec())?;
+    let stands_for = info.stands_for.map(|s| (s.quantity, word(&s.change)));
+    out.set_item("stands_for", stands_for)?;
+    let linear = match info.linear {
+        Linear::Waves { .. } => "waves".to_owned(),
+        other => word(&other),
     };
-    out.set_item("acts", acts)?;
+    out.set_item("linear", linear)?;
+    out.set_item("inverse_dynamics", info.inverse_dynamics)?;
+    out.set_item("stiff", info.stiff)?;
+    out.set_item("absorbed_by", words(info.absorbed_by))?;
+    out.set_item("shown_by", words(info.shown_by))?;
     let mut parameters = Vec::new();
     for p in info.parameters {
         let row = PyDict::new(py);
         row.set_item("name", p.name)?;
         row.set_item("unit", p.unit)?;
-        row.set_item(
-            "role",
-            if p.role == Role::Amplitude {
-                "amplitude"
-            } else {
-                "shape"
-            },
-        )?;
+        row.set_item("role", word(&p.role))?;
         row.set_item("neutral", p.neutral)?;
         row.set_item("lower", p.lower)?;
         row.set_item("upper", p.upper)?;
@@ -70,4 +86,20 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     }
     out.set_item("parameters", parameters)?;
     Ok(out)
+}
+
+/// A variant without fields as Python names it: `TorquePath` is `torque_path`.
+fn word(variant: &impl std::fmt::Debug) -> String {
+    let mut out = String::new();
+    for c in format!("{variant:?}").chars() {
+        if c.is_ascii_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.push(c.to_ascii_lowercase());
+    }
+    out
+}
+
+fn words(variants: &[impl std::fmt::Debug]) -> Vec<String> {
+    variants.iter().map(word).collect()
 }

@@ -1,12 +1,12 @@
 //! The robot class.
 
 use crate::convert::{array1, array2, array3, matrix, rows};
-use crate::effects::{EffectTuple, settings};
+use crate::effects::{EffectTuple, settings, tuple};
 use crate::entry::{AxisightError, RobotError, input_error};
-use axisight_core::robot::{
-    Controller, Linearization, Parameter, Plant, RigidBody, RobotDescription, equilibrium,
-    linearize, modes, read_robot, zoh_frequency_response,
-};
+use axisight_core::plant::{Linearization, Plant, equilibrium, linearize, zoh_frequency_response};
+use axisight_core::robot::{Controller, Parameter, RigidBody, RobotDescription};
+use axisight_core::robot_file::read_robot;
+use axisight_fit::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -19,6 +19,9 @@ pub struct Robot {
     source: String,
     changes: Vec<(String, f64)>,
 }
+
+/// What pickle keeps of a robot: its text, the changes made to it, its effects.
+type Kept = (String, Vec<(String, f64)>, Vec<EffectTuple>);
 
 type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
 type Matrix3<'py> = Bound<'py, PyArray3<f64>>;
@@ -96,19 +99,48 @@ impl Robot {
         })
     }
 
-    /// Rebuild a robot from its text and the changes made to it; used by pickle.
-    #[staticmethod]
-    fn _restore(text: String, changes: Vec<(String, f64)>) -> PyResult<Self> {
-        Self::from_toml(text)?.with_parameters(changes)
+    /// Effects that the simulator of this robot has.
+    #[getter]
+    fn effects(&self) -> Vec<EffectTuple> {
+        self.description.effects.iter().map(tuple).collect()
     }
 
-    #[allow(clippy::type_complexity)] // pickle's protocol
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
+    /// The same robot with other effects of its own.
+    fn with_effects(&self, effects: Vec<EffectTuple>) -> PyResult<Self> {
+        let mut description = self.description.clone();
+        description.effects = settings(effects);
+        Plant::<f64>::new(&description, &[], &[]).map_err(input_error)?;
+        Ok(Self {
+            body: RigidBody::new(&description),
+            description,
+            source: self.source.clone(),
+            changes: self.changes.clone(),
+        })
+    }
+
+    /// Relative standard deviation of the robot's own parameters by quantity, where stated.
+    #[getter]
+    fn tolerances(&self) -> Vec<(String, f64)> {
+        self.description.tolerances.clone()
+    }
+
+    /// Rebuild a robot from what pickle kept of it.
+    #[staticmethod]
+    fn _restore(
+        text: String,
+        changes: Vec<(String, f64)>,
+        effects: Vec<EffectTuple>,
+    ) -> PyResult<Self> {
+        Self::from_toml(text)?
+            .with_parameters(changes)?
+            .with_effects(effects)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
         let maker = slf.get_type().getattr("_restore")?;
         let robot = slf.get();
-        Ok((maker, (robot.source.clone(), robot.changes.clone())))
+        let kept = (robot.source.clone(), robot.changes.clone(), robot.effects());
+        Ok((maker, kept))
     }
 
     fn __repr__(&self) -> String {

@@ -2,7 +2,9 @@
 // A helper that cannot go on is a failed test.
 #![allow(clippy::panic, missing_docs)]
 
-use axisight_core::robot::{EffectSetting, Plant, RobotDescription, read_robot};
+use axisight_core::plant::Plant;
+use axisight_core::robot::{EffectSetting, Place, RobotDescription};
+use axisight_core::robot_file::read_robot;
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
 use axisight_scalar::Scalar;
 
@@ -90,7 +92,7 @@ pub fn plant<S: Scalar>(robot: &RobotDescription, settings: &[EffectSetting<S>])
 pub fn effect<S: Scalar>(name: &str, axis: Option<usize>, parameters: &[f64]) -> EffectSetting<S> {
     EffectSetting {
         name: name.to_owned(),
-        axis,
+        place: axis.map_or(Place::Arm, Place::Axis),
         parameters: parameters.iter().map(|p| S::constant(*p)).collect(),
     }
 }

@@ -288,7 +288,7 @@ fn misuse_is_refused_by_name() {
 fn whole_sample_delay_shifts_the_torque() {
     let robot = robot(PRESET);
     let rest =
-        axisight_core::robot::equilibrium(&plant::<f64>(&robot, &[]), &[0.0; 3]).expect("rest");
+        axisight_core::plant::equilibrium(&plant::<f64>(&robot, &[]), &[0.0; 3]).expect("rest");
     let mut torque = sines(60, 3, robot.sample_time, 2.0);
     for (i, u) in torque.iter_mut().enumerate() {
         *u += rest.motor_torque[i % 3] + 0.3;

@@ -1,6 +1,7 @@
 //! Without damping, friction and drive the plant conserves energy.
 
-use axisight_core::robot::{Plant, RigidBody, RobotDescription, linearize};
+use axisight_core::plant::{Plant, linearize};
+use axisight_core::robot::{RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
 use axisight_fit::frequency::modes;
 use axisight_tests::{ARM, PRESET, largest, plant, robot, trace};

@@ -1,6 +1,7 @@
 //! Fits find what was put in, and say how well they know it.
 
-use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription, equilibrium};
+use axisight_core::plant::equilibrium;
+use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method, measurement_noise};
 use axisight_fit::identification::{
     Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,

@@ -1,6 +1,7 @@
 //! Responses of the linearized robot by poles and by lines, and their derivatives.
 
-use axisight_core::robot::{Parameter, RobotDescription, linearize, zoh_frequency_response};
+use axisight_core::plant::{linearize, zoh_frequency_response};
+use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_fit::frequency::{Columns, Hold, Linearizer, evaluate};
 use axisight_tests::{PRESET, robot};
 use nalgebra::{Complex, DMatrix};

@@ -1,6 +1,7 @@
 //! The linear plant in the sampled loop: exactness, order of the ripple, and the nonlinear plant.
 
-use axisight_core::robot::{Controller, EffectSetting, RobotDescription, linearize};
+use axisight_core::plant::linearize;
+use axisight_core::robot::{Controller, EffectSetting, RobotDescription};
 use axisight_core::simulation::{
     Drive, LinearPlant, LinearPlantError, Method, Run, SimulationError, Status, measurement_noise,
     simulate_linear,

@@ -1,9 +1,9 @@
 //! Linearization: exact Jacobian, eigenvalues, and the response of the sampled plant.
 
-use axisight_core::robot::{
-    EffectSetting, RobotDescription, equilibrium, linearize, modes, zoh_frequency_response,
-};
+use axisight_core::plant::{equilibrium, linearize, zoh_frequency_response};
+use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
+use axisight_fit::frequency::modes;
 use axisight_tests::{ARM, PRESET, effect, plant, robot, trace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
@@ -32,7 +32,7 @@ fn jacobian_agrees_with_finite_differences() {
         let linear = linearize(&robot, &settings, &at).expect("linear");
         let plant = plant::<f64>(&robot, &settings);
         let rest = equilibrium(&plant, &at).expect("rest");
-        let x0 = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+        let x0 = plant.state_at_rest(&rest);
         let mut scratch = plant.scratch();
         let nx = x0.len();
         let mut at_shift = |column: usize, h: f64| {
@@ -82,7 +82,7 @@ fn equilibrium_is_at_rest() {
     for settings in [Vec::new(), settings()] {
         let plant = plant::<f64>(&robot, &settings);
         let rest = equilibrium(&plant, &[0.3, -0.4, 0.5]).expect("rest");
-        let x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+        let x = plant.state_at_rest(&rest);
         let mut dx = vec![0.0; x.len()];
         // Ripple is an effect on the motor that rest does not take into account.
         let ripple = !settings.is_empty();

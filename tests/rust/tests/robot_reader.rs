@@ -1,8 +1,7 @@
 //! The robot reader: what it reads, and how it says no.
 
-use axisight_core::robot::{
-    Compliance, Controller, Drive, Link, Motion, RobotDescription, RobotError, read_robot,
-};
+use axisight_core::robot::{Compliance, Controller, Drive, Link, Motion, RobotDescription};
+use axisight_core::robot_file::{RobotError, read_robot};
 
 const NOMINAL: &str = include_str!("../../../python/axisight/presets/irb6600_like.toml");
 

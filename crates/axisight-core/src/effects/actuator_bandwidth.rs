@@ -1,6 +1,6 @@
 //! Finite bandwidth of the current loop.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Leonhard (2001), Control of Electrical Drives, section 7.2 (closed current loop)",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
+    family: Family::Timing,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::WideBand],
     parameters: &[ParameterInfo {
         name: "time_constant_s",
         unit: "s",

@@ -1,6 +1,6 @@
 //! Backlash: a dead zone between motor and joint.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Nordin, Gutman (2002), Automatica 38(10), dead-zone model",
     scope: Scope::Axis,
     acts: Acts::Transmission,
+    family: Family::Transmission,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[Absorber::Backlash],
+    shown_by: &[Experiment::Amplitudes],
     parameters: &[ParameterInfo {
         name: "half_width_rad",
         unit: "rad (joint side)",

@@ -1,6 +1,6 @@
 //! Stiffness of cables and hoses along the joint.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Hooke's law on the joint angle",
     scope: Scope::Axis,
     acts: Acts::Joint,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Slope,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
         name: "stiffness_nm_rad",
         unit: "Nm/rad (joint side)",
@@ -28,7 +37,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Cable<S> {
-    fn joint_torque(&self, joint_angle: S) -> S {
-        -(self.0 * joint_angle)
+    fn joint_torque(&self, joint: &Joint<'_, S>) -> S {
+        -(self.0 * joint.angle)
     }
 }

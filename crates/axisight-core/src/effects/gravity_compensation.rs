@@ -1,6 +1,6 @@
 //! Torque of a gravity balancer on the joint.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.3",
     scope: Scope::Axis,
     acts: Acts::Joint,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Slope,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::Poses],
     parameters: &[
         ParameterInfo {
             name: "sine_nm",
@@ -45,8 +54,8 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Balancer<S> {
-    fn joint_torque(&self, joint_angle: S) -> S {
-        let (s, c) = joint_angle.sin_cos();
+    fn joint_torque(&self, joint: &Joint<'_, S>) -> S {
+        let (s, c) = joint.angle.sin_cos();
         self.sine.fma(s, self.cosine * c)
     }
 }

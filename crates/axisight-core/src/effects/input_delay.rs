@@ -1,6 +1,6 @@
 //! Transport delay between commanded and applied torque.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
+    family: Family::Timing,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::WideBand],
     parameters: &[ParameterInfo {
         name: "delay_s",
         unit: "s",

@@ -1,137 +1,7 @@
-//! What an effect is: its description and the points where it may act.
+//! The points where an effect may act, and what it sees there.
 
-use crate::robot::Chain;
+use crate::robot::{Body, Chain, Motion};
 use axisight_scalar::Scalar;
-
-/// Whether an effect belongs to one driven axis or to the arm as a whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// One driven axis.
-    Axis,
-    /// The whole arm.
-    Arm,
-}
-
-/// Where in the signal path an effect acts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Acts {
-    /// Between commanded and applied motor torque.
-    TorquePath,
-    /// Torque on the motor shaft.
-    Motor,
-    /// Between motor and joint.
-    Transmission,
-    /// Torque on the driven joint.
-    Joint,
-    /// Masses and springs of the arm.
-    Arm,
-    /// Between true and measured motor position.
-    Sensor,
-}
-
-/// What a parameter does to an effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// The effect vanishes when every amplitude is at its neutral value.
-    Amplitude,
-    /// Shapes the effect; any value is neutral once the amplitudes are.
-    Shape,
-}
-
-/// One parameter of an effect.
-#[derive(Debug, Clone, Copy)]
-pub struct ParameterInfo {
-    /// Name with its unit as suffix, e.g. `coulomb_nm`.
-    pub name: &'static str,
-    /// Unit, e.g. `Nm`; `1` when dimensionless.
-    pub unit: &'static str,
-    /// Amplitude or shape.
-    pub role: Role,
-    /// Value at which the effect vanishes (amplitude) or the usual value (shape).
-    pub neutral: f64,
-    /// Smallest admissible value.
-    pub lower: f64,
-    /// Largest admissible value.
-    pub upper: f64,
-    /// Typical magnitude: natural scale of a search and width of a plausible range.
-    pub typical: f64,
-}
-
-/// Description of an effect.
-#[derive(Debug)]
-pub struct EffectInfo {
-    /// Name as in the verdict vocabulary.
-    pub name: &'static str,
-    /// One line for people.
-    pub summary: &'static str,
-    /// Equation in the notation of the thesis.
-    pub equation: &'static str,
-    /// Where the equation comes from.
-    pub source: &'static str,
-    /// Axis or arm.
-    pub scope: Scope,
-    /// Point of action.
-    pub acts: Acts,
-    /// Parameters in kernel order.
-    pub parameters: &'static [ParameterInfo],
-}
-
-/// Misuse of the effect table.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EffectError {
-    /// No effect has this name.
-    #[error("effect `{name}`: expected one of {expected}")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The known names.
-        expected: String,
-    },
-    /// Wrong number of parameters.
-    #[error("effect `{effect}`: expected {expected} parameters, got {got}")]
-    ParameterCount {
-        /// Effect.
-        effect: &'static str,
-        /// Length of its parameter table.
-        expected: usize,
-        /// Length given.
-        got: usize,
-    },
-    /// An axis effect without a valid axis, or an arm effect with one.
-    #[error("effect `{effect}`: expected {expected}, got {got}")]
-    Axis {
-        /// Effect.
-        effect: &'static str,
-        /// What its scope asks for.
-        expected: String,
-        /// What came.
-        got: String,
-    },
-    /// A parameter outside its bounds or not finite.
-    #[error("effect `{effect}`: parameter `{parameter}`: expected {lower} to {upper}, got {got}")]
-    Bounds {
-        /// Effect.
-        effect: &'static str,
-        /// Parameter.
-        parameter: &'static str,
-        /// Lower bound.
-        lower: f64,
-        /// Upper bound.
-        upper: f64,
-        /// Value given.
-        got: f64,
-    },
-}
-
-impl EffectError {
-    pub(super) fn unknown(name: &str) -> Self {
-        let names: Vec<_> = super::EFFECTS.iter().map(|e| e.name).collect();
-        Self::Unknown {
-            name: name.to_owned(),
-            expected: names.join(", "),
-        }
-    }
-}
 
 /// State of one motor as its effects see it.
 #[derive(Debug, Clone, Copy)]
@@ -148,10 +18,85 @@ pub struct Motor<'a, S> {
     pub internal: &'a [S],
 }
 
+/// State of a gear spring as its effects see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Spring<'a, S> {
+    /// Deflection that loads the spring [rad].
+    pub loaded: S,
+    /// Its rate [rad/s]; zero at rest.
+    pub rate: S,
+    /// States of the effect itself; empty at rest.
+    pub internal: &'a [S],
+}
+
+/// State of a driven joint as its effects see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Joint<'a, S> {
+    /// Joint angle q [rad].
+    pub angle: S,
+    /// Joint speed [rad/s]; zero at rest.
+    pub speed: S,
+    /// States of the effect itself; empty where nothing is integrated.
+    pub internal: &'a [S],
+}
+
+/// State of one of two coupled axes.
+#[derive(Debug, Clone, Copy)]
+pub struct CoupledAxis<S> {
+    /// Motor angle [rad].
+    pub motor_angle: S,
+    /// Motor speed [rad/s].
+    pub motor_speed: S,
+    /// Joint angle [rad].
+    pub joint_angle: S,
+    /// Joint speed [rad/s].
+    pub joint_speed: S,
+}
+
+/// State of two axes as an effect between them sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair<'a, S> {
+    /// The axes in the order of the setting.
+    pub axes: [CoupledAxis<S>; 2],
+    /// States of the effect itself; empty where nothing is integrated.
+    pub internal: &'a [S],
+}
+
+/// What an effect adds to an axis.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisTorque<S> {
+    /// On the motor shaft [Nm].
+    pub motor: S,
+    /// On the driven joint [Nm, joint side].
+    pub joint: S,
+}
+
+impl<S: Scalar> AxisTorque<S> {
+    /// Nothing.
+    pub fn zero() -> Self {
+        let zero = S::zero();
+        Self {
+            motor: zero,
+            joint: zero,
+        }
+    }
+}
+
+/// State of the arm as its effects see it; joints of the robot, base to tip.
+#[derive(Debug, Clone, Copy)]
+pub struct Arm<'a, S> {
+    /// Joint angles [rad].
+    pub angles: &'a [S],
+    /// Joint speeds [rad/s]; zero at rest.
+    pub speeds: &'a [S],
+    /// States of the effect itself; empty where nothing is integrated.
+    pub internal: &'a [S],
+}
+
 /// The parts of a plant an arm or transmission effect may change before a run.
 #[derive(Debug)]
 pub struct PlantParameters<'a, S> {
-    /// Links.
+    /// Links, and gravity in the frame of the base.
     pub chain: &'a mut Chain<S>,
     /// Gear stiffness of the axis [Nm/rad]; `None` for arm effects or a rigid transmission.
     pub stiffness: Option<&'a mut S>,
@@ -161,10 +106,38 @@ pub struct PlantParameters<'a, S> {
     pub motor_inertia: Option<&'a mut S>,
 }
 
+/// A spring the arm stands on: an elastic joint below the first one.
+#[derive(Debug, Clone, Copy)]
+pub struct BaseJoint<S> {
+    /// How it moves.
+    pub motion: Motion,
+    /// Unit vector of its axis in the base frame.
+    pub axis: [f64; 3],
+    /// Stiffness [Nm/rad or N/m].
+    pub stiffness: S,
+    /// Damping [Nm s/rad or N s/m].
+    pub damping: S,
+    /// What moves with it besides the arm.
+    pub body: Option<Body<S>>,
+}
+
 /// The points where an effect may act; every default is "not here".
+///
+/// States of its own start at zero; their rates are asked for where the effect acts
+/// ([`Kernel::motor_rates`] for an effect on the motor, and so on).
 pub trait Kernel<S: Scalar>: Send + Sync {
-    /// Change masses or stiffness before the run.
+    /// Number of states the effect has of its own.
+    fn n_internal(&self) -> usize {
+        0
+    }
+
+    /// Change masses, stiffness or gravity before the run.
     fn prepare(&self, _plant: &mut PlantParameters<'_, S>) {}
+    /// Springs below the first joint, ground to arm.
+    fn base_joints(&self) -> Vec<BaseJoint<S>> {
+        Vec::new()
+    }
+
     /// What the drive makes of a command before any delay or lag, e.g. a limit [Nm].
     fn command(&self, torque: S) -> S {
         torque
@@ -185,6 +158,7 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn lag(&self) -> Option<S> {
         None
     }
+
     /// Torque added on the motor shaft [Nm]; friction is negative for positive speed.
     fn motor_torque(&self, _motor: &Motor<'_, S>) -> S {
         S::zero()
@@ -193,12 +167,9 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn uses_command(&self) -> bool {
         false
     }
-    /// Number of states the effect has of its own; they start at zero.
-    fn n_internal(&self) -> usize {
-        0
-    }
-    /// Rate of change of these states [1/s].
-    fn internal_rate(&self, _motor: &Motor<'_, S>, _rate: &mut [S]) {}
+    /// Rates of the effect's own states on a motor [1/s].
+    fn motor_rates(&self, _motor: &Motor<'_, S>, _rates: &mut [S]) {}
+
     /// Deflection that loads the gear spring and its slope, from the geometric deflection [rad].
     fn deflection(&self, delta: S) -> (S, S) {
         (delta, S::one())
@@ -207,19 +178,37 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn deflection_inverse(&self, loaded: S) -> S {
         loaded
     }
-    /// Gear torque added to the linear spring [Nm, joint side].
-    fn gear_torque(&self, _loaded: S) -> S {
+    /// Gear torque added to the linear spring and damper [Nm, joint side].
+    fn gear_torque(&self, _spring: &Spring<'_, S>) -> S {
         S::zero()
     }
+    /// Rates of the effect's own states in a gear [1/s].
+    fn gear_rates(&self, _spring: &Spring<'_, S>, _rates: &mut [S]) {}
     /// Kinematic error of the gear over the motor angle: joint angle [rad] by which the
     /// gear runs ahead, and its slope.
     fn transmission_error(&self, _angle: S) -> Option<(S, S)> {
         None
     }
+
     /// Torque added on the driven joint, joint side [Nm].
-    fn joint_torque(&self, _joint_angle: S) -> S {
+    fn joint_torque(&self, _joint: &Joint<'_, S>) -> S {
         S::zero()
     }
+    /// Rates of the effect's own states on a joint [1/s].
+    fn joint_rates(&self, _joint: &Joint<'_, S>, _rates: &mut [S]) {}
+
+    /// Torques added on two axes, in their order.
+    fn pair_torque(&self, _pair: &Pair<'_, S>) -> [AxisTorque<S>; 2] {
+        [AxisTorque::zero(); 2]
+    }
+    /// Rates of the effect's own states between two axes [1/s].
+    fn pair_rates(&self, _pair: &Pair<'_, S>, _rates: &mut [S]) {}
+
+    /// Add forces on the joints of the arm [Nm or N] to `force`, one entry a joint.
+    fn arm_force(&self, _arm: &Arm<'_, S>, _force: &mut [S]) {}
+    /// Rates of the effect's own states on the arm [1/s].
+    fn arm_rates(&self, _arm: &Arm<'_, S>, _rates: &mut [S]) {}
+
     /// Error added to the measured motor position [rad].
     fn sensor(&self, _angle: S) -> S {
         S::zero()

@@ -1,6 +1,6 @@
 //! Coulomb friction in proportion to the gear load.
 
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Hamon, Gautier, Garrec (2010), Dynamic identification of robots with a dry friction model depending on load and velocity, IROS",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::DryFriction],
+    shown_by: &[Experiment::Speeds],
     parameters: &[
         ParameterInfo {
             name: "coefficient",

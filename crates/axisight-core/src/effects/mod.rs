@@ -1,14 +1,21 @@
 //! Effects: what a machine does and a simulator may not model.
 //!
-//! One file per effect states its parameters, the value at which it vanishes,
-//! where it acts, its equation and its source. A new effect is a new file and
-//! one line in the table below.
+//! One file per effect states all that is known of it: its parameters, the value at which it
+//! vanishes, where it acts, its equation and its source, and what others have to know of it
+//! ([`EffectInfo`]). A new effect is a new file and one line in the table below.
 
+mod error;
 mod harmonics;
+mod info;
 mod kernel;
 
+pub use error::EffectError;
+pub use info::{
+    Absorber, Acts, Change, EffectInfo, Experiment, Family, Linear, ParameterInfo, Role, Scope,
+    StandsFor,
+};
 pub use kernel::{
-    Acts, EffectError, EffectInfo, Kernel, Motor, ParameterInfo, PlantParameters, Role, Scope,
+    Arm, AxisTorque, BaseJoint, CoupledAxis, Joint, Kernel, Motor, Pair, PlantParameters, Spring,
 };
 
 use axisight_scalar::Scalar;

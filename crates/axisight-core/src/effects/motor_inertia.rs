@@ -1,6 +1,6 @@
 //! Motor inertia other than the simulator's.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (9.4)",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Relative }),
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::MotorInertia],
+    shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
         name: "relative_change",
         unit: "1",

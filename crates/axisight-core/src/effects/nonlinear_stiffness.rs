@@ -1,6 +1,6 @@
 //! Gear stiffness that changes with load.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (9.6)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
+    family: Family::Transmission,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Slope,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[Absorber::Stiffness],
+    shown_by: &[Experiment::Amplitudes],
     parameters: &[ParameterInfo {
         name: "cubic_nm_rad3",
         unit: "Nm/rad^3",
@@ -28,7 +37,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Cubic<S> {
-    fn gear_torque(&self, loaded: S) -> S {
-        self.0 * loaded.square() * loaded
+    fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
+        self.0 * spring.loaded.square() * spring.loaded
     }
 }

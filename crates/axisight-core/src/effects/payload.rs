@@ -1,6 +1,6 @@
 //! A point mass on the last link that carries mass.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
 use crate::robot::Body;
 use axisight_scalar::Scalar;
 
@@ -23,6 +23,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Swevers, Verdonck, De Schutter (2007), IEEE Control Systems 27(5), payload as a rigid body",
     scope: Scope::Arm,
     acts: Acts::Arm,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::Poses],
     parameters: &[
         ParameterInfo {
             name: "mass_kg",

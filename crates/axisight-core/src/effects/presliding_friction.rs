@@ -1,6 +1,6 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), eqs. (1)-(4) with sigma_0 = F_c / delta, sigma_1 = sigma_0 T_b",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &["coulomb_friction"],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: true,
+    stiff: true,
+    absorbed_by: &[Absorber::DryFriction],
+    shown_by: &[Experiment::Speeds],
     parameters: &[
         ParameterInfo {
             name: "coulomb_nm",
@@ -103,8 +112,8 @@ impl<S: Scalar> Kernel<S> for Presliding<S> {
         -(self.coulomb * self.bristle_time.fma(rate, z))
     }
 
-    fn internal_rate(&self, motor: &Motor<'_, S>, rate: &mut [S]) {
-        if let Some(out) = rate.first_mut() {
+    fn motor_rates(&self, motor: &Motor<'_, S>, rates: &mut [S]) {
+        if let Some(out) = rates.first_mut() {
             *out = self.bristles(motor).1;
         }
     }

@@ -1,6 +1,6 @@
 //! Drag that grows with the square of the speed.
 
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Bona, Indri (2005), Friction compensation in robotics: an overview, IEEE CDC",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::ViscousFriction],
+    shown_by: &[Experiment::Speeds],
     parameters: &[ParameterInfo {
         name: "drag_nm_s2_rad2",
         unit: "Nm s^2/rad^2",

@@ -1,7 +1,7 @@
 //! Resolver error over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -11,6 +11,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (8.2b)",
     scope: Scope::Axis,
     acts: Acts::Sensor,
+    family: Family::Periodic,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Waves { constant: 0, proportional: 0, reading: 12 },
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
     parameters: harmonic_parameters!(
         "rad" 0.5 1e-3 "order_1" "cosine_1_rad" "sine_1_rad" 1.0,

@@ -1,6 +1,6 @@
 //! Stribeck friction: Coulomb friction with an excess at low speed.
 
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. (5)",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &["coulomb_friction"],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::DryFriction],
+    shown_by: &[Experiment::Speeds],
     parameters: &[
         ParameterInfo {
             name: "coulomb_nm",

@@ -1,6 +1,6 @@
 //! Torque constant other than the drive believes.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Gautier, Briot (2014), Global identification of joint drive gains, J. Dyn. Sys. 136(5)",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
+    family: Family::TorquePath,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Torque],
+    shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
         name: "relative_error",
         unit: "1",

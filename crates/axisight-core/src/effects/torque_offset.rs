@@ -1,6 +1,6 @@
 //! Constant torque error.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Janot, Gautier, Brunot (2019), EMPS benchmark: offset of the force",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
+    family: Family::TorquePath,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::TorqueOffset],
+    shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
         name: "offset_nm",
         unit: "Nm",

@@ -1,7 +1,7 @@
 //! Motor torque ripple over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -11,6 +11,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (8.2a)",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Periodic,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Waves { constant: 9, proportional: 3, reading: 0 },
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
     parameters: harmonic_parameters!(
         "Nm" 1e4 0.1 "order_1" "cosine_1_nm" "sine_1_nm" 1.0,

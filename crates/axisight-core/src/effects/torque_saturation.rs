@@ -1,6 +1,6 @@
 //! Torque limit of the drive.
 
-use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 9.4",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
+    family: Family::TorquePath,
+    contains: &[],
+    parts: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[],
     parameters: &[ParameterInfo {
         name: "limit_nm",
         unit: "Nm",

@@ -1,6 +1,6 @@
 //! Viscous friction beyond the simulator's.
 
-use super::{Acts, EffectInfo, Kernel, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,6 +10,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     source: "Wernholt (2004), eq. (9.7)",
     scope: Scope::Axis,
     acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &[],
+    parts: &[],
+    stands_for: Some(StandsFor { quantity: "viscous_friction", change: Change::Absolute }),
+    linear: Linear::Slope,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::ViscousFriction],
+    shown_by: &[Experiment::Speeds],
     parameters: &[ParameterInfo {
         name: "viscous_nm_s_rad",
         unit: "Nm s/rad",

@@ -28,9 +28,12 @@ impl<S: Scalar> From<&Link> for Body<S> {
 /// One joint and the link it moves.
 #[derive(Debug, Clone)]
 pub struct ChainJoint<S> {
-    pub(super) motion: Motion,
-    pub(super) origin: Option<[f64; 3]>,
-    pub(super) axis: [f64; 3],
+    /// How the joint moves.
+    pub motion: Motion,
+    /// Position in the parent link's frame [m]; `None` is its origin.
+    pub origin: Option<[f64; 3]>,
+    /// Unit vector of the axis in the parent link's frame.
+    pub axis: [f64; 3],
     /// Mass properties of the link; `None` is massless.
     pub body: Option<Body<S>>,
 }
@@ -53,7 +56,8 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
 /// A serial chain with differentiable mass properties.
 #[derive(Debug, Clone)]
 pub struct Chain<S> {
-    pub(super) gravity: [f64; 3],
+    /// Gravity in the base frame [m/s^2].
+    pub gravity: [S; 3],
     /// Joints from base to tip.
     pub joints: Vec<ChainJoint<S>>,
 }
@@ -73,7 +77,7 @@ impl<S: Scalar> Chain<S> {
     /// The chain of a robot description.
     pub fn new(robot: &RobotDescription) -> Self {
         Self {
-            gravity: robot.gravity,
+            gravity: robot.gravity.map(S::constant),
             joints: robot.joints.iter().map(ChainJoint::from).collect(),
         }
     }

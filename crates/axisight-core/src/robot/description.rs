@@ -1,7 +1,9 @@
 //! What a robot is: a serial chain of joints, links and drives, in SI units.
 //!
-//! The checks here are physical and know nothing of files; [`super::reader`]
+//! The checks here are physical and know nothing of files; the reader of robot files
 //! runs them and says where in the file the fault lies.
+
+use super::setting::EffectSetting;
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,6 +113,10 @@ pub struct RobotDescription {
     /// Angles of the driven joints at the operating point, in chain order
     /// [rad; m if prismatic].
     pub operating_point: Vec<f64>,
+    /// Effects that the simulator of this robot has.
+    pub effects: Vec<EffectSetting<f64>>,
+    /// Relative standard deviation of the robot's own parameters by quantity, where stated.
+    pub tolerances: Vec<(String, f64)>,
 }
 
 impl RobotDescription {
@@ -128,6 +134,31 @@ impl RobotDescription {
             .filter_map(|(i, joint)| joint.drive.as_ref().map(|drive| (i, joint, drive)))
     }
 
+    /// The robot's own effects that none of `settings` replaces.
+    pub fn effects_beside<S>(
+        &self,
+        settings: &[EffectSetting<S>],
+    ) -> impl Iterator<Item = &EffectSetting<f64>> {
+        let kept = move |own: &&EffectSetting<f64>| !settings.iter().any(|s| s.replaces(own));
+        self.effects.iter().filter(kept)
+    }
+
+    /// The robot without effects of its own, and all effects that act when `settings` are
+    /// added to its own.
+    #[must_use]
+    pub fn with_all_effects(
+        &self,
+        settings: &[EffectSetting<f64>],
+    ) -> (Self, Vec<EffectSetting<f64>>) {
+        let mut all: Vec<_> = self.effects_beside(settings).cloned().collect();
+        all.extend_from_slice(settings);
+        let bare = Self {
+            effects: Vec::new(),
+            ..self.clone()
+        };
+        (bare, all)
+    }
+
     /// Number of driven joints.
     pub fn n_axes(&self) -> usize {
         self.driven().count()
@@ -135,7 +166,7 @@ impl RobotDescription {
 
     /// The last joint that moves no inertia at all, which would make the
     /// inertia matrix singular in every pose.
-    pub(super) fn joint_without_inertia(&self) -> Option<usize> {
+    pub(crate) fn joint_without_inertia(&self) -> Option<usize> {
         let last_mass = self.joints.iter().rposition(|joint| joint.link.is_some());
         let singular = self
             .joints
@@ -145,7 +176,7 @@ impl RobotDescription {
     }
 
     /// The first pair of joints (earlier, later) that share a name.
-    pub(super) fn duplicate_name(&self) -> Option<(usize, usize)> {
+    pub(crate) fn duplicate_name(&self) -> Option<(usize, usize)> {
         self.joints.iter().enumerate().find_map(|(later, joint)| {
             let earlier = self.joints.iter().take(later);
             let earlier = earlier
@@ -168,7 +199,7 @@ impl Joint {
 
 /// What a number may be, beyond finite.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Bound {
+pub(crate) enum Bound {
     /// Any sign.
     Any,
     /// Above zero.
@@ -181,7 +212,7 @@ pub(super) enum Bound {
 
 impl Bound {
     /// Whether `x` is finite and within the bound.
-    pub(super) fn allows(self, x: f64) -> bool {
+    pub(crate) fn allows(self, x: f64) -> bool {
         x.is_finite()
             && match self {
                 Self::Any => true,
@@ -192,7 +223,7 @@ impl Bound {
     }
 
     /// The bound in words, for "expected ...".
-    pub(super) fn describe(self, unit: &str) -> String {
+    pub(crate) fn describe(self, unit: &str) -> String {
         let kind = match self {
             Self::Any => "a finite number",
             Self::Positive => "a positive number",
@@ -204,7 +235,7 @@ impl Bound {
 }
 
 /// Whether a vector is of unit length to `tolerance`; if not, its length.
-pub(super) fn check_unit(axis: &[f64; 3], tolerance: f64) -> Result<(), f64> {
+pub(crate) fn check_unit(axis: &[f64; 3], tolerance: f64) -> Result<(), f64> {
     let [x, y, z] = *axis;
     let norm = x.hypot(y).hypot(z);
     if (norm - 1.0).abs() <= tolerance {
@@ -219,7 +250,7 @@ pub(super) fn check_unit(axis: &[f64; 3], tolerance: f64) -> Result<(), f64> {
 /// The pivots of its `L D L^T` decomposition must be positive by more than
 /// rounding: a singular matrix with decimal entries has a last pivot of either
 /// sign near 1e-16.
-pub(super) fn is_positive_definite(matrix: &[f64; 6]) -> bool {
+pub(crate) fn is_positive_definite(matrix: &[f64; 6]) -> bool {
     let [xx, yy, zz, xy, xz, yz] = *matrix;
     let rounding = 1e-14 * xx.max(yy).max(zz);
     let second = yy - xy / xx * xy;

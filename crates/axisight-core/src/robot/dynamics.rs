@@ -13,7 +13,7 @@
 
 use super::chain::{Body, Chain, ChainJoint};
 use super::description::Motion;
-use super::linear_algebra::solve_symmetric;
+use super::linear_algebra::{factorize, solve_factorized};
 use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};
 use axisight_scalar::Scalar;
 use std::array::from_fn;
@@ -118,7 +118,7 @@ impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
 /// Equations of motion of a chain at its present mass properties.
 #[derive(Debug, Clone)]
 pub struct Dynamics<S> {
-    gravity: [f64; 3],
+    gravity: [S; 3],
     segments: Vec<Segment<S>>,
 }
 
@@ -191,9 +191,9 @@ pub struct DynamicsScratch<S> {
 }
 
 /// The scratch at the size of the code that uses it.
-pub(super) struct Sized<'a, S, const N: usize> {
-    pub(super) inertia: &'a mut [[S; N]; N],
-    pub(super) bias: &'a mut [S; N],
+struct Sized<'a, S, const N: usize> {
+    inertia: &'a mut [[S; N]; N],
+    bias: &'a mut [S; N],
     angles: &'a mut [S; N],
     trigonometry: &'a mut [(S, S); N],
     axes: &'a mut [Screw<S>; N],
@@ -202,9 +202,23 @@ pub(super) struct Sized<'a, S, const N: usize> {
 }
 
 impl<S: Scalar> DynamicsScratch<S> {
+    /// Forces on the joints, padding included: bias forces after [`Dynamics::add_rates`],
+    /// accelerations after [`Dynamics::solve`].
+    pub fn forces(&mut self) -> &mut [S] {
+        &mut self.bias
+    }
+
+    /// Add the inertia of a rotor that turns with a joint, before [`Dynamics::factorize`].
+    pub fn add_inertia(&mut self, joint: usize, inertia: S) {
+        let n = self.bias.len();
+        if let Some(entry) = self.inertia.get_mut(joint * n + joint) {
+            *entry += inertia;
+        }
+    }
+
     /// `None` if the scratch was made for another size.
     #[inline(always)]
-    pub(super) fn sized<const N: usize>(&mut self) -> Option<Sized<'_, S, N>> {
+    fn sized<const N: usize>(&mut self) -> Option<Sized<'_, S, N>> {
         Some(Sized {
             inertia: self.inertia.as_chunks_mut().0.first_chunk_mut()?,
             bias: self.bias.first_chunk_mut()?,
@@ -237,11 +251,10 @@ macro_rules! sized {
             2..=3 => $object.$method::<3>($($argument),*),
             4..=7 => $object.$method::<7>($($argument),*),
             8..=12 => $object.$method::<12>($($argument),*),
-            _ => $object.$method::<{ $crate::robot::MOST_JOINTS }>($($argument),*),
+            _ => $object.$method::<MOST_JOINTS>($($argument),*),
         }
     };
 }
-pub(super) use sized;
 
 /// Where a link is.
 struct Frame<S> {
@@ -270,14 +283,12 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Inertia matrix and bias forces at joint angles `q` [rad or m] and rates `v`.
     pub fn evaluate(&self, q: &[S], v: &[S]) -> DynamicsState<S> {
-        sized!(self.len(), self.evaluate_sized(q, v))
-    }
-
-    fn evaluate_sized<const N: usize>(&self, q: &[S], v: &[S]) -> DynamicsState<S> {
         let n = self.len();
         let mut scratch = self.scratch();
-        self.update::<N>(q, v, &mut scratch);
-        let entry = |i: usize, j: usize| scratch.inertia[i.min(j) * N + i.max(j)];
+        self.place(q, &mut scratch);
+        self.add_rates(v, &mut scratch);
+        let padded = scratch.bias.len();
+        let entry = |i: usize, j: usize| scratch.inertia[i.min(j) * padded + i.max(j)];
         DynamicsState {
             inertia: (0..n * n).map(|k| entry(k / n, k % n)).collect(),
             bias: scratch.bias[..n].to_vec(),
@@ -286,23 +297,18 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Accelerations of the joints under forces `tau` [Nm or N].
     pub fn accelerate(&self, q: &[S], v: &[S], tau: &[S]) -> Vec<S> {
-        sized!(self.len(), self.accelerate_sized(q, v, tau))
-    }
-
-    fn accelerate_sized<const N: usize>(&self, q: &[S], v: &[S], tau: &[S]) -> Vec<S> {
         let mut scratch = self.scratch();
-        self.update::<N>(q, v, &mut scratch);
-        let Some(terms) = scratch.sized::<N>() else {
-            return Vec::new();
-        };
-        for (i, f) in terms.bias.iter_mut().enumerate() {
+        self.place(q, &mut scratch);
+        self.add_rates(v, &mut scratch);
+        self.factorize(&mut scratch);
+        for (i, f) in scratch.bias.iter_mut().enumerate() {
             *f = tau.get(i).map_or_else(S::zero, |t| *t - *f);
         }
-        solve_symmetric(terms.inertia, terms.bias);
-        terms.bias[..self.len()].to_vec()
+        self.solve(&mut scratch);
+        scratch.bias[..self.len()].to_vec()
     }
 
-    /// Scratch for [`Dynamics::update`].
+    /// Scratch for an evaluation.
     pub fn scratch(&self) -> DynamicsScratch<S> {
         let n = sized!(self.len(), self.padded_size());
         DynamicsScratch {
@@ -321,15 +327,44 @@ impl<S: Scalar> Dynamics<S> {
         N
     }
 
-    /// Inertia matrix and bias forces into `scratch`.
-    fn update<const N: usize>(&self, q: &[S], v: &[S], scratch: &mut DynamicsScratch<S>) {
-        self.place::<N>(q, scratch);
-        self.add_rates::<N>(v, scratch);
+    /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
+    pub fn place(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.place_sized(q, scratch));
     }
 
-    /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
+    /// Bias forces at rates `v` and the angles last placed.
+    pub fn add_rates(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.add_rates_sized(v, scratch));
+    }
+
+    /// Factors of the inertia matrix, in its place.
+    pub fn factorize(&self, scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.factorize_sized(scratch));
+    }
+
+    /// Forces to accelerations, with the factors of the inertia matrix.
+    pub fn solve(&self, scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.solve_sized(scratch));
+    }
+
     #[inline(never)]
-    pub(super) fn place<const N: usize>(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
+    #[allow(clippy::unused_self)] // called like the other sized methods
+    fn factorize_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
+        if let Some(sized) = scratch.sized::<N>() {
+            factorize(sized.inertia);
+        }
+    }
+
+    #[inline(never)]
+    #[allow(clippy::unused_self)]
+    fn solve_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
+        if let Some(sized) = scratch.sized::<N>() {
+            solve_factorized(sized.inertia, sized.bias);
+        }
+    }
+
+    #[inline(never)]
+    fn place_sized<const N: usize>(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
         for (angle, q) in scratch.angles.iter_mut().zip(q) {
             *angle = *q;
         }
@@ -339,9 +374,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Bias forces at rates `v` and the angles last placed.
     #[inline(never)]
-    pub(super) fn add_rates<const N: usize>(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+    fn add_rates_sized<const N: usize>(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
         let Some(sized) = scratch.sized::<N>() else {
             return;
         };
@@ -349,7 +383,7 @@ impl<S: Scalar> Dynamics<S> {
         // Gravity is an acceleration of the base.
         let mut acceleration = Screw {
             angular: Vec3::zero(),
-            linear: Vec3::constant(self.gravity.map(|g| -g)),
+            linear: Vec3(self.gravity.map(|g| -g)),
         };
         for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(N) {
             let motion = sized.axes[i].scale(*v);

@@ -2,14 +2,6 @@
 
 use axisight_scalar::Scalar;
 
-/// Solve `a x = b` in place for a symmetric positive definite `a` (upper triangle
-/// read, destroyed).
-#[inline(always)]
-pub(super) fn solve_symmetric<S: Scalar, const N: usize>(a: &mut [[S; N]; N], b: &mut [S; N]) {
-    factorize(a);
-    solve_factorized(a, b);
-}
-
 /// `L D L^T` of a symmetric positive definite `a`, in its upper triangle; about `n^3 / 6`
 /// multiplications. The diagonal becomes `1 / d`, entries right of it hold `d l`.
 #[inline(always)]
@@ -66,7 +58,8 @@ mod tests {
         }
         let x = [1.0, -2.0, 0.5, 3.0];
         let mut b: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
-        solve_symmetric(&mut a, &mut b);
+        factorize(&mut a);
+        solve_factorized(&a, &mut b);
         for (got, want) in b.iter().zip(x) {
             assert!((got - want).abs() < 1e-12, "{got} {want}");
         }

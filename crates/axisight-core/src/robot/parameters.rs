@@ -145,7 +145,7 @@ impl Parameter {
     }
 
     /// Set a mass property of the chain; other parameters are left to the plant.
-    pub(super) fn apply_to_chain<S: Scalar>(self, value: S, chain: &mut Chain<S>) {
+    pub fn apply_to_chain<S: Scalar>(self, value: S, chain: &mut Chain<S>) {
         let Some(body) = chain
             .joints
             .get_mut(self.joint())

@@ -9,7 +9,8 @@
 use super::closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
 use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
 use super::method::{Effort, Method, Stepper};
-use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
+use crate::plant::{Plant, PlantError};
+use crate::robot::{EffectSetting, RobotDescription};
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -4,7 +4,8 @@ use super::controller::ControlLoop;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effects::EffectError;
-use crate::robot::{Controller, EquilibriumError, Plant, equilibrium};
+use crate::plant::{EquilibriumError, Plant, equilibrium};
+use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -125,7 +126,7 @@ pub fn simulate<S: Scalar>(
     }
     let rest = equilibrium(plant, run.start)?;
     stepper.begin();
-    let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+    let mut x = plant.state_at_rest(&rest);
     let mut controller = ControlLoop::new(
         run.controller,
         run.sample_time,
@@ -242,9 +243,7 @@ impl<S: Scalar> Signals<S> {
 
     /// Torque that effects add on the motors in the present state.
     fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
-        for (i, axis) in plant.axes.iter().enumerate() {
-            self.torque_disturbance[i] = plant.motor_disturbance(axis, x, self.command[i]);
-        }
+        plant.motor_disturbances(x, &self.command, &mut self.torque_disturbance);
     }
 
     pub(super) fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {

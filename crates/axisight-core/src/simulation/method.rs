@@ -3,7 +3,8 @@
 use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
 use super::{dormand_prince, nystrom4, runge_kutta4};
-use crate::robot::{DynamicsScratch, Plant};
+use crate::plant::Plant;
+use crate::robot::DynamicsScratch;
 use axisight_scalar::Scalar;
 
 /// How the plant is integrated inside a sample.

@@ -8,7 +8,7 @@
 //! the delay or lag, and the result is smooth in both parameters.
 
 use crate::effects::Kernel;
-use crate::robot::Axis;
+use crate::plant::Axis;
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Modes of a linearized robot.
 
-use axisight_core::robot::Linearization;
+use axisight_core::plant::Linearization;
 use axisight_numerics::eigen;
 use nalgebra::Complex;
 

@@ -6,24 +6,15 @@
 //! motor angles are `E^T p`. Elastic joints settle under gravity, so `q0` depends on the
 //! parameters; its derivative follows from the implicit function theorem.
 
-use axisight_core::robot::{
-    Chain, EffectSetting, EquilibriumError, Motion, Parameter, Plant, PlantError, RobotDescription,
-    Vec3, equilibrium,
-};
+use axisight_core::effects::{self, Linear};
+use axisight_core::plant::{EquilibriumError, Plant, PlantError, equilibrium};
+use axisight_core::robot::{Chain, EffectSetting, Motion, Parameter, RobotDescription, Vec3};
 use axisight_scalar::{Dual, Scalar};
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters differentiated in one pass.
 const WIDTH: usize = 8;
 type D = Dual<f64, WIDTH>;
-
-/// Effects that only change masses, springs or dampers, so that the robot stays linear.
-const LINEAR_EFFECTS: [&str; 4] = [
-    "payload",
-    "joint_stiffness",
-    "joint_damping",
-    "motor_inertia",
-];
 
 /// `M p'' + D p' + K p = E u`, motor angles `E^T p`.
 #[derive(Debug, Clone)]
@@ -54,11 +45,15 @@ pub struct SecondOrderDerivative {
 pub enum SecondOrderError {
     /// An effect has a slope at rest that a moving robot does not show.
     #[error(
-        "effects: expected only payload, joint_stiffness, joint_damping or motor_inertia (the \
-         slope of others at rest is not what a moving robot shows; friction under excitation \
-         is `viscous_friction` of the axis), got {0}"
+        "effects: expected only {expected} (the slope of others at rest is not what a moving \
+         robot shows; friction under excitation is `viscous_friction` of the axis), got {got}"
     )]
-    Effect(String),
+    Effect {
+        /// Effects that only change parameters.
+        expected: String,
+        /// The other one.
+        got: String,
+    },
     /// The plant cannot be built.
     #[error(transparent)]
     Plant(#[from] PlantError),
@@ -101,11 +96,14 @@ impl<'a> Linearizer<'a> {
         values: &[(Parameter, f64)],
         seeds: &[usize],
     ) -> Result<Self, SecondOrderError> {
-        let foreign = settings
-            .iter()
-            .find(|s| !LINEAR_EFFECTS.contains(&s.name.as_str()));
-        if let Some(setting) = foreign {
-            return Err(SecondOrderError::Effect(setting.name.clone()));
+        let (_, all) = robot.with_all_effects(settings);
+        let linear = |name| effects::info(name).is_ok_and(|i| i.linear == Linear::Parameters);
+        if let Some(setting) = all.iter().find(|s| !linear(&s.name)) {
+            let known = effects::EFFECTS.iter().map(|e| e.name);
+            return Err(SecondOrderError::Effect {
+                expected: known.filter(|n| linear(n)).collect::<Vec<_>>().join(", "),
+                got: setting.label(),
+            });
         }
         let lifted: Vec<EffectSetting<D>> = settings.iter().map(EffectSetting::lifted).collect();
         let seeded = seeds.chunks(WIDTH).map(|chunk| {

@@ -7,7 +7,8 @@
 use super::gram::{Block, cut};
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
 use axisight_core::effects::Motor;
-use axisight_core::robot::{EffectSetting, Plant, RobotDescription};
+use axisight_core::plant::Plant;
+use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Scalar};
 use rayon::prelude::*;
@@ -125,7 +126,8 @@ impl InverseDynamics {
             let state = plant.dynamics.evaluate(&motion[0], &motion[1]);
             for (i, axis) in plant.axes.iter().enumerate() {
                 let at = |x: &[f64]| S::constant(x[k * n_axes + i]);
-                let passive = state.bias[axis.joint] - axis.joint_torque(motion[0][axis.joint]);
+                let passive = state.bias[axis.joint]
+                    - axis.joint_torque_of(motion[0][axis.joint], motion[1][axis.joint]);
                 let joint_force = (0..n).fold(passive, |sum, j| {
                     state.inertia[axis.joint * n + j].fma(motion[2][j], sum)
                 });

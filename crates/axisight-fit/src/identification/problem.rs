@@ -84,14 +84,7 @@ pub(super) fn seeded<S: Scalar>(
     seeds: &[usize],
 ) -> (Vec<(Parameter, S)>, Vec<EffectSetting<S>>) {
     let mut overrides = Vec::new();
-    let mut settings: Vec<EffectSetting<S>> = effects
-        .iter()
-        .map(|e| EffectSetting {
-            name: e.name.clone(),
-            axis: e.axis,
-            parameters: e.parameters.iter().map(|p| S::constant(*p)).collect(),
-        })
-        .collect();
+    let mut settings: Vec<EffectSetting<S>> = effects.iter().map(EffectSetting::lifted).collect();
     for (i, (parameter, value)) in parameters.iter().zip(theta).enumerate() {
         let constant = S::constant(*value);
         let seed = seeds.iter().position(|s| *s == i);

@@ -7,7 +7,8 @@
 
 use super::gram::{Block, cut};
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
-use axisight_core::robot::{EffectSetting, Plant, RobotDescription};
+use axisight_core::plant::Plant;
+use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Lanes, Scalar};

@@ -1,6 +1,7 @@
 //! Exact Jacobian of the plant by dual numbers.
 
-use crate::robot::{DynamicsScratch, EffectSetting, Plant, PlantError, RobotDescription};
+use crate::plant::{Plant, PlantError};
+use crate::robot::{DynamicsScratch, EffectSetting, RobotDescription};
 use axisight_scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 

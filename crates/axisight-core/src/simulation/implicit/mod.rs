@@ -7,7 +7,8 @@ mod rosenbrock;
 
 use super::method::{Effort, Interval, Method, Stepper};
 use super::torque_path::{Line, SampleTorque};
-use crate::robot::{EffectSetting, Plant, PlantError, RobotDescription};
+use crate::plant::{Plant, PlantError};
+use crate::robot::{EffectSetting, RobotDescription};
 use axisight_scalar::Scalar;
 use jacobian::JacobianPlant;
 use nalgebra::DMatrix;
@@ -283,7 +284,9 @@ impl StepSize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{equilibrium, read_robot};
+    use crate::plant::equilibrium;
+    use crate::robot::Place;
+    use crate::robot_file::read_robot;
     use crate::simulation::torque_path::{TorqueBuffers, TorquePath};
 
     const PRESET: &str = include_str!("../../../../../python/axisight/presets/irb6600_like.toml");
@@ -293,12 +296,12 @@ mod tests {
         let robot = read_robot(PRESET).expect("preset");
         let settings = [EffectSetting {
             name: "actuator_bandwidth".to_owned(),
-            axis: Some(0),
+            place: Place::Axis(0),
             parameters: vec![3e-3],
         }];
         let plant = Plant::<f64>::new(&robot, &[], &settings).expect("plant");
         let rest = equilibrium(&plant, &robot.operating_point).expect("rest");
-        let mut x = plant.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+        let mut x = plant.state_at_rest(&rest);
         let command = [0.0; 3];
         let duration = 0.02;
         let mut slopes = Slopes::new(&robot, &settings).expect("plant");

@@ -2,26 +2,12 @@
 
 use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
-use crate::effects::{self, Acts, EffectError, Kernel, Role};
-use crate::robot::{
-    EffectSetting, Linearization, LinearizationError, Plant, PlantError, RobotDescription,
-    linearize,
-};
+use crate::effects::{self, Change, EffectError, EffectInfo, Kernel, Linear, Role};
+use crate::plant::{Linearization, LinearizationError, Plant, PlantError, linearize};
+use crate::robot::{EffectSetting, Place, RobotDescription};
 use axisight_scalar::Scalar;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Effects whose slope at rest describes them in motion too.
-const IN_STATE_MATRIX: [&str; 8] = [
-    "viscous_friction",
-    "joint_stiffness",
-    "nonlinear_stiffness",
-    "joint_damping",
-    "motor_inertia",
-    "payload",
-    "gravity_compensation",
-    "cable_stiffness",
-];
 
 /// Why a robot has no linear plant.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -94,11 +80,11 @@ impl LinearPlant {
         start: &[f64],
     ) -> Result<Self, LinearPlantError> {
         let whole = Plant::<f64>::new(robot, &[], settings).map_err(LinearizationError::from)?;
+        let (robot, settings) = &robot.with_all_effects(settings);
         let mut smooth = Vec::new();
         for setting in settings {
-            match treatment(setting)? {
-                Treatment::StateMatrix | Treatment::Path => smooth.push(setting.clone()),
-                Treatment::Ripple | Treatment::Nothing => {}
+            if is_smooth(setting)? {
+                smooth.push(setting.clone());
             }
         }
         let linear = linearize(robot, &smooth, start)?;
@@ -109,8 +95,8 @@ impl LinearPlant {
         let at = &linear.equilibrium;
         Ok(Self {
             start: start.to_vec(),
-            rest: plain.state_at_rest(&at.motor_angle, &at.joint_angle),
-            joints: plain.n_motors()..plain.n_motors() + plain.chain.len(),
+            rest: plain.state_at_rest(at),
+            joints: plain.joint_slots(),
             propagator: Propagator::new(&linear.a, &linear.b, robot.sample_time),
             waves: Waves::new(&ripple_tables(settings, axes.len())),
             linear,
@@ -162,55 +148,48 @@ pub struct Operations {
     pub harmonics: usize,
 }
 
-enum Treatment {
-    StateMatrix,
-    Path,
-    Ripple,
-    Nothing,
-}
-
-fn treatment(setting: &EffectSetting<f64>) -> Result<Treatment, LinearPlantError> {
+/// Whether the linearization of the plant holds an effect; the waves of ripple and what is
+/// neutral stand beside it.
+fn is_smooth(setting: &EffectSetting<f64>) -> Result<bool, LinearPlantError> {
     let misused = |e: EffectError| LinearizationError::from(PlantError::from(e));
     let info = effects::info(&setting.name).map_err(misused)?;
-    let name = setting.name.as_str();
-    if matches!(name, "torque_ripple" | "resolver_ripple") {
-        return Ok(Treatment::Ripple);
-    }
-    if info.acts == Acts::TorquePath {
-        return Ok(Treatment::Path);
-    }
-    if IN_STATE_MATRIX.contains(&name) {
-        return Ok(Treatment::StateMatrix);
-    }
     let parameters = info.parameters.iter().zip(&setting.parameters);
     let mut amplitudes = parameters.filter(|(p, _)| p.role == Role::Amplitude);
-    #[allow(clippy::float_cmp)] // neutral is a value one sets, not one that comes out
-    if amplitudes.all(|(p, value)| *value == p.neutral) {
-        return Ok(Treatment::Nothing);
+    match info.linear {
+        Linear::Parameters | Linear::Slope | Linear::Path => Ok(true),
+        Linear::Waves { .. } => Ok(false),
+        #[allow(clippy::float_cmp)] // neutral is a value one sets, not one that comes out
+        Linear::No if amplitudes.all(|(p, value)| *value == p.neutral) => Ok(false),
+        Linear::No => Err(LinearPlantError::NotLinear {
+            effect: setting.name.clone(),
+        }),
     }
-    Err(LinearPlantError::NotLinear {
-        effect: setting.name.clone(),
-    })
 }
 
 /// Ripple parameters by axis.
 fn ripple_tables(settings: &[EffectSetting<f64>], n_axes: usize) -> Vec<RippleTable> {
     let mut tables = vec![RippleTable::default(); n_axes];
     for setting in settings {
-        let Some(table) = setting.axis.and_then(|i| tables.get_mut(i)) else {
+        let Ok(Linear::Waves {
+            constant,
+            proportional,
+            reading,
+        }) = effects::info(&setting.name).map(|info| info.linear)
+        else {
             continue;
         };
-        let parameters = &setting.parameters;
-        match setting.name.as_str() {
-            "torque_ripple" => {
-                // Three harmonics of constant size, then one in proportion to the command.
-                let (constant, proportional) = parameters.split_at(parameters.len().min(9));
-                table.constant.extend_from_slice(constant);
-                table.proportional.extend_from_slice(proportional);
-            }
-            "resolver_ripple" => table.resolver.extend_from_slice(parameters),
-            _ => {}
-        }
+        let Place::Axis(axis) = setting.place else {
+            continue;
+        };
+        let Some(table) = tables.get_mut(axis) else {
+            continue;
+        };
+        let mut parameters = setting.parameters.iter().copied();
+        table.constant.extend(parameters.by_ref().take(constant));
+        table
+            .proportional
+            .extend(parameters.by_ref().take(proportional));
+        table.resolver.extend(parameters.take(reading));
     }
     tables
 }
@@ -221,12 +200,16 @@ impl LinearAxis {
         settings: &[EffectSetting<f64>],
         linear: &Linearization,
     ) -> Result<Self, LinearPlantError> {
-        let mine = || settings.iter().filter(|s| s.axis == Some(index));
-        let named = |name| mine().filter(move |s| s.name == name);
-        let path: Vec<_> = mine()
-            .filter(|s| effects::info(&s.name).is_ok_and(|i| i.acts == Acts::TorquePath))
-            .cloned()
-            .collect();
+        let mine = || {
+            let here = settings.iter().filter(|s| s.place == Place::Axis(index));
+            here.filter_map(|s| Some((s, effects::info(&s.name).ok()?)))
+        };
+        let path = mine().filter(|(_, info)| info.linear == Linear::Path);
+        let path: Vec<_> = path.map(|(setting, _)| setting.clone()).collect();
+        let viscous = |info: &EffectInfo| {
+            info.stands_for
+                .is_some_and(|s| s.quantity == "viscous_friction" && s.change == Change::Absolute)
+        };
         let no_angle = LinearPlantError::NoMotorAngle { axis: index + 1 };
         let (slot, scale) = (0..linear.c.ncols())
             .map(|j| (j, linear.c[(index, j)]))
@@ -239,8 +222,9 @@ impl LinearAxis {
             scale,
             angle: at.motor_angle.get(index).copied().unwrap_or(0.0),
             torque: command,
-            viscous: named("viscous_friction")
-                .filter_map(|s| s.parameters.first())
+            viscous: mine()
+                .filter(|(_, info)| viscous(info))
+                .filter_map(|(s, _)| s.parameters.first())
                 .sum(),
             path,
         };

@@ -1,8 +1,9 @@
 //! Linearization about an operating point, with exact derivatives.
 
-use super::description::RobotDescription;
+use super::build::PlantError;
+use super::equations::Plant;
 use super::equilibrium::{Equilibrium, EquilibriumError, equilibrium};
-use super::plant::{EffectSetting, Plant, PlantError};
+use crate::robot::{EffectSetting, RobotDescription};
 use axisight_scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 
@@ -48,7 +49,7 @@ pub fn linearize(
 ) -> Result<Linearization, LinearizationError> {
     let plain = Plant::<f64>::new(robot, &[], settings)?;
     let rest = equilibrium(&plain, driven)?;
-    let x0 = plain.state_at_rest(&rest.motor_angle, &rest.joint_angle);
+    let x0 = plain.state_at_rest(&rest);
     let lifted: Vec<EffectSetting<D>> = settings.iter().map(EffectSetting::lifted).collect();
     let plant = Plant::<D>::new(robot, &[], &lifted)?;
     let (nx, nu) = (plant.n_states(), plant.axes.len());

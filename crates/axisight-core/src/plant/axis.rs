@@ -1,10 +1,9 @@
 //! One driven axis: motor, transmission, and the effects on them.
 
-use super::description::RobotDescription;
-use super::parameters::Parameter;
-use crate::effects::Kernel;
+use super::equations::Own;
+use crate::effects::{Joint, Kernel, Spring};
+use crate::robot::{Parameter, RobotDescription};
 use axisight_scalar::Scalar;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// A compliant transmission.
@@ -34,23 +33,73 @@ pub struct Axis<S> {
     pub gear: Option<Gear<S>>,
     /// Everything that acts on this axis.
     pub kernels: Vec<Arc<dyn Kernel<S>>>,
-    pub(super) on_motor: Vec<OnMotor<S>>,
-    pub(super) on_gear: Vec<Arc<dyn Kernel<S>>>,
-    pub(super) on_joint: Vec<Arc<dyn Kernel<S>>>,
-}
-
-/// An effect on a motor, and its own states among those of the plant.
-#[derive(Clone)]
-pub(super) struct OnMotor<S> {
-    pub(super) kernel: Arc<dyn Kernel<S>>,
-    pub(super) internal: Range<usize>,
+    pub(super) on_motor: Vec<Own<S>>,
+    pub(super) on_gear: Vec<Own<S>>,
+    pub(super) on_joint: Vec<Own<S>>,
 }
 
 impl<S: Scalar> Axis<S> {
-    /// Torque of the effects on the driven joint at `joint_angle` [Nm].
-    pub fn joint_torque(&self, joint_angle: S) -> S {
-        let torques = self.on_joint.iter().map(|k| k.joint_torque(joint_angle));
+    /// Torque of the effects on the driven joint [Nm] without states of their own: at rest,
+    /// or where motion is measured and nothing is integrated.
+    pub fn joint_torque_of(&self, angle: S, speed: S) -> S {
+        let state = Joint {
+            angle,
+            speed,
+            internal: &[],
+        };
+        let torques = self
+            .on_joint
+            .iter()
+            .map(|on| on.kernel.joint_torque(&state));
         torques.fold(S::zero(), |a, b| a + b)
+    }
+
+    /// Torque of the effects on the driven joint [Nm]; `own` and `own_rates` run over the
+    /// states of all effects.
+    pub(super) fn joint_torque(&self, angle: S, speed: S, own: &[S], own_rates: &mut [S]) -> S {
+        let mut torque = S::zero();
+        for Own { kernel, internal } in &self.on_joint {
+            let state = Joint {
+                angle,
+                speed,
+                internal: &own[internal.clone()],
+            };
+            torque += kernel.joint_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.joint_rates(&state, rates);
+            }
+        }
+        torque
+    }
+
+    /// Torque of the gear at deflection `delta` [rad] that changes at `rate` [Nm, joint side].
+    #[inline]
+    pub(super) fn gear_torque(
+        &self,
+        gear: &Gear<S>,
+        delta: S,
+        rate: S,
+        own: &[S],
+        own_rates: &mut [S],
+    ) -> S {
+        let (mut loaded, mut slope) = (delta, S::one());
+        for on_gear in &self.on_gear {
+            let (next, factor) = on_gear.kernel.deflection(loaded);
+            (loaded, slope) = (next, slope * factor);
+        }
+        let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
+        for Own { kernel, internal } in &self.on_gear {
+            let state = Spring {
+                loaded,
+                rate: slope * rate,
+                internal: &own[internal.clone()],
+            };
+            torque += kernel.gear_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.gear_rates(&state, rates);
+            }
+        }
+        torque
     }
 
     /// Motor angle at rest for a joint angle and a static load [Nm, joint side].
@@ -64,7 +113,7 @@ impl<S: Scalar> Axis<S> {
             let errors = self
                 .on_gear
                 .iter()
-                .filter_map(|k| k.transmission_error(angle));
+                .filter_map(|on| on.kernel.transmission_error(angle));
             let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
                 break;
             };
@@ -78,7 +127,7 @@ impl<S: Scalar> Axis<S> {
         let slopes = self
             .on_gear
             .iter()
-            .filter_map(|k| k.transmission_error(angle));
+            .filter_map(|on| on.kernel.transmission_error(angle));
         load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
     }
 
@@ -93,8 +142,13 @@ impl<S: Scalar> Axis<S> {
         let mut loaded = load / gear.stiffness;
         for _ in 0..60 {
             let mut extra = S::zero();
-            for kernel in &self.on_gear {
-                extra += kernel.gear_torque(loaded);
+            for on_gear in &self.on_gear {
+                let state = Spring {
+                    loaded,
+                    rate: S::zero(),
+                    internal: &[],
+                };
+                extra += on_gear.kernel.gear_torque(&state);
             }
             let secant = loaded.abs().if_positive(extra / loaded, S::zero());
             loaded = (loaded + load / (gear.stiffness + secant)) * 0.5;
@@ -102,28 +156,8 @@ impl<S: Scalar> Axis<S> {
         self.on_gear
             .iter()
             .rev()
-            .fold(loaded, |d, kernel| kernel.deflection_inverse(d))
+            .fold(loaded, |d, on| on.kernel.deflection_inverse(d))
     }
-}
-
-/// Torque of a gear at deflection `delta` [rad] that changes at `rate` [Nm, joint side].
-#[inline]
-pub(super) fn gear_torque<S: Scalar>(
-    gear: &Gear<S>,
-    kernels: &[Arc<dyn Kernel<S>>],
-    delta: S,
-    rate: S,
-) -> S {
-    let (mut loaded, mut slope) = (delta, S::one());
-    for kernel in kernels {
-        let (next, factor) = kernel.deflection(loaded);
-        (loaded, slope) = (next, slope * factor);
-    }
-    let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
-    for kernel in kernels {
-        torque += kernel.gear_torque(loaded);
-    }
-    torque
 }
 
 /// The driven axes of `robot`, without effects.

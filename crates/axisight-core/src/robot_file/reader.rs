@@ -1,19 +1,22 @@
-//! Reads a robot from TOML text, schema `axisight.robot/1`.
+//! Reads a robot from TOML text, schemas `axisight.robot/1` and `axisight.robot/2`.
 //!
 //! Files come from elsewhere, so nothing is guessed: whatever is unknown,
 //! missing or unphysical is refused with its key, its line and what was
 //! expected. The document is walked with spans rather than deserialized,
 //! because a derived deserializer cannot say on which line a key is missing.
 
-use super::description::{
+use super::document::{Entry, Section, line_at, one_of};
+use super::effects::{read_effects, read_tolerances};
+use super::error::RobotError;
+use crate::robot::MOST_JOINTS;
+use crate::robot::description::{
     Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, check_unit,
     is_positive_definite,
 };
-use super::dynamics::MOST_JOINTS;
-use toml::Spanned;
-use toml::de::{DeInteger, DeTable, DeValue};
+use toml::de::DeTable;
 
-const SCHEMA: &str = "axisight.robot/1";
+/// Schemas by their number.
+const SCHEMAS: [&str; 2] = ["axisight.robot/1", "axisight.robot/2"];
 const AXIS_TOLERANCE: f64 = 1e-6;
 
 const ROOT_KEYS: &[&str] = &[
@@ -26,6 +29,8 @@ const ROOT_KEYS: &[&str] = &[
     "sensor",
     "operating_point",
 ];
+/// Keys that version 2 adds.
+const NEWER_ROOT_KEYS: &[&str] = &["effect", "tolerances"];
 const JOINT_KEYS: &[&str] = &[
     "name",
     "kind",
@@ -39,66 +44,6 @@ const JOINT_KEYS: &[&str] = &[
 ];
 const LINK_KEYS: &[&str] = &["mass", "com", "inertia"];
 const DRIVE_KEYS: &[&str] = &["gear_ratio", "motor_inertia", "viscous_friction"];
-
-/// Why a robot description is refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RobotError {
-    /// A value is of the wrong type or shape, or means nothing physical.
-    #[error("line {line}: `{key}`: expected {expected}, got {got}")]
-    Invalid {
-        /// Path of the key; joints and array entries count from 1.
-        key: String,
-        /// Line of the value, from 1.
-        line: usize,
-        /// What the format asks for.
-        expected: String,
-        /// What the file says.
-        got: String,
-    },
-    /// A key the schema does not have.
-    #[error("line {line}: unknown key `{key}`; expected one of {expected}")]
-    UnknownKey {
-        /// Path of the key; joints count from 1.
-        key: String,
-        /// Line of the key, from 1.
-        line: usize,
-        /// Keys that may stand here.
-        expected: String,
-    },
-    /// A required key is not there.
-    #[error("line {line}: missing key `{key}`; expected {expected}")]
-    MissingKey {
-        /// Path of the key; joints count from 1.
-        key: String,
-        /// Line of the table that lacks it, from 1.
-        line: usize,
-        /// What the format asks for.
-        expected: String,
-    },
-    /// The text is not TOML.
-    #[error("line {line}: not valid TOML: {message}")]
-    Syntax {
-        /// Line of the fault, from 1.
-        line: usize,
-        /// What the TOML parser says.
-        message: String,
-    },
-}
-
-impl RobotError {
-    /// Append the name of the joint: people know joints by name, not number.
-    fn of_joint(mut self, name: &str) -> Self {
-        let text = match &mut self {
-            Self::Invalid { got, .. } => got,
-            Self::UnknownKey { expected, .. } | Self::MissingKey { expected, .. } => expected,
-            Self::Syntax { message, .. } => message,
-        };
-        text.push_str(" (joint `");
-        text.push_str(name);
-        text.push_str("`)");
-        self
-    }
-}
 
 /// Read a robot description from TOML text.
 ///
@@ -115,8 +60,12 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         start: 0,
     };
     // The schema first: the keys of another schema would all seem unknown.
-    read_schema(&root)?;
-    root.only(ROOT_KEYS)?;
+    let version = read_schema(&root)?;
+    if version == 1 {
+        root.only(ROOT_KEYS)?;
+    } else {
+        root.only(&[ROOT_KEYS, NEWER_ROOT_KEYS].concat())?;
+    }
     let name = root.require("name", "a string")?.string()?.to_owned();
     let gravity = root
         .require("gravity", "an array of 3 numbers [m/s^2]")?
@@ -135,12 +84,16 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         controller: Controller::None,
         position_noise_std: 0.0,
         operating_point: Vec::new(),
+        effects: Vec::new(),
+        tolerances: Vec::new(),
     };
     check_chain(&robot, &joint_list, &sections)?;
     let n_axes = robot.n_axes();
     robot.controller = read_controller(&root, n_axes)?;
     robot.position_noise_std = read_noise(&root)?;
     robot.operating_point = read_operating_point(&root, n_axes)?;
+    robot.effects = read_effects(&root, &robot)?;
+    robot.tolerances = read_tolerances(&root)?;
     Ok(robot)
 }
 
@@ -155,12 +108,15 @@ fn syntax_error(text: &str, error: &toml::de::Error) -> RobotError {
     RobotError::Syntax { line, message }
 }
 
-fn read_schema(root: &Section) -> Result<(), RobotError> {
-    let expected = format!("\"{SCHEMA}\"");
+/// Number of the schema, from 1.
+fn read_schema(root: &Section) -> Result<usize, RobotError> {
+    let [first, second] = SCHEMAS;
+    let expected = format!("\"{first}\" or \"{second}\"");
     let schema = root.require("schema", &expected)?;
-    match schema.value {
-        DeValue::String(text) if text == SCHEMA => Ok(()),
-        _ => Err(schema.refuse(expected)),
+    let known = |text: &str| SCHEMAS.iter().position(|s| *s == text);
+    match schema.value.as_str().and_then(known) {
+        Some(index) => Ok(index + 1),
+        None => Err(schema.refuse(expected)),
     }
 }
 
@@ -394,200 +350,4 @@ fn read_operating_point(root: &Section, n_axes: usize) -> Result<Vec<f64>, Robot
     let section = entry.section()?;
     section.only(&["joint_angle"])?;
     section.per_axis("joint_angle", n_axes, "rad")
-}
-
-/// A table of the document and where it stands.
-struct Section<'a> {
-    text: &'a str,
-    entries: &'a DeTable<'a>,
-    path: String,
-    /// Byte at which the table starts.
-    start: usize,
-}
-
-impl<'a> Section<'a> {
-    fn key(&self, name: &str) -> String {
-        if self.path.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{}.{name}", self.path)
-        }
-    }
-
-    /// Refuse keys that are not `known`; the first in the file is named.
-    fn only(&self, known: &[&str]) -> Result<(), RobotError> {
-        let is_unknown = |key: &&Spanned<_>| !known.contains(&AsRef::<str>::as_ref(key.get_ref()));
-        let unknown = self.entries.keys().filter(is_unknown);
-        match unknown.min_by_key(|key| key.span().start) {
-            None => Ok(()),
-            Some(key) => Err(RobotError::UnknownKey {
-                key: self.key(key.get_ref()),
-                line: line_at(self.text, key.span().start),
-                expected: known.join(", "),
-            }),
-        }
-    }
-
-    fn find(&self, name: &str) -> Option<Entry<'a>> {
-        let value = self.entries.get(name)?;
-        Some(Entry::new(self.text, value, self.key(name)))
-    }
-
-    fn missing(&self, name: &str, expected: &str) -> RobotError {
-        RobotError::MissingKey {
-            key: self.key(name),
-            line: line_at(self.text, self.start),
-            expected: expected.to_owned(),
-        }
-    }
-
-    fn require(&self, name: &str, expected: &str) -> Result<Entry<'a>, RobotError> {
-        self.find(name).ok_or_else(|| self.missing(name, expected))
-    }
-
-    fn number(&self, name: &str, bound: Bound, unit: &str) -> Result<f64, RobotError> {
-        self.require(name, &bound.describe(unit))?
-            .number(bound, unit)
-    }
-
-    /// One number per driven joint.
-    fn per_axis(&self, name: &str, n_axes: usize, unit: &str) -> Result<Vec<f64>, RobotError> {
-        let expected = format!("{}, one per driven joint", array_of(n_axes, unit));
-        self.require(name, &expected)?
-            .numbers(n_axes, unit, expected)
-    }
-}
-
-/// A value of the document, its key and where it stands.
-struct Entry<'a> {
-    text: &'a str,
-    value: &'a DeValue<'a>,
-    key: String,
-    /// Byte at which the value starts.
-    start: usize,
-}
-
-impl<'a> Entry<'a> {
-    fn new(text: &'a str, value: &'a Spanned<DeValue<'a>>, key: String) -> Self {
-        Self {
-            text,
-            start: value.span().start,
-            value: value.get_ref(),
-            key,
-        }
-    }
-
-    fn invalid(&self, expected: String, got: String) -> RobotError {
-        RobotError::Invalid {
-            key: self.key.clone(),
-            line: line_at(self.text, self.start),
-            expected,
-            got,
-        }
-    }
-
-    /// [`Entry::invalid`] with the value as the file has it.
-    fn refuse(&self, expected: String) -> RobotError {
-        self.invalid(expected, describe(self.value))
-    }
-
-    fn string(&self) -> Result<&'a str, RobotError> {
-        self.value
-            .as_str()
-            .ok_or_else(|| self.refuse("a string".to_owned()))
-    }
-
-    fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, RobotError> {
-        let text = self.value.as_str();
-        let chosen = choices.iter().find(|(name, _)| text == Some(name));
-        chosen
-            .map(|(_, choice)| *choice)
-            .ok_or_else(|| self.refuse(one_of(choices)))
-    }
-
-    fn number(&self, bound: Bound, unit: &str) -> Result<f64, RobotError> {
-        let number = match self.value {
-            DeValue::Float(float) => float.as_str().parse().ok(),
-            DeValue::Integer(integer) => integer_value(integer),
-            _ => None,
-        };
-        number
-            .filter(|x| bound.allows(*x))
-            .ok_or_else(|| self.refuse(bound.describe(unit)))
-    }
-
-    fn vector<const N: usize>(&self, unit: &str) -> Result<[f64; N], RobotError> {
-        let numbers = self.numbers(N, unit, array_of(N, unit))?;
-        <[f64; N]>::try_from(numbers).map_err(|_| self.refuse(array_of(N, unit)))
-    }
-
-    fn numbers(&self, n: usize, unit: &str, expected: String) -> Result<Vec<f64>, RobotError> {
-        if self.value.as_array().is_none_or(|items| items.len() != n) {
-            return Err(self.refuse(expected));
-        }
-        self.items(expected)?
-            .iter()
-            .map(|item| item.number(Bound::Any, unit))
-            .collect()
-    }
-
-    fn items(&self, expected: String) -> Result<Vec<Entry<'a>>, RobotError> {
-        let items = self.value.as_array().ok_or_else(|| self.refuse(expected))?;
-        let entry = |(i, value)| Entry::new(self.text, value, format!("{}[{}]", self.key, i + 1));
-        Ok(items.iter().enumerate().map(entry).collect())
-    }
-
-    fn section(&self) -> Result<Section<'a>, RobotError> {
-        let entries = self
-            .value
-            .as_table()
-            .ok_or_else(|| self.refuse("a table".to_owned()))?;
-        Ok(Section {
-            text: self.text,
-            entries,
-            path: self.key.clone(),
-            start: self.start,
-        })
-    }
-
-    fn sections(&self) -> Result<Vec<Section<'a>>, RobotError> {
-        let expected = format!("an array of tables, [[{}]]", self.key);
-        self.items(expected)?.iter().map(Entry::section).collect()
-    }
-}
-
-fn integer_value(integer: &DeInteger) -> Option<f64> {
-    i128::from_str_radix(integer.as_str(), integer.radix())
-        .ok()
-        .map(|i| i as f64)
-}
-
-fn array_of(n: usize, unit: &str) -> String {
-    let plural = if n == 1 { "" } else { "s" };
-    format!("an array of {n} number{plural} [{unit}]")
-}
-
-fn one_of<T>(choices: &[(&str, T)]) -> String {
-    let quoted: Vec<_> = choices
-        .iter()
-        .map(|(name, _)| format!("\"{name}\""))
-        .collect();
-    quoted.join(" or ")
-}
-
-fn describe(value: &DeValue) -> String {
-    match value {
-        DeValue::String(text) => format!("{text:?}"),
-        DeValue::Integer(integer) => integer.to_string(),
-        DeValue::Float(float) => float.to_string(),
-        DeValue::Boolean(flag) => flag.to_string(),
-        DeValue::Datetime(time) => time.to_string(),
-        DeValue::Array(items) => format!("an array of {}", items.len()),
-        DeValue::Table(_) => "a table".to_owned(),
-    }
-}
-
-/// Line of a byte of the text, from 1.
-fn line_at(text: &str, byte: usize) -> usize {
-    1 + text.bytes().take(byte).filter(|b| *b == b'\n').count()
 }
