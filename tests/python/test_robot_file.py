@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 
 from axisight import Effect, Fitted, InputError, Robot, RobotError, _core, load_robot
 from axisight.effects import effect_table
-from axisight.presets import PRESETS
+from axisight.robot.presets import PRESETS
 from axisight.robot_file import (
     Provenance,
     hash_file,
     identified,
     identified_by_fit,
     load_identified,
-    render,
     write_identified,
 )
+from axisight.robot_file.document import render
+from axisight.robot_file.toml_spans import value_spans
 from axisight.simulation import simulate
-from axisight.toml_spans import value_spans
 
 WHEN = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 SOURCE = Provenance("three steps", {"log_1.parquet": "ab12"}, {"block_s": 0.25}, WHEN, notes="n")

@@ -12,8 +12,9 @@ from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frequency_fit.result import FrequencyFit
 from axisight.robot import Robot
-from axisight.robot_file import Identified, Provenance, render
-from axisight.robot_values import noted, values_of
+from axisight.robot_file import Identified, Provenance
+from axisight.robot_file.document import render
+from axisight.robot_file.values import noted, values_of
 
 
 def identified_responses(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects, without
-from axisight.fitting import FitOptions, Parameter, Weighting, core_spec
+from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.simulation_error import core_spec
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
 from axisight.gap.settings import Settings

@@ -15,11 +15,11 @@ from axisight.fitting import (
     FitOptions,
     Parameter,
     Weighting,
-    core_spec,
     effect_parameter,
     robot_parameter,
     robot_parameters,
 )
+from axisight.fitting.simulation_error import core_spec
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]

@@ -8,15 +8,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.absorbed import absorbed_effects, absorbed_note
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.graybox.axis_result import AxisFit
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance
-from axisight.robot_sidecar import known
-from axisight.robot_values import noted, values_of
+from axisight.robot_file.absorbed import absorbed_effects, absorbed_note
+from axisight.robot_file.sidecar import known
+from axisight.robot_file.values import noted, values_of
 
 Array = NDArray[np.float64]
 Covariance = Literal["trusted", "sandwich", "white"]

@@ -31,8 +31,8 @@ from axisight.rigid_body.reversal_window import reversal_weight
 from axisight.rigid_body.robot_values import identified_bodies
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance, identified
-from axisight.robot_sidecar import known as known_number
-from axisight.robot_values import noted
+from axisight.robot_file.sidecar import known as known_number
+from axisight.robot_file.values import noted
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]

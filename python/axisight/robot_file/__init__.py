@@ -1,0 +1,29 @@
+"""Identified values in robot files: written back with their uncertainty, and read again.
+
+Apart from `axisight.robot`, because it stands above the fits: they use robots, and what
+they find is written here.
+"""
+
+from axisight.robot_file.document import (
+    Identified,
+    Provenance,
+    hash_file,
+    identified,
+    identified_by_fit,
+    load_identified,
+    load_with_effects,
+    sidecar_path,
+    write_identified,
+)
+
+__all__ = [
+    "Identified",
+    "Provenance",
+    "hash_file",
+    "identified",
+    "identified_by_fit",
+    "load_identified",
+    "load_with_effects",
+    "sidecar_path",
+    "write_identified",
+]
