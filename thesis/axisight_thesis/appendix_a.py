@@ -91,7 +91,7 @@ def _low_pass(
 
 def _reference_gain(context: Context, frequency: Real) -> Complex:
     """Return ``kp + ki T / (z - 1)``, from velocity reference to torque command."""
-    gains = context.robot.core.controller_gains
+    gains = context.robot.controller_gains
     step = context.robot.sample_time_s
     z = np.exp(2j * np.pi * frequency * step)
     return np.asarray(gains["kp"] + gains["ki"] * step / (z - 1))

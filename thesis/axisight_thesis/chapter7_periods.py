@@ -266,5 +266,5 @@ def averages_over_periods(context: Context) -> Item:
 def _drifted_angle(context: Context) -> list[float]:
     """Return the driven joint angles [rad] after three periods of drift."""
     turn = (PERIODS - 1) * np.pi / 2
-    core = context.robot.core
-    return list(core.operating_point + turn * core.gear_ratio)
+    robot = context.robot
+    return list(robot.operating_point + turn * robot.gear_ratio)

@@ -108,7 +108,7 @@ def _nonlinear(context: Context) -> Result:
     )
     still, swung = ratio[[T1, T2]], ratio[[T1_SQUARE, T2_SQUARE]]
     refs = references(context.robot, DESIGNS[T1_SQUARE], context.seed, 0)
-    motion = np.cumsum(refs, axis=1) * context.robot.sample_time_s * context.robot.core.gear_ratio
+    motion = np.cumsum(refs, axis=1) * context.robot.sample_time_s * context.robot.gear_ratio
     swing = np.ptp(motion, axis=1).max()
     text = (
         f"entries of Table 8.2, nonlinear over linear, one realization: {still.min():.2f} to "

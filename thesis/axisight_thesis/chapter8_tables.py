@@ -126,7 +126,7 @@ def table_8_1(context: Context) -> Item:
         for name, sines in parts.items()
         for n, value, phase in sines
     ]
-    noise = context.robot.core.position_noise_std
+    noise = context.robot.position_noise_std
     rows.append({"amplitude": "e_phi, standard deviation [rad]", "value": noise})
     table = pd.DataFrame(rows)
     table["n"] = table["n"].astype("Int64")

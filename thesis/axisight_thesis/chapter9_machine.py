@@ -24,7 +24,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from axisight import _core
 from axisight.effects import Effect
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 from axisight.robot import Robot
@@ -148,4 +147,4 @@ def _robot(third_mass: bool, noise: bool) -> Robot:
             inertia=float(inertia),
         )
         text += drive if number == 1 else ""
-    return Robot(_core.Robot.from_toml(text))
+    return Robot.from_toml(text)

@@ -68,12 +68,12 @@ def _scattered(robot: Robot, seed: int) -> Robot:
         "damping": 0.05,
     }
     rng = np.random.default_rng([seed, 1])
-    changed = []
-    for name, value in robot.core.parameters():
+    changed = {}
+    for name, value in robot.parameters().items():
         spread = scatter.get(name.rsplit(".", 1)[1])
         if spread is not None:
-            changed.append((name, value * (1 + spread * float(np.clip(rng.normal(), -2, 2)))))
-    return Robot(robot.core.with_parameters(changed))
+            changed[name] = value * (1 + spread * float(np.clip(rng.normal(), -2, 2)))
+    return robot.with_parameters(changed)
 
 
 def _multisine(n: int, robot: Robot, rng: np.random.Generator, peak_rad_s: float) -> Array:

@@ -89,7 +89,7 @@ def excite_command(
         checked = read_design(data, "options" if design is None else str(design))
         machine = load_robot(checked.robot)
         # Without limits or a controller nothing is simulated.
-        if checked.limits is not None and machine.core.controller_kind != "none":
+        if checked.limits is not None and machine.controller_kind != "none":
             machine = load_simulator(checked.robot, identified=identified_effects)
         made = excite(checked, machine)
         _show(made)

@@ -165,7 +165,7 @@ def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
     if not 1 <= axis <= machine.n_axes:
         raise InputError(f"--axis: expected 1 to {machine.n_axes}, got {axis}")
     # Motor-side data do not show which way the joint turns.
-    return abs(float(machine.core.gear_ratio[axis - 1]))
+    return abs(float(machine.gear_ratio[axis - 1]))
 
 
 def _lines(band_hz: str | None, period_s: float | None) -> NDArray[np.int64] | None:

@@ -64,9 +64,9 @@ def read_logs(
                 say(f"{finding.severity}: {text}")
         log = read_log(path, columns, n_axes=None if robot is None else robot.n_axes)
         slides = [kind == "prismatic" for kind in log.axis_kinds]
-        if robot is not None and slides != list(robot.core.axis_is_prismatic):
+        if robot is not None and slides != list(robot.axis_is_prismatic):
             raise InputError(
-                f"{path.name}: expected axes that {_kinds(robot.core.axis_is_prismatic)} as the "
+                f"{path.name}: expected axes that {_kinds(robot.axis_is_prismatic)} as the "
                 f"robot's, got axes that {_kinds(slides)} by their units"
             )
         logs.append(log)

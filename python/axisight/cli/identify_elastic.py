@@ -96,7 +96,7 @@ def elastic_command(
         refuse_in_the_way(out, force)
         machine = load_source(robot)
         linear = [effect for effect in machine.effects if effect.name in _LINEAR]
-        model = Robot(machine.core, linear)
+        model = machine.with_effects(linear)
         data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
         search = axisight.frequency_fit.FrequencyFitOptions(

@@ -143,7 +143,7 @@ class _Spec:
 
 def robot_parameters(robot: Robot) -> dict[str, float]:
     """Return the names and values of all physical parameters of a robot."""
-    return dict(robot.core.parameters())
+    return robot.parameters()
 
 
 def robot_parameter(
@@ -232,7 +232,7 @@ def fit(
         replace(p, effect=p.effect + len(robot.effects)) if p.effect is not None else p
         for p in parameters
     ]
-    closed = robot.core.controller_kind != "none" and all(
+    closed = robot.controller_kind != "none" and all(
         log.velocity_ref_rad_s is not None for log in logs
     )
     result = _core.fit_simulation(

@@ -74,9 +74,9 @@ class InverseDynamicsFitter(ModelFitter):
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
-    changed = robot.core.with_parameters(list(variant.robot_values.items()))
+    changed = robot.with_parameters(variant.robot_values)
     result = _core.fit_inverse_dynamics(
-        changed,
+        changed.core,
         core_effects([*without(robot.effects, variant.effects), *variant.effects]),
         [],
         [at],
@@ -122,10 +122,10 @@ def inverse_noise(
 def _inertia(robot: Robot) -> Array:
     """Return the inertia felt by each motor at the operating point (n_axes,) [kg m^2]."""
     q = robot.equilibrium()["joint_angle_rad"].values
-    joints = robot.core.axis_joints
-    ratio = robot.core.gear_ratio
+    joints = robot.axis_joints
+    ratio = robot.gear_ratio
     arm = np.diag(robot.inertia_matrix(q))[joints] * ratio**2
-    own = dict(robot.core.parameters())
+    own = robot.parameters()
     motors = [own[f"{robot.joint_names[j]}.motor_inertia"] for j in joints]
     return np.asarray(arm + np.array(motors))
 

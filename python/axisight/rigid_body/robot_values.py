@@ -127,7 +127,7 @@ def _axis(model: TorqueModel, joint: str) -> int:
 
 
 def _rotors(model: TorqueModel) -> list[str]:
-    return [n for n, _ in model.robot.core.parameters() if n.endswith(".motor_inertia")]
+    return [n for n in model.robot.parameters() if n.endswith(".motor_inertia")]
 
 
 def _about_centre(link: Array) -> tuple[Array, Array]:

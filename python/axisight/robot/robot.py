@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -13,9 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError, RobotError
+from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
 
 Array = NDArray[np.float64]
+ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "none"]
 
 
 class Robot:
@@ -24,11 +27,19 @@ class Robot:
     Joint arrays run over all joints, driven and elastic, base to tip; axis
     arrays over driven joints only. ``q`` [rad or m], ``v``, ``a`` and forces
     [Nm or N] may have shape (n_joints,) or (n, n_joints).
+
+    ``core`` hands the robot to functions of the compiled core; everything that can be known of
+    it is an attribute or a method here.
     """
 
     def __init__(self, core: _core.Robot, effects: Sequence[Effect] = ()) -> None:
         self.core = core
         self.effects = tuple(effects)
+
+    @classmethod
+    def from_toml(cls, text: str, effects: Sequence[Effect] = ()) -> Robot:
+        """Return the robot of a description; raises RobotError naming line, key and expectation."""
+        return cls(_core.Robot.from_toml(text), effects)
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -58,6 +69,85 @@ class Robot:
     def joint_names(self) -> list[str]:
         """Names of all joints, base to tip."""
         return self.core.joint_names
+
+    @property
+    def toml(self) -> str:
+        """The description it was read from; parameters replaced since do not show in it."""
+        return self.core.toml
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints with link, spring and drive, base to tip, at the present parameters."""
+        return tuple(joint_of(entry) for entry in self.core.joints())
+
+    @property
+    def gravity_m_s2(self) -> Array:
+        """Gravity in the base frame [m/s^2], shape (3,)."""
+        return np.array(self.core.gravity_m_s2)
+
+    @property
+    def axis_joints(self) -> list[int]:
+        """Place in the chain, from 0, of the joint that each axis drives."""
+        return self.core.axis_joints
+
+    @property
+    def axis_names(self) -> list[str]:
+        """Name of the joint that each axis drives."""
+        names = self.joint_names
+        return [names[joint] for joint in self.axis_joints]
+
+    @property
+    def axis_is_prismatic(self) -> list[bool]:
+        """Whether each axis slides."""
+        return self.core.axis_is_prismatic
+
+    @property
+    def axis_is_rigid(self) -> list[bool]:
+        """Whether each axis has a rigid transmission."""
+        return self.core.axis_is_rigid
+
+    @property
+    def gear_ratio(self) -> Array:
+        """Joint angle per motor angle, shape (n_axes,) [1, m/rad if the axis slides]."""
+        return self.core.gear_ratio
+
+    @property
+    def operating_point(self) -> Array:
+        """Driven joint angles at the operating point, shape (n_axes,) [rad or m]."""
+        return self.core.operating_point
+
+    @property
+    def position_noise_std(self) -> float:
+        """Standard deviation of the white noise on motor positions, per sample [rad]."""
+        return self.core.position_noise_std
+
+    @property
+    def controller_kind(self) -> ControllerKind:
+        """``pi_velocity``, ``p_velocity``, ``cascade``, or ``none``."""
+        return self.core.controller_kind
+
+    @property
+    def controller_gains(self) -> dict[str, Array]:
+        """Gains by name, shape (n_axes,) each, motor side.
+
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
+        """
+        return self.core.controller_gains
+
+    def parameters(self) -> dict[str, float]:
+        """Return all physical parameters by name (``axis1.stiffness``), in SI units."""
+        return dict(self.core.parameters())
+
+    def with_parameters(self, values: Mapping[str, float]) -> Robot:
+        """Return the same robot with some parameters replaced, by name, in SI units.
+
+        Raises InputError for a name that `parameters` does not have.
+        """
+        return Robot(self.core.with_parameters(list(values.items())), self.effects)
+
+    def with_effects(self, effects: Iterable[Effect]) -> Robot:
+        """Return the same robot with ``effects`` in place of its own."""
+        return Robot(self.core, tuple(effects))
 
     def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
         out = []
@@ -225,7 +315,7 @@ def load_robot(source: Path | str) -> Robot:
     """
     if isinstance(source, str) and source in PRESETS:
         text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
-        return Robot(_core.Robot.from_toml(text), PRESETS[source])
+        return Robot.from_toml(text, PRESETS[source])
     path = Path(source)
     try:
         text = path.read_text("utf-8")
@@ -235,6 +325,6 @@ def load_robot(source: Path | str) -> Robot:
             f"{path}: expected a robot description or a preset ({known}): {error}"
         ) from error
     try:
-        return Robot(_core.Robot.from_toml(text))
+        return Robot.from_toml(text)
     except RobotError as error:
         raise RobotError(f"{path}: {error}") from None

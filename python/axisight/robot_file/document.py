@@ -26,7 +26,6 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
-from axisight import _core
 from axisight.effects import Effect, without
 from axisight.errors import InputError, RobotError
 from axisight.fitting import Fitted
@@ -254,7 +253,7 @@ def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
 
     ``sidecar_name`` is named in the head comment.
     """
-    text = robot.core.toml
+    text = robot.toml
     document = tomllib.loads(text)
     changes, notes = _changes(robot, document, found)
     spans = value_spans(text)
@@ -329,7 +328,7 @@ def _place(robot: Robot, document: dict[str, Any], name: str) -> tuple[int, str]
             return joint, quantity
         except (KeyError, TypeError):
             pass
-    known = ", ".join([n for n, _ in robot.core.parameters()])
+    known = ", ".join(robot.parameters())
     raise InputError(
         f"found: expected parameters among {known}, inertia_xx.., "
         f"origin_x.. and axis_x.., got {name!r}"
@@ -374,7 +373,7 @@ def _check(text: str, before: dict[str, Any], changes: dict[Key, float]) -> None
         raise RobotError(
             "source: its text cannot be edited faithfully; write it in plain TOML tables"
         )
-    _core.Robot.from_toml(text)
+    Robot.from_toml(text)
 
 
 def _equal(a: Any, b: Any) -> bool:
@@ -467,7 +466,7 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     if Path(report.robot).name != report.robot:
         raise InputError(f"{sidecar}: robot: expected a file beside it, got {report.robot!r}")
     robot = load_robot(sidecar.with_name(report.robot))
-    if check and text_hash(robot.core.toml) != report.robot_sha256:
+    if check and text_hash(robot.toml) != report.robot_sha256:
         raise InputError(_changed(sidecar, report.robot))
     source = report.provenance
     effects = _effects(report, robot)
@@ -482,7 +481,7 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         if report.covariance is None
         else checked_covariance(report.covariance, len(names)),
         effects=effects,
-        robot=Robot(robot.core, effects),
+        robot=robot.with_effects(effects),
         provenance=Provenance(
             source.method,
             source.data,
@@ -517,7 +516,7 @@ def load_with_effects(
     if (isinstance(source, str) and source in PRESETS) or not sidecar.is_file():
         return robot, ""
     report = _read_sidecar(sidecar)
-    if text_hash(robot.core.toml) != report.robot_sha256:
+    if text_hash(robot.toml) != report.robot_sha256:
         if check:
             raise InputError(_changed(sidecar, Path(source).name))
         unused = ", ".join(Effect(e.name, e.axis, e.parameters).label for e in report.effects)
@@ -526,7 +525,7 @@ def load_with_effects(
     effects = without(_effects(report, robot), given)
     named = ", ".join(effect.label for effect in effects if effect.acts)
     line = f"with the effects in {sidecar}: {named}" if named else ""
-    return Robot(robot.core, effects), line
+    return robot.with_effects(effects), line
 
 
 def _read_sidecar(sidecar: Path) -> Sidecar:

@@ -74,7 +74,7 @@ class Sidecar(Strict):
                 schema=SCHEMA,
                 robot=name,
                 robot_sha256=text_hash(text),
-                source_sha256=text_hash(robot.core.toml),
+                source_sha256=text_hash(robot.toml),
                 parameters=[
                     ParameterEntry(name=n, value=float(v), standard_error=known(e))
                     for n, v, e in zip(
