@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 from axisight.errors import ConvergenceError
 from axisight.excitation import multisine, square, triangle
 from axisight.frf import etfe
-from axisight.graybox import AxisData, AxisFit, AxisModel, FitSettings, fit_axis
-from axisight.graybox.procedure import InitialModel, initial_model
+from axisight.graybox import (
+    AxisData,
+    AxisFit,
+    AxisModel,
+    FitSettings,
+    InitialModel,
+    fit_axis,
+    initial_model,
+)
 from axisight.records import PeriodicRecords
 from axisight.simulation import simulate
 from axisight_thesis.chapter8_setting import clipped

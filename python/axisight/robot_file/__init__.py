@@ -5,16 +5,13 @@ they find is written here.
 """
 
 from axisight.robot_file.document import (
-    Identified,
-    Provenance,
     hash_file,
-    identified,
-    identified_by_fit,
     load_identified,
     load_with_effects,
     sidecar_path,
     write_identified,
 )
+from axisight.robot_file.identified import Identified, Provenance, identified, identified_by_fit
 
 __all__ = [
     "Identified",

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.errors import InputError
 from axisight.robot import Robot
-
-if TYPE_CHECKING:
-    from axisight.robot_file.document import Identified
+from axisight.robot_file.identified import Identified
 
 SCHEMA: Literal["axisight.identified/1"] = "axisight.identified/1"
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.robot_file.document import Identified, Provenance, identified
+from axisight.robot_file.identified import Identified, Provenance, identified
 
 Array = NDArray[np.float64]
 
