@@ -10,17 +10,52 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects, without
-from axisight.fitting import FitOptions, Parameter, Weighting, core_spec
+from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.simulation_error import core_spec
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
 from axisight.gap.settings import Settings
 from axisight.gap.torques import Variant
+from axisight.gap.view import View
 from axisight.logs import Log, differentiate, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
+
+# Below the first resonance of most machines, above the spectrum of their motions.
+INVERSE_CUTOFF_HZ = 60.0
+
+
+class InverseView(View):
+    """Torque predicted from the measured motion."""
+
+    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+        cutoff = min(INVERSE_CUTOFF_HZ, 0.2 / robot.sample_time_s)
+        self.cutoff_hz = cutoff
+        floor = inverse_floor(robot, logs, cutoff, settings)
+        fitter = InverseDynamicsFitter(
+            robot,
+            [motion(log, cutoff) for log in logs],
+            floor.weighting,
+            settings.tolerances,
+            settings.block_s,
+        )
+        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
+
+    def measured(self, log: Log) -> Array:
+        """Return the low-passed torque."""
+        return motion(log, self.cutoff_hz)[3]
+
+    def torque(self, variant: Variant, log: Log) -> Array:
+        """Return the predicted torque."""
+        return predicted_torque(self.robot, variant, motion(log, self.cutoff_hz))
+
+    def noise(self, log: Log, run: int) -> Array:
+        """Return the error that noise of position and torque causes."""
+        std = self.floor.position_std_rad
+        return inverse_noise(self.robot, log, std, self.cutoff_hz, self.settings.seed, 2 * run)
 
 
 def motion(log: Log, cutoff_hz: float) -> Motion:
@@ -73,9 +108,9 @@ class InverseDynamicsFitter(ModelFitter):
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
-    changed = robot.core.with_parameters(list(variant.robot_values.items()))
+    changed = robot.with_parameters(variant.robot_values)
     result = _core.fit_inverse_dynamics(
-        changed,
+        changed.core,
         core_effects([*without(robot.effects, variant.effects), *variant.effects]),
         [],
         [at],
@@ -121,10 +156,10 @@ def inverse_noise(
 def _inertia(robot: Robot) -> Array:
     """Return the inertia felt by each motor at the operating point (n_axes,) [kg m^2]."""
     q = robot.equilibrium()["joint_angle_rad"].values
-    joints = robot.core.axis_joints
-    ratio = robot.core.gear_ratio
+    joints = robot.axis_joints
+    ratio = robot.gear_ratio
     arm = np.diag(robot.inertia_matrix(q))[joints] * ratio**2
-    own = dict(robot.core.parameters())
+    own = robot.parameters()
     motors = [own[f"{robot.joint_names[j]}.motor_inertia"] for j in joints]
     return np.asarray(arm + np.array(motors))
 

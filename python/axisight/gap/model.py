@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects, without
+from axisight.effects import Effect, without
 from axisight.fitting import (
     FitOptions,
     Parameter,
     Weighting,
-    core_spec,
     effect_parameter,
     robot_parameter,
     robot_parameters,
@@ -212,7 +211,7 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
     """Return the robot parameter that an effect stands in for: it is then held at its value."""
     if effect.axis is None or effect.name not in _SAME:
         return None
-    joint = robot.joint_names[robot.core.axis_joints[effect.axis - 1]]
+    joint = robot.axis_names[effect.axis - 1]
     return f"{joint}.{_SAME[effect.name]}"
 
 
@@ -263,45 +262,3 @@ def _evidence(
         residual=result.residual,
         nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(names) if e is None},
     )
-
-
-class ClosedLoopFitter(ModelFitter):
-    """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
-
-    In a linear loop this is the torque by which a run driven by the references
-    would be off; in a nonlinear one the simulator also stays in phase with the
-    log, without which lost motion and stiction have no smooth error to fit.
-    ``records``: (position [rad], torque [Nm]) of each log, (n, n_axes).
-    """
-
-    def __init__(
-        self,
-        robot: Robot,
-        records: list[tuple[Array, Array]],
-        weighting: Weighting,
-        tolerances: Mapping[str, float],
-        block_s: float,
-    ) -> None:
-        super().__init__(robot, weighting, tolerances, block_s)
-        self.records = records
-
-    def solve(
-        self,
-        effects: Sequence[Effect],
-        parameters: Sequence[Parameter],
-        options: FitOptions,
-        warm: list[tuple[int, Array]],
-    ) -> _core.FitResult:
-        """Run the fit in the core."""
-        return _core.fit_simulation(
-            self.robot.core,
-            core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
-            self.records,
-            self.weighting.core(),
-            options,
-            input="tracking",
-            output="torque",
-            warm=warm,
-            cancel=self.cancel,
-        )
