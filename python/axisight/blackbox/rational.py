@@ -24,6 +24,7 @@ from axisight.blackbox._weights import UsableLines, Weighting, usable_lines
 from axisight.errors import AxisightError, InputError
 from axisight.frf.pooled import MISFIT_EXPLAINED, few_words
 from axisight.frf.response import DIMS, frequency_response
+from axisight.statistics.evaluation import last_value
 
 
 @dataclass(frozen=True)
@@ -374,15 +375,7 @@ def _starts(
 def _searched(
     problem: Weighted, start: Sections, domain: Domain, stable: bool, limit: int
 ) -> tuple[Sections, int, bool]:
-    at: dict[bytes, Solved] = {}
-
-    def solved(vector: Real) -> Solved:
-        # Residual and Jacobian are asked for at the same place, one after the other.
-        key = vector.tobytes()
-        if key not in at:
-            at.clear()
-            at[key] = problem.residues(Sections.of_vector(vector))
-        return at[key]
+    solved = last_value(lambda vector: problem.residues(Sections.of_vector(vector)))
 
     def residual(vector: Real) -> Real:
         sections = Sections.of_vector(vector)

@@ -1,0 +1,1 @@
+"""Statistics and linear algebra on results that several kinds of fits share."""
