@@ -18,6 +18,9 @@ from axisight.blackbox._sections import Domain, Sections, Weighted
 SMALL_CONSTANT = 1e-8
 """A smaller d would throw the zeros of sigma to infinity."""
 
+NO_RATE = 1e-12
+"""Size of a pole that is at zero but for rounding."""
+
 
 def relocated(problem: Weighted, sections: Sections) -> Complex:
     """Return the poles after one iteration."""
@@ -78,5 +81,7 @@ def _conjugate(poles: Complex) -> Complex:
 
 
 def _moved(old: Complex, new: Complex) -> float:
-    distance = np.abs(old[:, None] - new[None, :]) / np.abs(new)[None, :]
+    # The band lies about one: a pole that is this much slower is one at zero.
+    size = np.maximum(np.abs(new), NO_RATE)
+    distance = np.abs(old[:, None] - new[None, :]) / size[None, :]
     return float(np.max(np.min(distance, axis=0)))

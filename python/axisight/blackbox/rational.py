@@ -81,6 +81,22 @@ class RationalModel:
         """Whether all poles but the integrators are stable."""
         return self.domain.stable(self.sections.poles())
 
+    def zeros(self, output: int = 1, input_: int = 1) -> Complex:
+        """Return the zeros (n,) of element (``output``, ``input_``), from 1, as ``poles`` are given.
+
+        For models with a direct term and without integrators; raises InputError for others.
+        """
+        for name, value, most in (("output", output, self.n_out), ("input_", input_, self.n_in)):
+            if whole(name, value, 1) > most:
+                raise InputError(f"{name}: expected at most {most}, got {value}")
+        top = self.numerators[(output - 1) * self.n_in + input_ - 1]
+        if self.integrators or not self._direct or top[-1] == 0:
+            raise InputError(
+                "zeros: expected a model with a direct term and no integrators, got "
+                f"{self.integrators} integrators and the direct term {self.direct}"
+            )
+        return self.domain.natural(self.sections.zeros(top[: self.order], float(top[-1])))
+
     def modes(self) -> xr.Dataset:
         """Return the poles as modes, slowest first, with standard errors.
 
