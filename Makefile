@@ -29,12 +29,15 @@ SOURCES := $(sort $(shell find crates python -type f \
 	$(wildcard .cargo/config.toml rust-toolchain.toml README.md LICENSE-APACHE LICENSE-MIT) \
 	Cargo.toml Cargo.lock pyproject.toml)
 
+# The thesis's study is a package of its own, pure Python.
+STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
+
 .PHONY: setup demo test test-rust test-python lint format docs bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
 
-demo: $(STAMPS)/installed
+demo: $(STAMPS)/installed $(STAMPS)/study
 	rm -rf demo
 	$(BIN)/axisight demo --out demo
 	@report=$$(find demo -name '*.html' | sort | head -n 1); \
@@ -84,8 +87,8 @@ $(STAMPS)/venv:
 	mkdir -p $(STAMPS)
 	touch $@
 
-$(STAMPS)/maturin: $(STAMPS)/venv
-	$(PIP) install 'maturin>=1.9,<2'
+$(STAMPS)/build-tools: $(STAMPS)/venv
+	$(PIP) install 'maturin>=1.9,<2' 'flit_core>=3.11,<4'
 	touch $@
 
 # Written anew only when a file was added or removed, so that the wheel notices that too.
@@ -94,7 +97,7 @@ $(WHEELS)/.sources: force
 	@printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
 
 # Dated from the start of the build: a source edited meanwhile counts as newer.
-$(WHEELS)/.built: $(WHEELS)/.sources $(SOURCES) | $(STAMPS)/maturin
+$(WHEELS)/.built: $(WHEELS)/.sources $(SOURCES) | $(STAMPS)/build-tools
 	@rm -f $(WHEELS)/axisight-*.whl
 	@touch $@.begun
 	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS)
@@ -109,8 +112,13 @@ $(STAMPS)/installed: $(WHEELS)/.built
 	$(PIP) install --force-reinstall --no-deps $(WHEELS)/axisight-*.whl
 	touch $@
 
+# Needs nothing that the wheel does not bring.
+$(STAMPS)/study: $(STUDY) | $(STAMPS)/installed
+	$(PIP) install --force-reinstall --no-deps --no-build-isolation ./thesis
+	touch $@
+
 # The dependencies of an extra change only with pyproject.toml.
-$(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/installed
+$(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/installed $(STAMPS)/study
 	touch $@
 
 $(STAMPS)/bench-tools: $(STAMPS)/bench-extra $(STAMPS)/installed

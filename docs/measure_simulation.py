@@ -34,7 +34,7 @@ def read(text: str) -> axisight.Robot:
 
 def two_masses() -> axisight.Robot:
     """One motor, one gear, one link: the preset `two_mass_axis` without its effects."""
-    return axisight.Robot(axisight.load_robot("two_mass_axis").core)
+    return axisight.load_robot("two_mass_axis").with_effects([])
 
 
 def chain(n_joints: int) -> axisight.Robot:

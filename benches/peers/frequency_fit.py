@@ -55,7 +55,9 @@ def main() -> None:
     parser.add_argument("--lines", type=int, default=391)
     lines = parser.parse_args().lines
     robot = axisight.load_robot("irb6600_like")
-    text = resources.files("axisight.presets").joinpath("irb6600_like.toml").read_text("utf-8")
+    text = (
+        resources.files("axisight.robot.presets").joinpath("irb6600_like.toml").read_text("utf-8")
+    )
     arm = linear_arm.Arm.read(text)
     f = np.linspace(1.0, 40.0, lines)
     z = np.exp(2j * np.pi * f * robot.sample_time_s)

@@ -65,7 +65,7 @@ def check_same_plant(robot: _core.Robot, text: str) -> float:
 
 def rows(repeats: int) -> list[tuple[str, float, float, str]]:
     """Label, our time and the peer's per unit [us], remark."""
-    text = (ROOT / "python/axisight/presets/irb6600_like.toml").read_text()
+    text = (ROOT / "python/axisight/robot/presets/irb6600_like.toml").read_text()
     robot = _core.Robot.from_toml(text)
     model = pinocchio_model.build(text)
     data = model.createData()

@@ -7,7 +7,7 @@ use axisight_core::robot::{EffectSetting, RobotDescription, read_robot};
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
 pub fn preset() -> RobotDescription {
-    let text = include_str!("../../python/axisight/presets/irb6600_like.toml");
+    let text = include_str!("../../python/axisight/robot/presets/irb6600_like.toml");
     read_robot(text).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -105,7 +105,7 @@ def measure(
         place = number * realizations + run
         turn = np.random.default_rng([9, place]).uniform(0, 2 * np.pi, robot.n_axes)
         # The linearized robot stays that of its starting point.
-        start = pose if model == "linear" else pose + turn * robot.core.gear_ratio
+        start = pose if model == "linear" else pose + turn * robot.gear_ratio
         period = references(robot, 5, place)
         simulated = simulate_batch(
             robot,
@@ -120,7 +120,7 @@ def measure(
         torque, position = (
             simulated[name].values[:, None, n:] for name in ("torque_cmd_nm", "position_rad")
         )
-        angles.append(position.mean(axis=(0, 1, 2)) * robot.core.gear_ratio)
+        angles.append(position.mean(axis=(0, 1, 2)) * robot.gear_ratio)
         records.append(PeriodicRecords(robot.sample_time_s, torque, position, LINES))
     at = np.mean(angles, axis=0) if model == "nonlinear" else pose
     return at, frf.logarithmic_mean(records, quantity="acceleration")

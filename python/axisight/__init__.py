@@ -31,7 +31,13 @@ from axisight.fitting import (
 from axisight.frf.plots import plot_bode, plot_response_matrix
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.logs import Case, Log, check_log, read_case, read_log
-from axisight.plots import plot_gap_map, plot_log, plot_overlay, plot_ranking, plot_simulation
+from axisight.report.plots import (
+    plot_gap_map,
+    plot_log,
+    plot_overlay,
+    plot_ranking,
+    plot_simulation,
+)
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate, simulate_batch
 
@@ -115,4 +121,6 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in _LATER:
         return import_module(f"axisight.{name}")
+    if name == "reproduce":  # an installation of its own, see thesis/
+        return import_module("axisight_thesis")
     raise AttributeError(f"module 'axisight' has no attribute {name!r}")

@@ -92,6 +92,24 @@ class EffectInfo(TypedDict):
     parameters: list[ParameterInfo]
 
 @type_check_only
+class JointEntry(TypedDict):
+    """A joint: ``origin`` [m] and unit ``axis`` in the parent link's frame, and what it carries.
+
+    ``spring`` stiffness, damping [Nm/rad, Nm s/rad] or [N/m, N s/m], None if rigid; ``link`` mass
+    [kg], centre of mass [m] and inertia about it, xx yy zz xy xz yz [kg m^2], None if massless;
+    ``drive`` joint angle per motor angle, motor inertia [kg m^2] and viscous friction
+    [Nm s/rad], motor side, None if no motor acts.
+    """
+
+    name: str
+    prismatic: bool
+    origin: list[float]
+    axis: list[float]
+    spring: tuple[float, float] | None
+    link: tuple[float, list[float], list[float]] | None
+    drive: tuple[float, float, float] | None
+
+@type_check_only
 class Equilibrium(TypedDict):
     """A robot at rest: ``joint_angle`` (n_joints,) [rad], the others (n_axes,) [rad], [Nm]."""
 
@@ -275,6 +293,11 @@ class Robot:
 
         ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
         """
+    @property
+    def gravity_m_s2(self) -> list[float]:
+        """Gravity in the base frame [m/s^2], shape (3,)."""
+    def joints(self) -> list[JointEntry]:
+        """Every joint, base to tip, with the parameters replaced since it was read."""
     def parameters(self) -> list[tuple[str, float]]:
         """Names (``<joint>.<quantity>``) and SI values of all physical parameters."""
     def with_parameters(self, values: Sequence[tuple[str, float]]) -> Robot:

@@ -284,7 +284,7 @@ def sensor_noise(
     A function of (seed, run) with the standard deviation of the sensor; white, or first
     order with corner ``cutoff_hz``. Raises InputError for a cutoff that is not positive.
     """
-    std = robot.core.position_noise_std
+    std = robot.position_noise_std
     if cutoff_hz is None:
         return white_noise(seed, run, n_samples, robot.n_axes) * std
     _check_stream(seed, run)

@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tests" / "python"))
 import pinocchio_model  # noqa: E402
 
 SEED = 20261121
-ROBOT = "python/axisight/presets/irb6600_like.toml"
+ROBOT = "python/axisight/robot/presets/irb6600_like.toml"
 POINT = [0.3, -0.2, 0.5]
 
 

@@ -39,7 +39,7 @@ def small_study(**changes) -> mc.Study:
 
 def robot_file(folder: Path, old: str, new: str) -> str:
     """The preset robot with a piece of its text replaced, as a file."""
-    text = load_robot(ROBOT).core.toml
+    text = load_robot(ROBOT).toml
     assert old in text
     path = folder / "robot.toml"
     path.write_text(text.replace(old, new))

@@ -1,8 +1,8 @@
 """Which effects an identified quantity has taken up."""
 
 from axisight import Effect
-from axisight.absorbed import ABSORBED, absorbed_effects, absorbed_note
 from axisight.effects import effect_info
+from axisight.robot_file.absorbed import ABSORBED, absorbed_effects, absorbed_note
 
 
 def test_the_table_names_effects_once() -> None:

@@ -219,7 +219,7 @@ def test_a_failed_run_is_blank_from_there_on_and_spoils_no_neighbour(
 
 
 def test_an_unstable_loop_diverges_in_every_run_at_its_own_sample() -> None:
-    text = ARM.core.toml
+    text = ARM.toml
     assert "kp = [7.039" in text
     robot = Robot(_core.Robot.from_toml(text.replace("kp = [7.039", "kp = [-7.039")))
     scale = np.array([1e-6, 1e-3, 1.0])[:, None, None]

@@ -17,8 +17,8 @@ from axisight.errors import InputError
 from axisight.frf import logarithmic_mean, mfrf
 from axisight.frf.response import frequency_response
 from axisight.records.periodic import PeriodicRecords
-from axisight.reproduce.chapter8_setting import Design, references, ripple
 from axisight.simulation import simulate_batch
+from axisight_thesis.chapter8_setting import Design, references, ripple
 
 OMEGA = 2 * np.pi * np.array([8.0, 15.0, 30.0])
 ZETA = np.array([0.02, 0.015, 0.03])

@@ -63,7 +63,7 @@ def test_deflected_arm_is_where_its_springs_are_in_balance(robot):
     start = nominal(robot)
     for q in configurations(5, 4):
         rest = robot.equilibrium(q)
-        ahead = rest["motor_angle_rad"].values * robot.core.gear_ratio
+        ahead = rest["motor_angle_rad"].values * robot.gear_ratio
         torque = load_torque(robot, ahead[None], np.zeros(1), LOADS)
         _, position = start.tool_location(ahead[None], torque)
         rotation, origin = robot.pose(rest["joint_angle_rad"].values)
@@ -136,12 +136,12 @@ def test_every_derivative_against_differences(robot):
 
 
 def test_sliding_joint(robot):
-    text = robot.core.toml.replace(
+    text = robot.toml.replace(
         'kind = "driven"\norigin = [0, 0, 1.0]',
         'kind = "driven"\nmotion = "prismatic"\norigin = [0, 0, 1.0]',
     )
-    slider = type(robot)(type(robot.core).from_toml(text))
-    assert slider.core.axis_is_prismatic[2]
+    slider = type(robot).from_toml(text)
+    assert slider.axis_is_prismatic[2]
     test_nominal_tool_is_where_the_robot_says(slider)
     test_offset_columns_are_the_jacobian_of_the_robot(slider)
     test_every_derivative_against_differences(slider)

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from axisight import Effect, load_robot, simulate
 from axisight.cli import app
-from axisight.demo import write_demo_case
+from axisight.cli.demo import write_demo_case
 
 ROBOT = "two_mass_axis"
 

@@ -388,7 +388,7 @@ def test_one_command_takes_up_what_another_found(axis_logs, tmp_path: Path) -> N
     first, second = tmp_path / "axis.toml", tmp_path / "elastic.toml"
     run("axis", *axis_logs, "--robot", "two_mass_axis", *LINES, "-o", first)
     robot = load_identified(first).robot
-    bare = Robot(robot.core)
+    bare = robot.with_effects([])
     g = model_response(bare, LINES_HZ, [0.0], quantity="acceleration").values
     variance = (0.01 * np.abs(g)) ** 2
     response = frequency_response(
@@ -478,7 +478,7 @@ def test_the_page_runs_as_it_stands(
     for name, source in files.items():
         shutil.copy(source, tmp_path / name)
     for name, preset in (("axis", "two_mass_axis"), ("arm_elastic", "irb6600_like")):
-        (tmp_path / f"{name}.toml").write_text(load_robot(preset).core.toml)
+        (tmp_path / f"{name}.toml").write_text(load_robot(preset).toml)
     blocks = re.findall(r"```sh\n(.*?)```", page, flags=re.DOTALL)
     assert len(blocks) == 3
     for block in blocks:

@@ -180,7 +180,7 @@ def test_diagnose_does_without_when_told(axis: Path, log: Path, monkeypatch) -> 
         seen.append(inputs["robot"].effects)
         raise InputError("seen")
 
-    monkeypatch.setattr("axisight.cli.diagnose", stop)
+    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
     command = ["diagnose", log, log, "--model", axis]
     assert "with the effects in" in run(*command, code=2)
     assert "identified" not in run(*command, "--no-identified-effects", code=2)

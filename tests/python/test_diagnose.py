@@ -14,7 +14,7 @@ SECONDS = 6.0
 
 def bare_axis() -> Robot:
     """The two-mass axis as a simulator that models no effect."""
-    return Robot(load_robot("two_mass_axis").core)
+    return load_robot("two_mass_axis").with_effects([])
 
 
 def reference(kind: str, seed: int, n: int, sample_time_s: float) -> np.ndarray:
@@ -54,12 +54,12 @@ def scattered(robot: Robot, seed: int) -> Robot:
     """About one per cent off in everything, as any other machine of the type."""
     rng = np.random.default_rng(seed)
     spread = {"stiffness": 0.01, "damping": 0.05, "motor_inertia": 0.01, "viscous_friction": 0.02}
-    values = [
-        (name, value * (1 + spread[q] * rng.uniform(-1, 1)))
-        for name, value in robot.core.parameters()
+    values = {
+        name: value * (1 + spread[q] * rng.uniform(-1, 1))
+        for name, value in robot.parameters().items()
         if (q := name.rsplit(".", 1)[1]) in spread
-    ]
-    return Robot(robot.core.with_parameters(values))
+    }
+    return robot.with_parameters(values)
 
 
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}

@@ -78,7 +78,7 @@ class Balance:
 
 
 def balance(sample_time: float) -> Balance:
-    text = load_robot("irb6600_like").core.toml
+    text = load_robot("irb6600_like").toml
     assert "sample_time = 5.0e-4" in text
     text = text.replace("sample_time = 5.0e-4", f"sample_time = {sample_time}")
     robot = Robot(_core.Robot.from_toml(text))

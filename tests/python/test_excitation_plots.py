@@ -66,7 +66,7 @@ def test_command_draws(tmp_path: Path) -> None:
 
 def uncontrolled() -> str:
     """The preset without its controller."""
-    lines = ROBOT.core.toml.splitlines()
+    lines = ROBOT.toml.splitlines()
     first = lines.index("[controller]")
     last = next(i for i in range(first + 1, len(lines)) if lines[i].startswith("["))
     return "\n".join([*lines[:first], '[controller]\nkind = "none"', *lines[last:]])
@@ -92,9 +92,9 @@ def test_torque_without_a_controller_is_that_of_the_rigid_robot(free, period_s) 
     assert largest.sel(quantity="acceleration", axis=1) == pytest.approx(rate, rel=1e-3)
     # Axis 1 is vertical: no gravity; its own motion only, A w and A 90 degrees apart.
     rest = free.equilibrium()["joint_angle_rad"].values
-    joint = free.core.axis_joints[0]
-    ratio = free.core.gear_ratio[0]
-    known = dict(free.core.parameters())
+    joint = free.axis_joints[0]
+    ratio = free.gear_ratio[0]
+    known = free.parameters()
     name = free.joint_names[joint]
     inertia = known[f"{name}.motor_inertia"]
     inertia += ratio**2 * free.inertia_matrix(rest)[joint, joint]

@@ -262,7 +262,7 @@ def test_priors_pull_and_frozen_parameters_stay() -> None:
     assert fit.names == ("axis1.stiffness", "axis3.stiffness")
     assert fit.values[0] == pytest.approx(mean, rel=1e-5)
     assert fit.std[0] <= 1.01e-6 * mean
-    assert dict(fit.robot.core.parameters())["axis2.stiffness"] == 4e6
+    assert fit.robot.parameters()["axis2.stiffness"] == 4e6
 
 
 def test_several_starts_find_the_best_and_are_reproducible() -> None:
@@ -494,7 +494,7 @@ def test_robust_loss_is_at_its_minimum() -> None:
     fit = fit_responses(ROBOT, data, [name], options=options)
 
     def loss(log_value: float) -> float:
-        robot = Robot(ROBOT.core.with_parameters([(name, float(np.exp(log_value)))]))
+        robot = ROBOT.with_parameters({name: float(np.exp(log_value))})
         total = 0.0
         for one in data:
             model = model_response(

@@ -21,7 +21,7 @@ def test_the_robot_comes_back(shown: dict[str, Any]) -> None:
     error = fit.values - np.array([truth[name] for name in fit.names])
     # Chi-squared with 5 degrees of freedom: below 26 with probability 0.9999.
     assert error @ np.linalg.solve(fit.covariance, error) < 26
-    assert dict(shown["better"].core.parameters())["axis1.stiffness"] == fit.values[0]
+    assert shown["better"].parameters()["axis1.stiffness"] == fit.values[0]
 
 
 def test_what_stays_unknown_is_named(shown: dict[str, Any]) -> None:

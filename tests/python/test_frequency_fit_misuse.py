@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from axisight import Effect, InputError, Parameter, Robot, frf, load_robot
+from axisight import Effect, InputError, Parameter, frf, load_robot
 from axisight.frequency_fit import (
     FrequencyFitOptions,
     MeasuredResponse,
@@ -207,12 +207,13 @@ def test_too_few_lines_leave_combinations_unknown() -> None:
     assert fit.identifiability.condition == np.inf
     # The combination is right: along it the response does not change.
     (direction,) = combination.directions
-    moved = [
-        (name, value * np.exp(1e-4 * share))
+    moved = {
+        name: value * np.exp(1e-4 * share)
         for name, value, share in zip(fit.names, fit.values, direction, strict=True)
-    ]
-    other = Robot(ROBOT.core.with_parameters(moved)).zoh_response([2.0], POSES[0])
-    alone = Robot(ROBOT.core.with_parameters(moved[:1])).zoh_response([2.0], POSES[0])
+    }
+    first = fit.names[0]
+    other = ROBOT.with_parameters(moved).zoh_response([2.0], POSES[0])
+    alone = ROBOT.with_parameters({first: moved[first]}).zoh_response([2.0], POSES[0])
     base = ROBOT.zoh_response([2.0], POSES[0])
     change, single = (abs((x / base).values[0, 0, 0] - 1) for x in (other, alone))
     assert change < 1e-3 * single

@@ -209,7 +209,7 @@ def test_loop_of_the_robot(robot):
     """F and P against the controller's own equations, run as a filter on one axis."""
     n, step = 4096, robot.sample_time_s
     rng = np.random.default_rng(6)
-    gains = robot.core.controller_gains
+    gains = robot.controller_gains
     kp, ki = gains["kp"][0], gains["ki"][0]
     w_ref, y = rng.standard_normal(n), rng.standard_normal(n)
     w_ref -= w_ref.mean()
@@ -223,7 +223,7 @@ def test_loop_of_the_robot(robot):
 
 
 def test_loop_refuses_other_controllers(tmp_path, robot):
-    before, after = robot.core.toml.split("[controller]")
+    before, after = robot.toml.split("[controller]")
     text = before + '[controller]\nkind = "none"\n' + after[after.index("[sensor]") :]
     path = tmp_path / "robot.toml"
     path.write_text(text)
@@ -286,7 +286,7 @@ def _without_leakage(robot, references):
     """Noise variance at the first line, element (1, 1), had the noise no past and no future."""
     run = simulate_batch(robot, np.tile(references, (1, 41, 1)), model="linear")
     u = _spectrum(run["torque_cmd_nm"].values[:, -N:])
-    power = np.full((len(LINES), 3), N * robot.core.position_noise_std**2)
+    power = np.full((len(LINES), 3), N * robot.position_noise_std**2)
     to_acceleration, _ = _true(robot)
     return (np.abs(to_acceleration) ** 2 * errors.error_variance(power, u))[0, 0, 0]
 

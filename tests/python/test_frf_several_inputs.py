@@ -57,7 +57,7 @@ def test_leakage_of_noise_is_what_a_simulated_loop_shows():
     robot = load_robot("irb6600_like")
     a, b, c = _sampled(robot)
     kp, ki = velocity_gains(robot)
-    step, std, n, runs = robot.sample_time_s, robot.core.position_noise_std, 400, 300
+    step, std, n, runs = robot.sample_time_s, robot.position_noise_std, 400, 300
     rng = np.random.default_rng(2)
     x, before = np.zeros((runs, len(a))), np.zeros((runs, len(kp)))
     inputs, outputs = [], []
@@ -91,7 +91,7 @@ def test_prediction_divides_leakage_by_the_square_of_the_number_of_periods():
         frf.predict_errors(robot, refs, lines, n_periods=p)["noise_variance"] for p in (1, periods)
     )
     frequency = lines / signal.period_s
-    white = n * robot.core.position_noise_std**2
+    white = n * robot.position_noise_std**2
     ends = [noise_leakage_power(robot, frequency, p * n) for p in (1, periods)]
     expected = (white / periods + ends[1] / periods**2) / (white + ends[0])
     ratio = (many / one).transpose("frequency_hz", "output", "input").values

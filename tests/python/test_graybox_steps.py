@@ -13,10 +13,19 @@ from scipy.integrate import solve_ivp
 from axisight.errors import InputError
 from axisight.excitation import multisine, square, triangle
 from axisight.frf import etfe, frequency_response
-from axisight.graybox import AxisData, AxisModel, Collocated, Landmark, collocated, flexibilities
+from axisight.graybox import (
+    AxisData,
+    AxisModel,
+    Collocated,
+    Landmark,
+    axis_data,
+    collocated,
+    flexibilities,
+    identify_axis,
+    initial_model,
+)
 from axisight.graybox.flexibilities import cubic_spring, initial_flexibility, simulate_deflection
 from axisight.graybox.landmarks import find_notch
-from axisight.graybox.procedure import axis_data, identify_axis, initial_model
 from axisight.graybox.spring_masses import SpringMassChain
 from axisight.graybox.step_one import rigid_body_friction
 from axisight.logs import Log

@@ -46,7 +46,7 @@ def motor_log(robot: Robot, seed: int, n: int = 8000, noise: float = 0.0) -> Log
     """A log of a robot with rigid gears and joints, friction and offsets."""
     model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
     q, v, a = smooth_motion(robot, n, STEP, seed)
-    elastic = np.delete(np.arange(robot.n_joints), robot.core.axis_joints)
+    elastic = np.delete(np.arange(robot.n_joints), robot.axis_joints)
     q[:, elastic] = v[:, elastic] = a[:, elastic] = 0.0
     torque = model.matrix(q, v, a) @ truth_of(model)
     torque += noise * np.random.default_rng(seed).normal(size=torque.shape)
@@ -55,7 +55,7 @@ def motor_log(robot: Robot, seed: int, n: int = 8000, noise: float = 0.0) -> Log
         sample_time_s=STEP,
         time_s=STEP * np.arange(n),
         torque_nm=torque,
-        position_rad=model.coupling.motor_motion(q[:, robot.core.axis_joints]),
+        position_rad=model.coupling.motor_motion(q[:, robot.axis_joints]),
         source=Path(f"run{seed}"),
     )
 
@@ -78,7 +78,7 @@ def test_it_is_the_steps_by_hand(robot, logs) -> None:
     for log in logs:
         m = estimate_motion(log.position_rad, log.torque_nm, sample_time_s=STEP, cutoff_hz=8.0)
         motor = (m.position_rad, m.velocity_rad_s, m.acceleration_rad_s2)
-        parts.append([*(x * robot.core.gear_ratio for x in motor), m.torque_nm])
+        parts.append([*(x * robot.gear_ratio for x in motor), m.torque_nm])
     both = [np.concatenate(x) for x in zip(*parts[:2], strict=True)]
     want = identify_rigid_body(model, *both)
     np.testing.assert_allclose(found.estimate.values, want.values, rtol=1e-9)
@@ -282,7 +282,7 @@ def test_the_prior_share_says_how_near_to_the_file(logs) -> None:
 def test_elastic_joints_count_as_locked() -> None:
     """The oracle is the same robot without them: in the preset they sit on the gears' axes."""
     elastic = load_robot("irb6600_like")
-    data = parse(elastic.core.toml)
+    data = parse(elastic.toml)
     joints = []
     for joint in data["joint"]:
         if joint["kind"] == "driven":

@@ -31,7 +31,7 @@ CONTROLLED = ("dopri5", "radau5", "rodas4", "auto")
 IMPLICIT = ("radau5", "rodas4", "auto")
 ARM = load_robot("irb6600_like")
 # Without the effects the preset comes with.
-TWO_MASSES = Robot(load_robot("two_mass_axis").core)
+TWO_MASSES = load_robot("two_mass_axis").with_effects([])
 
 
 def positions(run: xr.Dataset) -> Array:
@@ -50,7 +50,7 @@ def sines(n: int, amplitude: float, n_axes: int = 3) -> Array:
 
 def fall(method: str, tolerance: float) -> xr.Dataset:
     """The arm let go, sampled so rarely that steps end where the tolerance says."""
-    text = ARM.core.toml
+    text = ARM.toml
     assert "sample_time = 5.0e-4" in text
     rarely = _core.Robot.from_toml(text.replace("sample_time = 5.0e-4", "sample_time = 2.0e-2"))
     return axisight.simulate(

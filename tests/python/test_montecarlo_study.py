@@ -35,7 +35,7 @@ def test_a_file_says_what_a_call_says(tmp_path):
 
 
 def test_robot_file_stands_next_to_the_study(tmp_path):
-    (tmp_path / "robot.toml").write_text(load_robot(ROBOT).core.toml)
+    (tmp_path / "robot.toml").write_text(load_robot(ROBOT).toml)
     text = small_study(runs=1).to_toml().replace(f'"{ROBOT}"', '"robot.toml"')
     (tmp_path / "study.toml").write_text(text)
     same_bits(mc.run(tmp_path / "study.toml"), mc.run(small_study(runs=1)))

@@ -29,7 +29,7 @@ N_SAMPLES = 601
 START_RAD = (0.4, 0.3, -0.5)
 LOCAL_ERROR = 1e-12
 TOLERANCE = 10 * N_SAMPLES * LOCAL_ERROR
-TEXT = (resources.files("axisight.presets") / "irb6600_like.toml").read_text("utf-8")
+TEXT = (resources.files("axisight.robot.presets") / "irb6600_like.toml").read_text("utf-8")
 # One number of the description off by a thousandth: gravity, or the mass of a link.
 WRONG = {
     "gravity": ("gravity = [0.0, 0.0, -9.81]", "gravity = [0.0, 0.0, -9.81981]"),

@@ -86,7 +86,7 @@ ALL_TERMS = DriveTerms(
 def test_drive_terms_of_coupled_motors() -> None:
     """Against the equations written out: tau = R_tau^-1 (M q'' + .. + joint terms) + motor terms."""
     robot = robot_of(wrist_arm())
-    gears = np.diag(1 / robot.core.gear_ratio)
+    gears = np.diag(1 / robot.gear_ratio)
     gears[5, 4] = 32.0
     loss = gears.T * 1.1
     coupling = MotorCoupling(gears, loss)

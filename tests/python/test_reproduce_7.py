@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from axisight.errors import ConvergenceError
-from axisight.reproduce import Context, Item, context, registered
-from axisight.reproduce.chapter7_machine import Machine, small_signal_response
-from axisight.reproduce.chapter7_measures import (
+from axisight.robot import load_robot
+from axisight_thesis import Context, Item, context, registered
+from axisight_thesis.chapter7_machine import Machine, small_signal_response
+from axisight_thesis.chapter7_measures import (
     distance_db,
     log_mean,
     notch_hz,
@@ -17,8 +18,8 @@ from axisight.reproduce.chapter7_measures import (
     scatter_db,
     spread_db,
 )
-from axisight.reproduce.chapter7_records import periods, records
-from axisight.reproduce.chapter7_setting import (
+from axisight_thesis.chapter7_records import periods, records
+from axisight_thesis.chapter7_setting import (
     PERIOD_S,
     SQUARE_RAD_S,
     Broadband,
@@ -26,7 +27,6 @@ from axisight.reproduce.chapter7_setting import (
     broadband,
     references,
 )
-from axisight.robot import load_robot
 
 ITEMS = [n for n in registered() if n.startswith(("figure-7.", "claims-7"))]
 LINEAR = Machine((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), ripple=False, noise=False)

@@ -1,5 +1,7 @@
 """The frame of ``axisight reproduce``, and chapter 8 and appendix A in a quick run."""
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,24 +11,24 @@ from typer.testing import CliRunner
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.frf import errors, robot_loop
-from axisight.reproduce import Claim, Item, context, item, item_names, registered, run, write_claims
-from axisight.reproduce.appendix_a import STOCHASTIC_FIGURES, stochastic_experiments
-from axisight.reproduce.chapter8_compare import Ratios, except_for
-from axisight.reproduce.chapter8_setting import (
+from axisight_thesis import Claim, Item, context, item, item_names, registered, run, write_claims
+from axisight_thesis.appendix_a import STOCHASTIC_FIGURES, stochastic_experiments
+from axisight_thesis.chapter8_compare import Ratios, except_for
+from axisight_thesis.chapter8_setting import (
     DESIGNS,
     Design,
     excited_lines,
     references,
     square_lines,
 )
-from axisight.reproduce.chapter8_study import (
+from axisight_thesis.chapter8_study import (
     experiments,
     from_simulation,
     same_excitation,
     simulate_period,
     true_response,
 )
-from axisight.reproduce.chapter8_tables import THESIS_8_2, mean_errors
+from axisight_thesis.chapter8_tables import THESIS_8_2, mean_errors
 
 NAMES = [
     *(f"table-8.{n}" for n in range(1, 5)),
@@ -234,3 +236,16 @@ def test_command(tmp_path):
     assert (out / "table-8.1.csv").is_file()
     result = CliRunner().invoke(app, ["reproduce", "nothing", "--out", str(out)])
     assert result.exit_code == 2
+
+
+def test_command_says_what_to_install_where_the_study_is_not(monkeypatch, tmp_path) -> None:
+    monkeypatch.setitem(sys.modules, "axisight_thesis", None)
+    result = CliRunner().invoke(app, ["reproduce", "table-8.1", "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "make setup" in result.stderr and "axisight[thesis]" in result.stderr
+
+
+def test_study_is_found_where_it_was() -> None:
+    from axisight import reproduce  # noqa: PLC0415
+
+    assert reproduce.run is run

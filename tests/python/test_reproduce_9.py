@@ -9,11 +9,11 @@ import pytest
 
 from axisight.graybox import identify_axis
 from axisight.graybox.validation import fit_percent
-from axisight.reproduce import Context, Item, context, registered
-from axisight.reproduce.chapter9_cubic import THESIS_STIFFENING
-from axisight.reproduce.chapter9_figures import small_motion, two_mass_velocity
-from axisight.reproduce.chapter9_machine import GEAR_RATIO, M3, PEAKS_RAD_S, Machine, chain
-from axisight.reproduce.chapter9_study import (
+from axisight_thesis import Context, Item, context, registered
+from axisight_thesis.chapter9_cubic import THESIS_STIFFENING
+from axisight_thesis.chapter9_figures import small_motion, two_mass_velocity
+from axisight_thesis.chapter9_machine import GEAR_RATIO, M3, PEAKS_RAD_S, Machine, chain
+from axisight_thesis.chapter9_study import (
     BROADBAND,
     LINES,
     MODEL,
@@ -26,7 +26,7 @@ from axisight.reproduce.chapter9_study import (
     reference,
     simulated,
 )
-from axisight.reproduce.chapter9_tables import TABLE_9_3, truth
+from axisight_thesis.chapter9_tables import TABLE_9_3, truth
 
 ITEMS = [n for n in registered() if n.split("-")[1].split(".")[0] == "9"]
 PURE = Machine(third_mass=False, ripple=False, noise=False)

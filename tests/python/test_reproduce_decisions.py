@@ -8,11 +8,11 @@ import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from axisight.reproduce import Claim, Item, write_claims, write_item
-from axisight.reproduce.chapter8_figures import error_item
-from axisight.reproduce.chapter8_setting import Design, excited_lines
-from axisight.reproduce.chapter8_study import Experiments
-from axisight.reproduce.decision import all_of, interval, positive
+from axisight_thesis import Claim, Item, write_claims, write_item
+from axisight_thesis.chapter8_figures import error_item
+from axisight_thesis.chapter8_setting import Design, excited_lines
+from axisight_thesis.chapter8_study import Experiments
+from axisight_thesis.decision import all_of, interval, positive
 
 
 def test_verdict_is_that_of_students_test():

@@ -82,7 +82,7 @@ class Case:
 def case(request: pytest.FixtureRequest, repository: Path) -> Case:
     if request.param == "mixed":
         return Case(MIXED)
-    return Case((repository / "python/axisight/presets/irb6600_like.toml").read_text())
+    return Case((repository / "python/axisight/robot/presets/irb6600_like.toml").read_text())
 
 
 def assert_close(got: Array, want: Array, tolerance: float = TOLERANCE) -> None:

@@ -60,7 +60,7 @@ def test_rotors_and_springs_store_energy() -> None:
     h = energy_regressor(model, q, v)
     at = {name: h[:, i] for i, name in enumerate(model.names)}
     np.testing.assert_allclose(at["axis3.joint_rotor_inertia"], 0.5 * v[:, 4] ** 2)
-    motor = v[:, 4] / robot.core.gear_ratio[2]
+    motor = v[:, 4] / robot.gear_ratio[2]
     np.testing.assert_allclose(at["axis3.motor_inertia"], 0.5 * motor**2)
     np.testing.assert_allclose(at["axis2_yaw.stiffness"], 0.5 * q[:, 3] ** 2)
 
@@ -69,7 +69,7 @@ def test_rotors_and_springs_store_energy() -> None:
 def test_energy_balances(side: str) -> None:
     """What goes in is stored or lost, with all terms on both sides and coupled motors."""
     robot = robot_of(wrist_arm())
-    gears = np.diag(1 / robot.core.gear_ratio)
+    gears = np.diag(1 / robot.gear_ratio)
     gears[5, 4] = 32.0
     both = ("motor", "joint")
     terms = DriveTerms(inertia=both, viscous=both, coulomb=both, offset=both, smoothing_rad_s=0.5)

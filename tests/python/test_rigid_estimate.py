@@ -56,7 +56,7 @@ def noisy(torque: Array, seed: int, share: float = 0.05, colour: float = 0.0) ->
 @pytest.mark.parametrize("side", ["motor", "joint"])
 def test_exact_data_give_exact_parameters(method: str, side: str) -> None:
     robot = robot_of(wrist_arm())
-    gears = np.diag(1 / robot.core.gear_ratio)
+    gears = np.diag(1 / robot.gear_ratio)
     gears[5, 4] = 32.0
     model = TorqueModel(robot, terms=USUAL_TERMS, side=side, coupling=MotorCoupling(gears))
     values = drive_values(model.names, model.nominal)

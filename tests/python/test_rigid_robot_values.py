@@ -15,7 +15,7 @@ FROM = Provenance("test")
 
 def test_nominal_parameters_give_the_values_of_the_file():
     found = identified_bodies(MODEL, MODEL.nominal, FROM)
-    known = dict(ROBOT.core.parameters())
+    known = ROBOT.parameters()
     shared = [n for n in found.names if n in known]
     assert {n.rpartition(".")[2] for n in shared} >= {"mass", "com_z", "motor_inertia"}
     for name in shared:

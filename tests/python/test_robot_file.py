@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 
 from axisight import Effect, Fitted, InputError, Robot, RobotError, _core, load_robot
 from axisight.effects import effect_table
-from axisight.presets import PRESETS
+from axisight.robot.presets import PRESETS
 from axisight.robot_file import (
     Provenance,
     hash_file,
     identified,
     identified_by_fit,
     load_identified,
-    render,
     write_identified,
 )
+from axisight.robot_file.document import render
+from axisight.robot_file.toml_spans import value_spans
 from axisight.simulation import simulate
-from axisight.toml_spans import value_spans
 
 WHEN = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 SOURCE = Provenance("three steps", {"log_1.parquet": "ab12"}, {"block_s": 0.25}, WHEN, notes="n")
@@ -55,7 +55,7 @@ kind = "none"
 
 
 def parameters(robot: Robot) -> dict[str, float]:
-    return dict(robot.core.parameters())
+    return robot.parameters()
 
 
 def without_comments(text: str) -> str:
@@ -72,7 +72,7 @@ def test_unchanged_values_keep_every_character(name: str, tmp_path: Path) -> Non
     everything = {n: v for n, v in parameters(robot).items() if not n.endswith("inertia_scale")}
     target = tmp_path / "robot.toml"
     write_identified(name, target, identified(everything, SOURCE))
-    assert without_comments(target.read_text()) == robot.core.toml
+    assert without_comments(target.read_text()) == robot.toml
     assert parameters(load_robot(target)) == parameters(robot)
     # Effects its simulator models go along.
     assert load_identified(target).robot.effects == robot.effects
@@ -210,7 +210,7 @@ def test_inertia_scale_multiplies_the_whole_inertia(tmp_path: Path) -> None:
     write_identified(
         "irb6600_like", tmp_path / "r.toml", identified({"axis3_yaw.inertia_scale": 1.1}, SOURCE)
     )
-    old = tomllib.loads(load_robot("irb6600_like").core.toml)["joint"][6]["link"]["inertia"]
+    old = tomllib.loads(load_robot("irb6600_like").toml)["joint"][6]["link"]["inertia"]
     new = tomllib.loads((tmp_path / "r.toml").read_text())["joint"][6]["link"]["inertia"]
     assert new == [1.1 * x for x in old]
 

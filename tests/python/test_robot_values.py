@@ -73,7 +73,7 @@ def test_a_frequency_fit_written_is_its_robot(frequency_fit, tmp_path: Path) -> 
 
 
 def test_frequency_fits_that_cannot_be_written_are_refused(frequency_fit) -> None:
-    changed = Robot(ROBOT.core.with_parameters([("axis2_yaw.inertia_scale", 1.2)]))
+    changed = ROBOT.with_parameters({"axis2_yaw.inertia_scale": 1.2})
     fit = fit_responses(changed, responses(0.05, 1), {"axis1.stiffness": 1.7e6})
     with pytest.raises(InputError, match="fit: expected a robot with the inertias of its file"):
         identified_responses(fit, SOURCE)
@@ -262,7 +262,7 @@ def test_effects_in_the_way_are_set_to_neutral(tmp_path: Path) -> None:
 def test_axis_fits_of_other_things_are_refused() -> None:
     fit = axis_fit(AxisModel(gear_ratio=RATIO), TRUTH)
     robot = load_robot("two_mass_axis")
-    text = robot.core.toml.replace("stiffness = 1.46e6\ndamping = 2.63e3\n", "")
+    text = robot.toml.replace("stiffness = 1.46e6\ndamping = 2.63e3\n", "")
     rigid = Robot(_core.Robot.from_toml(text))
     for call, words in (
         (lambda: identified_axis(fit.parameters, robot, SOURCE), "fit: expected an AxisFit"),

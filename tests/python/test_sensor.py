@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 N = 1 << 17
 SIGMAS = 5
 ROBOT = load_robot("irb6600_like")
-STD = ROBOT.core.position_noise_std
+STD = ROBOT.position_noise_std
 T = ROBOT.sample_time_s
 
 
@@ -106,7 +106,7 @@ def test_noise_acts_on_the_measurement_and_through_the_loop() -> None:
     measured = noisy["motor_position_rad"] + noisy["position_disturbance_rad"]
     assert np.array_equal(noisy["position_rad"], measured)
     # First command: u_ff - ki e_0; the speed starts at zero.
-    gains = ROBOT.core.controller_gains
+    gains = ROBOT.controller_gains
     first = quiet["torque_cmd_nm"].values[0] - gains["ki"] * noise[0]
     assert np.allclose(noisy["torque_cmd_nm"].values[0], first, rtol=1e-12)
     assert np.abs(noisy["motor_position_rad"] - quiet["motor_position_rad"]).max() > STD / 10
@@ -149,7 +149,7 @@ def test_resolution_that_vanishes_changes_nothing_and_a_coarse_one_matters() -> 
         run = axisight.simulate(ROBOT, sweep()[:500], position_resolution_rad=step)
         torques.append(float(np.abs(run["torque_cmd_nm"] - exact["torque_cmd_nm"]).max()))
     # The difference quotient makes step / T of speed, kp of that torque, and the loop answers.
-    kp = ROBOT.core.controller_gains["kp"].max()
+    kp = ROBOT.controller_gains["kp"].max()
     assert kp * 1e-5 / T / 10 < torques[0] < 10 * kp * 1e-5 / T
     assert 1e3 < torques[0] / torques[1] < 1e5
 

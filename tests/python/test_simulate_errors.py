@@ -119,7 +119,7 @@ def test_linear_model_refuses_what_it_cannot_follow(name: str) -> None:
 
 
 def changed(old: str, new: str) -> Robot:
-    text = ARM.core.toml
+    text = ARM.toml
     assert text.count(old) == 1
     return Robot(_core.Robot.from_toml(text.replace(old, new)))
 
@@ -131,7 +131,7 @@ def test_sample_time_is_refused_by_name(value: str) -> None:
 
 
 def test_reference_needs_a_controller() -> None:
-    head, _, tail = ARM.core.toml.partition('kind = "pi_velocity"')
+    head, _, tail = ARM.toml.partition('kind = "pi_velocity"')
     without = head + 'kind = "none"\n[sensor]' + tail.partition("[sensor]")[2]
     robot = Robot(_core.Robot.from_toml(without))
     with pytest.raises(InputError, match=r"controller.*none"):

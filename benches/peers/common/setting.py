@@ -36,7 +36,7 @@ def make(seconds: float, extras: robot_model.Extras | None = None, smooth: bool 
 
     Without ``smooth`` the second form is not compiled, and is the first again.
     """
-    text = (ROOT / "python/axisight/presets" / f"{PRESET}.toml").read_text("utf-8")
+    text = (ROOT / "python/axisight/robot/presets" / f"{PRESET}.toml").read_text("utf-8")
     robot = axisight.load_robot(PRESET)
     model = robot_model.read(text)
     tones = Tones.make(np.array([d.ratio for d in model.drives]))

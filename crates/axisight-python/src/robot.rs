@@ -4,8 +4,8 @@ use crate::convert::{array1, array2, array3, matrix, rows};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{AxisightError, RobotError, input_error};
 use axisight_core::robot::{
-    Controller, Linearization, Parameter, Plant, RigidBody, RobotDescription, equilibrium,
-    linearize, modes, read_robot, zoh_frequency_response,
+    Controller, Joint, Linearization, Motion, Parameter, Plant, RigidBody, RobotDescription,
+    equilibrium, linearize, modes, read_robot, zoh_frequency_response,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -29,6 +29,23 @@ type ModeArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     Matrix3<'py>,
 );
+
+/// What a description says of a joint, with the changes made since.
+fn joint_entry<'py>(py: Python<'py>, joint: &Joint) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    out.set_item("name", &joint.name)?;
+    out.set_item("prismatic", joint.motion == Motion::Prismatic)?;
+    out.set_item("origin", joint.origin)?;
+    out.set_item("axis", joint.axis)?;
+    let spring = joint.compliance.as_ref();
+    out.set_item("spring", spring.map(|s| (s.stiffness, s.damping)))?;
+    let link = joint.link.as_ref();
+    out.set_item("link", link.map(|l| (l.mass, l.com, l.inertia)))?;
+    let drive = joint.drive.as_ref();
+    let drive = drive.map(|d| (d.gear_ratio, d.motor_inertia, d.viscous_friction));
+    out.set_item("drive", drive)?;
+    Ok(out)
+}
 
 impl Robot {
     fn linear(&self, effects: Vec<EffectTuple>, at: Option<Vec<f64>>) -> PyResult<Linearization> {
@@ -165,10 +182,8 @@ impl Robot {
     }
     #[getter]
     fn axis_is_prismatic(&self) -> Vec<bool> {
-        let prismatic = |(_, j, _): (_, &axisight_core::robot::Joint, _)| {
-            j.motion == axisight_core::robot::Motion::Prismatic
-        };
-        self.description.driven().map(prismatic).collect()
+        let slides = |(_, j, _): (_, &Joint, _)| j.motion == Motion::Prismatic;
+        self.description.driven().map(slides).collect()
     }
     #[getter]
     fn axis_is_rigid(&self) -> Vec<bool> {
@@ -213,6 +228,15 @@ impl Robot {
             Controller::None => {}
         }
         Ok(out)
+    }
+    #[getter]
+    fn gravity_m_s2(&self) -> [f64; 3] {
+        self.description.gravity
+    }
+    /// Every joint, base to tip, with its link, spring and drive.
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let joints = self.description.joints.iter();
+        joints.map(|joint| joint_entry(py, joint)).collect()
     }
     /// Names and values of all physical parameters.
     fn parameters(&self) -> Vec<(String, f64)> {

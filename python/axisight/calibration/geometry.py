@@ -7,7 +7,6 @@ lies before the chain, a tool frame behind it.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -101,16 +100,14 @@ def nominal_geometry(
     ``base_position_m`` and ``base_rotation`` the robot's base in the frame of the measuring
     device; rotations are (3, 3), the identity by default. Raises InputError naming the field.
     """
-    data = tomllib.loads(robot.core.toml)
-    values = dict(robot.core.parameters())
-    joints = data["joint"]
-    stiffness = [values.get(f"{joint['name']}.stiffness", np.inf) for joint in joints]
-    axis = np.array([joint["axis"] for joint in joints], dtype=np.float64)
+    joints = robot.joints
+    stiffness = [np.inf if joint.spring is None else joint.spring.stiffness for joint in joints]
+    axis = np.array([joint.axis for joint in joints])
     return Geometry(
-        joint_names=tuple(joint["name"] for joint in joints),
-        driven=tuple(joint["kind"] == "driven" for joint in joints),
-        sliding=tuple(joint.get("motion") == "prismatic" for joint in joints),
-        origin_m=np.array([joint["origin"] for joint in joints], dtype=np.float64),
+        joint_names=tuple(joint.name for joint in joints),
+        driven=tuple(joint.drive is not None for joint in joints),
+        sliding=tuple(joint.prismatic for joint in joints),
+        origin_m=np.array([joint.origin_m for joint in joints]),
         axis=axis / np.linalg.norm(axis, axis=1)[:, None],
         offset_rad=np.zeros(len(joints)),
         compliance_rad_nm=1.0 / np.array(stiffness),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -256,10 +255,10 @@ def load_torque(
             f"payload_kg: expected one number or ({len(angle)},), got shape {payload.shape}"
         )
     q = np.zeros((len(angle), robot.n_joints))
-    q[:, robot.core.axis_joints] = angle
+    q[:, robot.axis_joints] = angle
     torque = robot.gravity(q) if held.gravity else np.zeros_like(q)
     if np.any(payload):
-        gravity = np.array(_gravity(robot))
+        gravity = robot.gravity_m_s2
         point = real("loads.payload_com_m", held.payload_com_m)
         if point.shape != (3,):
             raise InputError(f"loads.payload_com_m: expected shape (3,), got {point.shape}")
@@ -267,12 +266,6 @@ def load_torque(
             lift = robot.jacobian(q[row], -1, tuple(point))[:3].T @ gravity
             torque[row] -= mass * lift
     return torque
-
-
-def _gravity(robot: Robot) -> list[float]:
-    """Gravity [m/s^2] in the description."""
-    gravity: list[float] = tomllib.loads(robot.core.toml)["gravity"]
-    return gravity
 
 
 def _shaped(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

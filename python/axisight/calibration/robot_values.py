@@ -12,8 +12,8 @@ from axisight.calibration.geometry import errors_about, left_jacobian
 from axisight.calibration.identify import Calibration
 from axisight.errors import InputError
 from axisight.robot_file import Identified, Provenance
-from axisight.robot_sidecar import known
-from axisight.robot_values import noted, values_of
+from axisight.robot_file.sidecar import known
+from axisight.robot_file.values import noted, values_of
 
 Array = NDArray[np.float64]
 

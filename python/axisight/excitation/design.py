@@ -25,8 +25,8 @@ from axisight.excitation.signals import (
     stepped_sine,
     triangle,
 )
-from axisight.presets import PRESETS
 from axisight.robot import Robot, load_robot
+from axisight.robot.presets import PRESETS
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]

@@ -159,7 +159,7 @@ def check_limits(
     step = robot.sample_time_s
     failed: dict[int, str] = {}
     method: Method = "closed_loop"
-    if robot.core.controller_kind == "none":
+    if robot.controller_kind == "none":
         method = "inverse_dynamics"
         if added:
             raise InputError(

@@ -20,7 +20,7 @@ def rigid_torque(
     ``tau = J_m phi'' + F_v phi' + r (M(q) q'' + c(q, q') + g(q))`` with ``q = r phi``.
     """
     rest = robot.equilibrium(start_rad)["joint_angle_rad"].values
-    driven, ratio = robot.core.axis_joints, robot.core.gear_ratio
+    driven, ratio = robot.axis_joints, robot.gear_ratio
     moved = np.cumsum(velocity, axis=1) - velocity
     shape = (velocity.shape[0] * velocity.shape[1], robot.n_joints)
     q, v, a = np.tile(rest, (shape[0], 1)), np.zeros(shape), np.zeros(shape)
@@ -28,7 +28,7 @@ def rigid_torque(
     v[:, driven] = (ratio * velocity).reshape(shape[0], -1)
     a[:, driven] = (ratio * acceleration).reshape(shape[0], -1)
     joint = robot.inverse_dynamics(q, v, a)[:, driven].reshape(velocity.shape)
-    known = dict(robot.core.parameters())
+    known = robot.parameters()
     names = [robot.joint_names[j] for j in driven]
     inertia = np.array([known[f"{name}.motor_inertia"] for name in names])
     friction = np.array([known[f"{name}.viscous_friction"] for name in names])

@@ -201,8 +201,7 @@ def _table(results: Sequence[_core.FrequencyFitResult]) -> pd.DataFrame:
 
 
 def _with_values(robot: Robot, wanted: Sequence[Spec], values: Real) -> Robot:
-    pairs = [(s.name, float(v)) for s, v in zip(wanted, values, strict=True)]
-    return Robot(robot.core.with_parameters(pairs), robot.effects)
+    return robot.with_parameters({s.name: float(v) for s, v in zip(wanted, values, strict=True)})
 
 
 def _wrap(

@@ -249,7 +249,7 @@ def model_response(
     check_sampling(sampling)
     if quantity not in ORDER:
         raise InputError(f"quantity: expected one of {', '.join(ORDER)}, got {quantity!r}")
-    at = robot.core.operating_point if joint_angle_rad is None else joint_angle_rad
+    at = robot.operating_point if joint_angle_rad is None else joint_angle_rad
     pairs = _core.frequency_response(
         robot.core,
         core_effects([*robot.effects, *effects]),

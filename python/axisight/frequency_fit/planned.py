@@ -127,7 +127,7 @@ def pose_information(
         ) from None
     if not (error > 0).all():
         raise InputError("relative_std: expected positive numbers, got others")
-    model = Robot(robot.core.with_parameters([(s.name, s.initial) for s in chosen]), robot.effects)
+    model = robot.with_parameters({s.name: s.initial for s in chosen})
     poses: list[PoseTuple] = []
     for point, share in zip(points, error, strict=True):
         response = model_response(

@@ -12,8 +12,9 @@ from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frequency_fit.result import FrequencyFit
 from axisight.robot import Robot
-from axisight.robot_file import Identified, Provenance, render
-from axisight.robot_values import noted, values_of
+from axisight.robot_file import Identified, Provenance
+from axisight.robot_file.document import render
+from axisight.robot_file.values import noted, values_of
 
 
 def identified_responses(
@@ -40,7 +41,7 @@ def identified_responses(
     if not isinstance(fit, FrequencyFit):
         raise InputError(f"fit: expected a FrequencyFit, got {type(fit).__name__}")
     # A robot with changed parameters keeps the text it came from.
-    source = Robot(_core.Robot.from_toml(fit.robot.core.toml))
+    source = Robot.from_toml(fit.robot.toml)
     before, after = robot_parameters(source), robot_parameters(fit.robot)
     held = {n: v for n, v in after.items() if n not in fit.names and v != before[n]}
     notes = [f"held in the fit: {', '.join(held)}"] if held else []
@@ -53,10 +54,12 @@ def identified_responses(
         noted(provenance, [*notes, f"search: {fit.status}", *fit.warnings]),
         effects=effects,
     )
-    written = _core.Robot.from_toml(render(source, found, ""))
+    written = Robot.from_toml(render(source, found, ""))
     links, wanted = _core.inertial_parameters(fit.robot.core)
     rounding = 1e-9 * np.abs(wanted).max(initial=0.0)
-    if not np.allclose(_core.inertial_parameters(written)[1], wanted, rtol=1e-9, atol=rounding):
+    if not np.allclose(
+        _core.inertial_parameters(written.core)[1], wanted, rtol=1e-9, atol=rounding
+    ):
         names = [source.joint_names[i] for i in links]
         raise InputError(
             "fit: expected a robot with the inertias of its file, got others in one of "

@@ -29,7 +29,7 @@ def noise_leakage_power(robot: Robot, frequency_hz: Real, n_samples: int) -> Rea
     kp, ki = velocity_gains(robot)
     frequency_hz = frequencies_below_nyquist(robot, frequency_hz)
     whole("n_samples", n_samples)
-    step, std = robot.sample_time_s, robot.core.position_noise_std
+    step, std = robot.sample_time_s, robot.position_noise_std
     a, b, c = _sampled(robot)
     n, m = b.shape
     now, before = np.diag(kp / step + ki), np.diag(kp / step)

@@ -72,10 +72,10 @@ def frequencies_below_nyquist(robot: Robot, frequency_hz: object) -> Real:
 def velocity_gains(robot: Robot) -> tuple[Real, Real]:
     """Return kp [Nm s/rad] and ki [Nm/rad] (n_axes,); raises InputError for other controllers."""
     instance("robot", robot, Robot)
-    kind = robot.core.controller_kind
+    kind = robot.controller_kind
     if kind not in ("pi_velocity", "p_velocity"):
         raise InputError(f"robot: expected a pi_velocity or p_velocity controller, got {kind}")
-    gains = robot.core.controller_gains
+    gains = robot.controller_gains
     kp = np.asarray(gains["kp"])
     return kp, np.asarray(gains["ki"]) if kind == "pi_velocity" else np.zeros_like(kp)
 

@@ -92,7 +92,7 @@ def predict_errors(
     threads_of(threads)
     frequency = k / (refs.shape[2] * robot.sample_time_s)
     true = robot.zoh_response(frequency).values
-    noise = refs.shape[2] * robot.core.position_noise_std**2
+    noise = refs.shape[2] * robot.position_noise_std**2
     leaked = noise_leakage_power(robot, frequency, n_periods * refs.shape[2])
     power = noise / n_periods + leaked / n_periods**2
     found = []

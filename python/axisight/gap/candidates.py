@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -74,7 +73,7 @@ def all_candidates(
 ) -> list[FreeEffect]:
     """Return one candidate per effect and axis (or arm) that can act on this robot."""
     out = []
-    rigid = robot.core.axis_is_rigid
+    rigid = robot.axis_is_rigid
     for info in effect_table().values():
         if info.name in _NOT_YET:
             continue
@@ -154,9 +153,9 @@ def _axis_candidate(
 
 def _backlash(robot: Robot, logs: Sequence[Log], at: Situation, axis: int) -> FreeEffect:
     """Start at several widths, as shares of the deflection the largest torque gives."""
-    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
-    stiffness = dict(robot.core.parameters())[f"{joint}.stiffness"]
-    ratio = abs(float(robot.core.gear_ratio[axis - 1]))
+    joint = robot.axis_names[axis - 1]
+    stiffness = robot.parameters()[f"{joint}.stiffness"]
+    ratio = abs(float(robot.gear_ratio[axis - 1]))
     spread = max(float(np.std(log.torque_nm[:, axis - 1])) for log in logs)
     deflection = spread / ratio / stiffness
     # The valley around the true width is narrow: impacts must stay in phase.
@@ -179,9 +178,9 @@ def _axis_share(at: Situation, axis: int) -> float:
 
 def _own(robot: Robot, effect: str, axis: int) -> float:
     """Return the simulator's value of what a relative effect changes."""
-    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
+    joint = robot.axis_names[axis - 1]
     quantity = {"motor_inertia": "motor_inertia", "joint_damping": "damping"}[effect]
-    return dict(robot.core.parameters())[f"{joint}.{quantity}"]
+    return robot.parameters()[f"{joint}.{quantity}"]
 
 
 def _ripple(at: Situation, name: str, axis: int) -> FreeEffect | None:
@@ -218,9 +217,9 @@ def _saturation(logs: Sequence[Log], axis: int) -> FreeEffect:
 
 def _payload(robot: Robot) -> FreeEffect:
     """Return a point mass that starts at the centre of mass of the last link that has one."""
-    joints = tomllib.loads(robot.core.toml)["joint"]
-    x, y, z = next(j["link"]["com"] for j in reversed(joints) if "link" in j)
-    reach = sum(float(np.linalg.norm(j["origin"])) for j in joints) or 1.0
+    joints = robot.joints
+    x, y, z = next(j.link.com_m for j in reversed(joints) if j.link is not None)
+    reach = sum(float(np.linalg.norm(j.origin_m)) for j in joints) or 1.0
     centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
     # Tools reach about as far as the last links do.
     spread = 0.3 * reach

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects, without
-from axisight.fitting import FitOptions, Parameter, Weighting, core_spec
+from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.simulation_error import core_spec
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
 from axisight.gap.settings import Settings
@@ -73,9 +74,9 @@ class InverseDynamicsFitter(ModelFitter):
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
-    changed = robot.core.with_parameters(list(variant.robot_values.items()))
+    changed = robot.with_parameters(variant.robot_values)
     result = _core.fit_inverse_dynamics(
-        changed,
+        changed.core,
         core_effects([*without(robot.effects, variant.effects), *variant.effects]),
         [],
         [at],
@@ -121,10 +122,10 @@ def inverse_noise(
 def _inertia(robot: Robot) -> Array:
     """Return the inertia felt by each motor at the operating point (n_axes,) [kg m^2]."""
     q = robot.equilibrium()["joint_angle_rad"].values
-    joints = robot.core.axis_joints
-    ratio = robot.core.gear_ratio
+    joints = robot.axis_joints
+    ratio = robot.gear_ratio
     arm = np.diag(robot.inertia_matrix(q))[joints] * ratio**2
-    own = dict(robot.core.parameters())
+    own = robot.parameters()
     motors = [own[f"{robot.joint_names[j]}.motor_inertia"] for j in joints]
     return np.asarray(arm + np.array(motors))
 

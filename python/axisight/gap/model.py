@@ -15,11 +15,11 @@ from axisight.fitting import (
     FitOptions,
     Parameter,
     Weighting,
-    core_spec,
     effect_parameter,
     robot_parameter,
     robot_parameters,
 )
+from axisight.fitting.simulation_error import core_spec
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -212,7 +212,7 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
     """Return the robot parameter that an effect stands in for: it is then held at its value."""
     if effect.axis is None or effect.name not in _SAME:
         return None
-    joint = robot.joint_names[robot.core.axis_joints[effect.axis - 1]]
+    joint = robot.axis_names[effect.axis - 1]
     return f"{joint}.{_SAME[effect.name]}"
 
 

@@ -67,7 +67,7 @@ def _density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
 
 def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floor:
     """Return the floor of closed-loop logs, by simulating the loop with and without noise."""
-    nominal = robot.core.position_noise_std
+    nominal = robot.position_noise_std
     std = np.maximum(position_noise_std(logs), nominal)
     log = logs[0]
     reference = log.velocity_ref_rad_s

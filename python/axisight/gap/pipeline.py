@@ -81,7 +81,7 @@ def diagnose(
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
-    closed = machine.core.controller_kind != "none" and all(
+    closed = machine.controller_kind != "none" and all(
         log.velocity_ref_rad_s is not None for log in [*fit_logs, *held_logs]
     )
     view = (
@@ -340,7 +340,7 @@ def _assemble(
             "seed": settings.seed,
             "robot": robot.name,
             "robot_effects": [effect.label for effect in robot.effects if effect.acts],
-            "axis_kinds": ["prismatic" if p else "revolute" for p in robot.core.axis_is_prismatic],
+            "axis_kinds": ["prismatic" if p else "revolute" for p in robot.axis_is_prismatic],
             "estimation_logs": [log.name for log in view.logs],
             "validation_logs": [log.name for log in held_logs],
             "position_noise_std_rad": view.floor.position_std_rad.tolist(),

@@ -35,8 +35,9 @@ def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
     """
     if log.velocity_ref_rad_s is None:
         raise InputError(f"log {log.name!r}: expected velocity references")
-    core = robot.core.with_parameters(list(variant.robot_values.items()))
-    changed = Robot(core, without(robot.effects, variant.effects))
+    changed = robot.with_parameters(variant.robot_values).with_effects(
+        without(robot.effects, variant.effects)
+    )
     out = simulate(changed, log.velocity_ref_rad_s, effects=variant.effects, method="rk4")
     torque = np.full(log.torque_nm.shape, np.nan)
     values = out["torque_cmd_nm"].values

@@ -2,10 +2,12 @@
 
 from axisight.graybox.against_robot import Comparison, compare_with_robot
 from axisight.graybox.axis_model import AxisData, AxisModel, AxisParameter
+from axisight.graybox.axis_records import axis_data
 from axisight.graybox.axis_result import AxisFit, NoiseModel
 from axisight.graybox.axis_search import FitSettings
 from axisight.graybox.chain_fit import ChainFit, fit_chain
 from axisight.graybox.collocated import Collocated, collocated
+from axisight.graybox.first_steps import InitialModel, initial_model
 from axisight.graybox.flexibilities import (
     CubicSpring,
     Flexibility,
@@ -22,13 +24,7 @@ from axisight.graybox.landmarks import (
 )
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
 from axisight.graybox.prediction_error import fit_axis
-from axisight.graybox.procedure import (
-    AxisIdentification,
-    InitialModel,
-    axis_data,
-    identify_axis,
-    initial_model,
-)
+from axisight.graybox.procedure import AxisIdentification, identify_axis
 from axisight.graybox.robot_values import identified_axis
 from axisight.graybox.sensitivity import sensitivity_table
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain

@@ -2,35 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-if TYPE_CHECKING:
-    from axisight.graybox.flexibilities import CubicSpring, Flexibility
-    from axisight.graybox.procedure import AxisIdentification
-    from axisight.graybox.step_one import RigidBodyFriction
+from axisight.graybox.axis_model import AxisModel
+from axisight.graybox.axis_result import AxisFit
+from axisight.graybox.first_steps import InitialModel
+from axisight.graybox.flexibilities import CubicSpring, Flexibility
+from axisight.graybox.step_one import RigidBodyFriction
+from axisight.graybox.validation import ResidualTests
 
 
-def report(found: AxisIdentification) -> str:
-    """Return the values of each step, fits, tests and findings."""
-    names = [d.name for d in found.data_sets]
-    lines = [*_step_one(found.initial.rigid), ""]
-    for name, one in zip(names[1:], found.initial.flexibilities, strict=False):
+def report(
+    names: Sequence[str],
+    model: AxisModel,
+    initial: InitialModel,
+    fit: AxisFit,
+    initial_fit_percent: Sequence[float],
+    tests: Sequence[ResidualTests],
+) -> str:
+    """Return the values of each step, fits, tests and findings.
+
+    ``names`` are those of the data sets, the low-frequency one first; the rest is as in
+    `AxisIdentification`.
+    """
+    lines = [*_step_one(initial.rigid), ""]
+    for name, one in zip(names[1:], initial.flexibilities, strict=False):
         lines += _step_two(name, one)
-    if found.initial.spring is not None:
-        lines += _spring(found.initial.spring)
+    if initial.spring is not None:
+        lines += _spring(initial.spring)
     lines += ["", "Step 3: prediction-error fit"]
-    units = {p.name: p.unit for p in found.model.parameters}
-    deviation = found.fit.standard_error
-    for name, value, own in zip(found.fit.free, found.fit.values, deviation, strict=True):
-        start = found.initial.start.get(name)
+    units = {p.name: p.unit for p in model.parameters}
+    for name, value, own in zip(fit.free, fit.values, fit.standard_error, strict=True):
+        start = initial.start.get(name)
         was = "" if start is None else f"   start {start:.4g}"
         lines.append(_row(name, float(value), float(own), units[name]) + was)
-    lines.append(f"  status: {found.fit.status}, {found.fit.iterations} iterations")
+    lines.append(f"  status: {fit.status}, {fit.iterations} iterations")
     lines += ["", "Fit (3.54), initial -> final, and residual tests"]
-    rows = zip(names, found.initial_fit_percent, found.fit.fit_percent, found.tests, strict=True)
+    rows = zip(names, initial_fit_percent, fit.fit_percent, tests, strict=True)
     for name, before, after, test in rows:
         lines.append(f"  {name}: {before:.1f} % -> {after:.1f} %; {test.verdict}")
-    notes = [*found.initial.findings, *found.fit.warnings]
+    notes = [*initial.findings, *fit.warnings]
     if notes:
         lines += ["", "Findings", *[f"  - {text}" for text in notes]]
     return "\n".join(lines)

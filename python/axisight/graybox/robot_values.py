@@ -8,15 +8,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.absorbed import absorbed_effects, absorbed_note
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.graybox.axis_result import AxisFit
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance
-from axisight.robot_sidecar import known
-from axisight.robot_values import noted, values_of
+from axisight.robot_file.absorbed import absorbed_effects, absorbed_note
+from axisight.robot_file.sidecar import known
+from axisight.robot_file.values import noted, values_of
 
 Array = NDArray[np.float64]
 Covariance = Literal["trusted", "sandwich", "white"]
@@ -173,13 +173,13 @@ def joint_of(robot: Robot, axis: int) -> tuple[str, float]:
     """Name of the joint of an axis and the size of its gear ratio."""
     if isinstance(axis, bool) or axis not in range(1, robot.n_axes + 1):
         raise InputError(f"axis: expected 1 to {robot.n_axes}, got {axis!r}")
-    joint = robot.joint_names[robot.core.axis_joints[axis - 1]]
+    joint = robot.axis_names[axis - 1]
     if f"{joint}.stiffness" not in robot_parameters(robot):
         raise InputError(
             f"axis: expected one with a gear spring, got {axis}: {joint} has a rigid transmission; "
             "give it a stiffness and a damping in the robot file"
         )
-    return joint, abs(float(robot.core.gear_ratio[axis - 1]))
+    return joint, abs(float(robot.gear_ratio[axis - 1]))
 
 
 def _width(fit: AxisFit, given: float | None) -> float:
@@ -293,6 +293,6 @@ def _notes(
 def inertia_about(robot: Robot, joint: str) -> float:
     """Inertia of all links beyond a joint at the operating point [kg m^2]."""
     q = np.zeros(robot.n_joints)
-    q[robot.core.axis_joints] = robot.core.operating_point
+    q[robot.axis_joints] = robot.operating_point
     place = robot.joint_names.index(joint)
     return float(robot.inertia_matrix(q)[place, place])

@@ -34,7 +34,7 @@ def freeze(study: Study) -> str:
     design = study.model_dump(by_alias=True, mode="json", exclude={"seed", "runs", "name", "robot"})
     design["statistics"].pop("quantiles")
     design["robot"] = {
-        "toml": robot.core.toml,
+        "toml": robot.toml,
         "effects": [[e.name, e.axis, e.values()] for e in robot.effects],
     }
     design["axisight_version"] = version("axisight")

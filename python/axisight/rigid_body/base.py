@@ -248,7 +248,7 @@ def random_factor(
     q = rng.uniform(-np.pi, np.pi, shape)
     v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
     if locked:
-        elastic = np.delete(np.arange(model.robot.n_joints), model.robot.core.axis_joints)
+        elastic = np.delete(np.arange(model.robot.n_joints), model.robot.axis_joints)
         q[:, elastic] = v[:, elastic] = a[:, elastic] = 0.0
     factors, _ = _core.regression_factors(
         model.robot.core,

@@ -56,7 +56,7 @@ def bending(
             "motors held: what passes the filter there bends the arm and does not fit rigid bodies"
         )
         out.append(IdentificationFinding(FindingKind.BENDING, text, serious=False))
-    joints = np.array(robot.core.axis_joints)
+    joints = np.array(robot.axis_joints)
     arm = mass[:, joints, joints].mean(axis=0)
     felt = (mass[:, joints[:, None], springs] ** 2 * compliance).sum(axis=2).mean(axis=0)
     rms_hz = _motion_hz(estimate.model, logs, cutoff_hz)
@@ -82,8 +82,8 @@ def bending(
 
 def _springs(robot: Robot) -> tuple[NDArray[np.intp], Array]:
     """Joints that give way, by gears or by themselves, and their compliances [rad/Nm]."""
-    stiffness = dict(robot.core.parameters())
-    rigid = dict(zip(robot.core.axis_joints, robot.core.axis_is_rigid, strict=True))
+    stiffness = robot.parameters()
+    rigid = dict(zip(robot.axis_joints, robot.axis_is_rigid, strict=True))
     joints = [
         joint
         for joint, name in enumerate(robot.joint_names)
@@ -126,7 +126,7 @@ def _certainty(estimate: RigidBodyEstimate, q: Array) -> tuple[Array, Array]:
     links = np.array([column.extra is None for column in model.columns])
     held = np.array([estimate.known.get(name, 0.0) for name in model.names])
     share, error = [], []
-    for axis, joint in enumerate(model.robot.core.axis_joints):
+    for axis, joint in enumerate(model.robot.axis_joints):
         unit = zero.copy()
         unit[:, joint] = 1.0
         row = (model.matrix(q, zero, unit) - still)[:, axis].mean(axis=0)

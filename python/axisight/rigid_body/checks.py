@@ -86,7 +86,7 @@ def gear_sign(
     the others say.
     """
     model = result.model
-    joints = model.robot.core.axis_joints
+    joints = model.robot.axis_joints
     q = motion[0][:: max(1, len(motion[0]) // LOOKS)]
     # Unit acceleration of each motor (or joint) alone, and none at all.
     units = np.zeros((len(joints) + 1, model.robot.n_joints))

@@ -72,7 +72,7 @@ class MotorCoupling:
 
 def gear_coupling(robot: Robot) -> MotorCoupling:
     """Return the coupling of the gear ratios in the robot file, each motor on its own joint."""
-    return MotorCoupling(np.diag(1.0 / robot.core.gear_ratio))
+    return MotorCoupling(np.diag(1.0 / robot.gear_ratio))
 
 
 def _solve(matrix: Array, rows: Array) -> Array:

@@ -77,7 +77,7 @@ def _advice(base: BaseParameters, shares: dict[str, float], motion: tuple[Array,
     names = base.model.robot.joint_names
     advice = []
     # Only what has a motor can be moved.
-    driven = base.model.robot.core.axis_joints
+    driven = base.model.robot.axis_joints
     still = [names[j] for j in driven if np.ptp(v[:, j]) == 0]
     if still:
         advice.append(f"move {', '.join(still)} at changing speeds")

@@ -233,7 +233,7 @@ def _speeds(model: TorqueModel) -> Array:
     n = model.robot.n_joints
     if model.side == "joint":
         return np.eye(n)
-    return model.coupling.position @ np.eye(n)[model.robot.core.axis_joints]
+    return model.coupling.position @ np.eye(n)[model.robot.axis_joints]
 
 
 def _loss_rates(model: TorqueModel, v: Array) -> Array:

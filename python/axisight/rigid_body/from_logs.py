@@ -31,8 +31,8 @@ from axisight.rigid_body.reversal_window import reversal_weight
 from axisight.rigid_body.robot_values import identified_bodies
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance, identified
-from axisight.robot_sidecar import known as known_number
-from axisight.robot_values import noted
+from axisight.robot_file.sidecar import known as known_number
+from axisight.robot_file.values import noted
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
@@ -311,7 +311,7 @@ def _joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
     parts = []
     for motor in (motion.position_rad, motion.velocity_rad_s, motion.acceleration_rad_s2):
         full = np.zeros((motion.n_samples, model.robot.n_joints))
-        full[:, model.robot.core.axis_joints] = model.coupling.joint_motion(motor)
+        full[:, model.robot.axis_joints] = model.coupling.joint_motion(motor)
         parts.append(full)
     torque = np.zeros((0, 0)) if motion.torque_nm is None else motion.torque_nm
     return parts[0], parts[1], parts[2], torque

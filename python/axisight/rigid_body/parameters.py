@@ -69,7 +69,7 @@ def drive_columns(
 
     ``row_map`` (n_rows, n_joints) is what the rows of the regression make of joint torques.
     """
-    joints = robot.core.axis_joints
+    joints = robot.axis_joints
     place = np.zeros((robot.n_axes, robot.n_joints))
     place[np.arange(robot.n_axes), joints] = 1.0
     # Motor angles of joint angles, and rows of motor torques.
@@ -77,10 +77,10 @@ def drive_columns(
     motor_rows = row_map @ place.T @ coupling.torque
     # In motor-side rows a motor torque is itself; rounding of the inverse has no place there.
     motor_rows[np.abs(motor_rows) < 1e-13 * np.abs(motor_rows).max()] = 0.0
-    nominal = dict(robot.core.parameters())
+    nominal = robot.parameters()
     columns = []
     for axis, joint in enumerate(joints):
-        prismatic = robot.core.axis_is_prismatic[axis]
+        prismatic = robot.axis_is_prismatic[axis]
         for kind, signal, motor_name, joint_name in KINDS:
             for side in terms.sides(kind):
                 motor = side == "motor"
@@ -95,7 +95,7 @@ def drive_columns(
 
 def _springs(robot: Robot, nominal: dict[str, float], row_map: Array) -> list[Column]:
     columns = []
-    for joint in sorted(set(range(robot.n_joints)) - set(robot.core.axis_joints)):
+    for joint in sorted(set(range(robot.n_joints)) - set(robot.axis_joints)):
         motion = np.eye(robot.n_joints)[joint].tolist()
         # Without a motor the torque on the row is zero: inertia + K q + D q' = 0.
         for quantity, unit, signal in (

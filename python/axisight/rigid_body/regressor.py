@@ -58,7 +58,7 @@ class TorqueModel:
         identity = np.eye(self.robot.n_joints)
         if self.side == "joint":
             return identity
-        driven = identity[self.robot.core.axis_joints]
+        driven = identity[self.robot.axis_joints]
         rows: Array = np.linalg.solve(self.coupling.torque, driven).astype(np.float64)
         rows[np.abs(rows) < 1e-14 * np.abs(rows).max()] = 0.0
         return rows
@@ -98,7 +98,7 @@ class TorqueModel:
     def row_names(self) -> list[str]:
         """Names of the rows: joints."""
         names = self.robot.joint_names
-        return names if self.side == "joint" else [names[j] for j in self.robot.core.axis_joints]
+        return names if self.side == "joint" else [names[j] for j in self.robot.axis_joints]
 
     @property
     def row_dim(self) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from axisight.absorbed import absorbed_effects, absorbed_note
 from axisight.effects import Effect
 from axisight.errors import InputError, RobotError
 from axisight.rigid_body.regressor import TorqueModel
-from axisight.robot_file import INERTIA, Identified, Provenance, identified
-from axisight.robot_values import noted
+from axisight.robot_file import Identified, Provenance, identified
+from axisight.robot_file.absorbed import absorbed_effects, absorbed_note
+from axisight.robot_file.document import INERTIA
+from axisight.robot_file.values import noted
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def identified_bodies(
     First moments become centres of mass and inertias about the link frame those about the
     centre of mass: I_c = I - (|h|^2 1 - h h^T) / m with h = m c. Coulomb friction and torque
     offsets become effects. Effects of the robot whose torque the regression has taken up (see
-    `axisight.absorbed`) are set to neutral, and a note says so: a payload and balancers, which the
+    `axisight.robot_file.absorbed`) are set to neutral, and a note says so: a payload and balancers, which the
     links now hold; errors of torque constants, in which all is measured; friction, offset and
     rotor inertia of an axis by the terms of its drive.
 
@@ -126,7 +127,7 @@ def _axis(model: TorqueModel, joint: str) -> int:
 
 
 def _rotors(model: TorqueModel) -> list[str]:
-    return [n for n, _ in model.robot.core.parameters() if n.endswith(".motor_inertia")]
+    return [n for n in model.robot.parameters() if n.endswith(".motor_inertia")]
 
 
 def _about_centre(link: Array) -> tuple[Array, Array]:

@@ -38,11 +38,11 @@ class Sensitivity:
 
 def regressor_sensitivity(model: TorqueModel, q: Array, v: Array, a: Array) -> Sensitivity:
     """Return the regressor of ``model`` and its derivatives, motions (n, n_joints)."""
-    joints = model.robot.core.axis_joints
+    joints = model.robot.axis_joints
     n, links = len(q), sum(column.extra is None for column in model.columns)
     # One call for all shifts: (block, sample, joint).
     shifts: list[tuple[int, int, float]] = []
-    for joint, slides in zip(joints, model.robot.core.axis_is_prismatic, strict=True):
+    for joint, slides in zip(joints, model.robot.axis_is_prismatic, strict=True):
         for step in (1.0,) if slides else tuple(s for s, _ in _TURNS):
             shifts += [(0, joint, step), (0, joint, -step)]
         shifts += [(1, joint, 1.0), (1, joint, -1.0), (2, joint, 1.0)]
@@ -58,7 +58,7 @@ def regressor_sensitivity(model: TorqueModel, q: Array, v: Array, a: Array) -> S
     value = np.zeros(shape[1:])
     value[..., :links] = out[0]
     at = 1
-    for k, slides in enumerate(model.robot.core.axis_is_prismatic):
+    for k, slides in enumerate(model.robot.axis_is_prismatic):
         for weight in (0.5,) if slides else tuple(c for _, c in _TURNS):
             by_position[k, ..., :links] += weight * (out[at] - out[at + 1])
             at += 2

@@ -205,7 +205,7 @@ class _Problem:
         self.model, self.bounds, self.harmonics = model, bounds, harmonics
         self.fundamental_hz, self.samples, self.at_rest = fundamental_hz, samples, at_rest
         robot = model.robot
-        self.joints = np.array(robot.core.axis_joints)
+        self.joints = np.array(robot.axis_joints)
         self.slowest = float(bounds["velocity"].min())
         gears = float(np.abs(model.coupling.position).max())
         terms = model.terms

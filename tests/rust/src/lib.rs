@@ -7,7 +7,7 @@ use axisight_core::scalar::Scalar;
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
-pub const PRESET: &str = include_str!("../../../python/axisight/presets/irb6600_like.toml");
+pub const PRESET: &str = include_str!("../../../python/axisight/robot/presets/irb6600_like.toml");
 
 /// A horizontal arm under gravity: one compliant axis with an elastic joint behind it.
 pub const ARM: &str = r#"schema = "axisight.robot/1"

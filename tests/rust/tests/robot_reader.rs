@@ -4,7 +4,7 @@ use axisight_core::robot::{
     Compliance, Controller, Drive, Link, Motion, RobotDescription, RobotError, read_robot,
 };
 
-const NOMINAL: &str = include_str!("../../../python/axisight/presets/irb6600_like.toml");
+const NOMINAL: &str = include_str!("../../../python/axisight/robot/presets/irb6600_like.toml");
 
 /// A small robot with every kind of joint. Tests count its lines: `schema` is line 1.
 const SMALL: &str = include_str!("../src/small_robot.toml");

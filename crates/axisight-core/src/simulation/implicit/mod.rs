@@ -286,7 +286,8 @@ mod tests {
     use crate::robot::{equilibrium, read_robot};
     use crate::simulation::torque_path::{TorqueBuffers, TorquePath};
 
-    const PRESET: &str = include_str!("../../../../../python/axisight/presets/irb6600_like.toml");
+    const PRESET: &str =
+        include_str!("../../../../../python/axisight/robot/presets/irb6600_like.toml");
 
     /// State after a fall of 20 ms under a lagging torque in `n` equal steps.
     fn fall<M: OneStep>(make: impl Fn(usize) -> M, n: usize) -> Vec<f64> {

@@ -1,0 +1,188 @@
+"""The command line: diagnose, check, simulate, effects, excite, identify, montecarlo, reproduce, demo."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from axisight.cli.common import ERR as _err
+from axisight.cli.common import OUT as _out
+from axisight.cli.common import errors as _errors
+from axisight.cli.demo import write_demo_case
+from axisight.cli.excite import excite_command
+from axisight.cli.identify import identify_app
+from axisight.cli.montecarlo import montecarlo_command
+from axisight.cli.reproduce import reproduce_command
+from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.cli.simulate import simulate_command
+from axisight.effects import effect_table
+from axisight.errors import InputError
+from axisight.gap import Diagnosis, Settings, diagnose
+from axisight.gap.inputs import read_inputs
+from axisight.logs import check_log, render
+from axisight.report import save_report
+
+app = typer.Typer(
+    help="Identify industrial robots, simulate them, and explain the sim-to-real gap.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.command("excite")(excite_command)
+app.add_typer(identify_app, name="identify")
+app.command("montecarlo")(montecarlo_command)
+app.command("reproduce")(reproduce_command)
+app.command("simulate")(simulate_command)
+
+Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Show one bar per stage of the work."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=_err) as bars:
+        tasks: dict[str, int] = {}
+
+        def report(label: str, done: int, total: int) -> None:
+            if label not in tasks:
+                tasks[label] = bars.add_task(label, total=total)
+            bars.update(bars.task_ids[tasks[label]], completed=done, total=total)
+
+        yield report
+
+
+def _tolerances(given: list[str]) -> Settings:
+    settings = Settings()
+    changed = dict(settings.tolerances)
+    for item in given:
+        name, _, value = item.partition("=")
+        try:
+            changed[name] = float(value)
+        except ValueError:
+            raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
+        if name not in settings.tolerances:
+            raise InputError(
+                f"--tolerance: expected one of {', '.join(settings.tolerances)}, got {name!r}"
+            )
+        if not 0 < changed[name] < 1:
+            raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
+    return replace(settings, tolerances=changed)
+
+
+@app.command("diagnose")
+def diagnose_command(
+    case_or_logs: Annotated[
+        list[Path], typer.Argument(help="A case folder, or logs to fit and choose on.")
+    ],
+    model: Annotated[
+        str | None, typer.Option(help="Simulator: robot.toml or a preset. A case brings its own.")
+    ] = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
+    ] = None,
+    columns: Columns = None,
+    identified_effects: IdentifiedEffects = True,
+    json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(help="Relative tolerance of a simulator parameter, e.g. mass=0.02."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
+) -> None:
+    """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
+    with _errors():
+        settings = replace(_tolerances(tolerance or []), seed=seed)
+        load = partial(load_simulator, identified=identified_effects)
+        inputs = read_inputs(case_or_logs, model, validation or [], columns, load)
+        with _progress() as progress:
+            found = diagnose(
+                name=inputs.name,
+                robot=inputs.robot,
+                estimation=inputs.estimation,
+                validation=inputs.validation,
+                settings=settings,
+                progress=progress,
+            )
+        _write(found, json, report)
+
+
+def _write(found: Diagnosis, json: Path | None, report: Path | None) -> None:
+    _show(found)
+    if json is not None:
+        found.save_verdict(json)
+        _out.print(f"verdict: {json}", soft_wrap=True)
+    if report is not None:
+        save_report(found, report)
+        _out.print(f"report: {report}", soft_wrap=True)
+
+
+def _show(found: Diagnosis) -> None:
+    _out.print(f"[bold]{found.verdict}[/]: {found.headline}")
+    if not found.ranking:
+        return
+    table = Table("effect", "axis", "probability", "held-out score", "significance")
+    for c in found.ranking[:8]:
+        axis = "arm" if c.axis is None else str(c.axis)
+        table.add_row(
+            c.effect, axis, f"{c.probability:.3f}", f"{c.score:.3f}", f"{c.significance:.1f}"
+        )
+    _out.print(table)
+
+
+@app.command()
+def check(
+    log: Annotated[Path, typer.Argument(help="Log to check.")], columns: Columns = None
+) -> None:
+    """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
+    with _errors():
+        found = check_log(log, columns)
+        _out.print(render(found))
+        if not found.ok:
+            raise typer.Exit(1)
+
+
+@app.command()
+def effects() -> None:
+    """List the effects that can be simulated, fitted and named as causes."""
+    table = Table("effect", "acts on", "equation", "parameters")
+    for info in effect_table().values():
+        parameters = ", ".join(f"{p.name} [{p.unit}]" for p in info.parameters)
+        table.add_row(info.name, info.acts, info.equation, parameters)
+    _out.print(table)
+
+
+@app.command()
+def demo(
+    out: Annotated[
+        Path, typer.Option(help="Folder for the case, the verdict and the report.")
+    ] = Path("demo"),
+) -> None:
+    """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
+    with _errors():
+        case = write_demo_case(out / "case")
+        _out.print(f"case: {case} (a simulated machine with an effect its simulator lacks)")
+        with _progress() as progress:
+            found = diagnose(case, progress=progress)
+        _write(found, out / "verdict.json", out / "report.html")
+
+
+def main() -> None:
+    """Run the command line."""
+    sys.exit(app())

@@ -1,0 +1,146 @@
+"""The command ``axisight excite``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from axisight.cli.common import OUT, errors, numbers
+from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.errors import InputError
+from axisight.excitation import Excited, excite, load_design, read_design, write_references
+from axisight.excitation.plots import plot_references, plot_signal
+from axisight.robot import load_robot
+
+
+def excite_command(
+    design: Annotated[
+        Path | None, typer.Argument(help="Design (TOML); options replace what it says.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="File to write: .csv (with .design.json), .mat or .parquet.")
+    ] = Path("excitation.parquet"),
+    robot: Annotated[str | None, typer.Option(help="robot.toml or a preset.")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            help="multisine, chirp, stepped_sine, triangle, prbs or discrete_interval_binary."
+        ),
+    ] = None,
+    period_s: Annotated[float | None, typer.Option(help="Period (s).")] = None,
+    band_hz: Annotated[
+        str | None, typer.Option(metavar="LOW,HIGH", help="Band of the lines (Hz).")
+    ] = None,
+    peak_rad_s: Annotated[
+        float | None, typer.Option(help="Largest value (rad/s), motor side.")
+    ] = None,
+    grid: Annotated[str | None, typer.Option(help="full, odd, odd_odd or odd_random.")] = None,
+    phases: Annotated[str | None, typer.Option(help="optimized, random or schroeder.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Rules every random choice.")] = None,
+    starts: Annotated[int | None, typer.Option(help="Starts of the search for phases.")] = None,
+    time_s: Annotated[float | None, typer.Option(help="Time for that search (s).")] = None,
+    directions: Annotated[str | None, typer.Option(help="t1, t2, hadamard or dft.")] = None,
+    square: Annotated[
+        str | None,
+        typer.Option(metavar="AMPLITUDE,PERIOD", help="Add a square wave (rad/s, s) to all axes."),
+    ] = None,
+    dc_level_rad_s: Annotated[float | None, typer.Option(help="Mean velocity (rad/s).")] = None,
+    velocity_limit: Annotated[
+        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (rad/s).")
+    ] = None,
+    acceleration_limit: Annotated[
+        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (rad/s^2).")
+    ] = None,
+    torque_limit: Annotated[
+        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (Nm).")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also draw the signal here, and the references in NAME-references (.png, .pdf)."
+        ),
+    ] = None,
+    identified_effects: IdentifiedEffects = True,
+    force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
+) -> None:
+    """Make references for a robot, check them against its limits in simulation, and write them."""
+    with errors():
+        data = {} if design is None else load_design(design)
+        _replace(
+            data, "signal", kind=kind, period_s=period_s, band_hz=_numbers("--band-hz", band_hz)
+        )
+        _replace(data, "signal", peak_rad_s=peak_rad_s, grid=grid, phases=phases)
+        _replace(data, "signal", seed=seed, starts=starts, time_s=time_s)
+        wave = _numbers("--square", square)
+        if wave is not None:
+            if len(wave) != 2:
+                raise InputError(f"--square: expected AMPLITUDE,PERIOD, got {square}")
+            _replace(data, "square", amplitude_rad_s=wave[0], period_s=wave[1])
+        limits = {
+            "velocity_rad_s": _one_or_each("--velocity-limit", velocity_limit),
+            "acceleration_rad_s2": _one_or_each("--acceleration-limit", acceleration_limit),
+            "torque_nm": _one_or_each("--torque-limit", torque_limit),
+        }
+        _replace(data, "limits", **limits)
+        top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
+        data |= {name: value for name, value in top.items() if value is not None}
+        checked = read_design(data, "options" if design is None else str(design))
+        machine = load_robot(checked.robot)
+        # Without limits or a controller nothing is simulated.
+        if checked.limits is not None and machine.controller_kind != "none":
+            machine = load_simulator(checked.robot, identified=identified_effects)
+        made = excite(checked, machine)
+        _show(made)
+        if made.report is not None and not made.report.ok and not force:
+            OUT.print("nothing was written; --force writes in spite of limits")
+            raise typer.Exit(1)
+        for path in write_references(made.references, out):
+            OUT.print(f"written: {path}", soft_wrap=True)
+        if plot is not None:
+            for path in _draw(made, plot):
+                OUT.print(f"written: {path}", soft_wrap=True)
+
+
+def _show(made: Excited) -> None:
+    signal = made.signal
+    OUT.print(
+        f"crest factor {signal.crest_factor:.4f}, peak {signal.peak:.4g} rad/s, "
+        f"{len(signal.lines)} lines, period {signal.period_s:g} s, "
+        f"{made.references.n_experiments} experiments"
+    )
+    if made.search is not None:
+        found = made.search
+        OUT.print(
+            f"best of {len(found.crest_factors)} starts: number {found.start}, seed {found.seed} "
+            f"({found.status})"
+        )
+    if made.report is not None:
+        OUT.print(str(made.report), highlight=False, soft_wrap=True)
+
+
+def _draw(made: Excited, path: Path) -> list[Path]:
+    both = path.with_name(f"{path.stem}-references{path.suffix}")
+    figures = {path: plot_signal(made.signal), both: plot_references(made.references)}
+    for name, figure in figures.items():
+        try:
+            figure.savefig(name, dpi=200)
+        except (OSError, ValueError) as error:
+            raise InputError(f"--plot: {name} cannot be drawn: {error}") from None
+    return list(figures)
+
+
+def _replace(data: dict[str, Any], part: str, **values: Any) -> None:
+    given = {name: value for name, value in values.items() if value is not None}
+    if given:
+        data[part] = {**data.get(part, {}), **given}
+
+
+def _numbers(option: str, text: str | None) -> list[float] | None:
+    return None if text is None else numbers(option, text)
+
+
+def _one_or_each(option: str, text: str | None) -> float | list[float] | None:
+    found = _numbers(option, text)
+    return found[0] if found is not None and len(found) == 1 else found

@@ -1,0 +1,180 @@
+"""The command ``axisight identify axis``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+import axisight
+from axisight.cli.common import errors
+from axisight.cli.identify_common import (
+    Columns,
+    Force,
+    Out,
+    Unchecked,
+    band,
+    load_source,
+    options,
+    provenance,
+    read_logs,
+    refuse_in_the_way,
+    say,
+    write_robot,
+)
+from axisight.errors import InputError
+from axisight.robot import Robot
+
+if TYPE_CHECKING:
+    from axisight.graybox.prediction_error import NoiseKind
+
+
+def axis_command(
+    ctx: typer.Context,
+    slow: Annotated[
+        Path, typer.Argument(help="Log of a slow motion both ways, e.g. a triangle wave.")
+    ],
+    broadband: Annotated[
+        list[Path],
+        typer.Argument(help="Logs of periodic excitation, from rest, of different amplitudes."),
+    ],
+    robot: Annotated[
+        str | None, typer.Option(help="robot.toml or a preset: gear ratio, and what --out writes.")
+    ] = None,
+    gear_ratio: Annotated[
+        float | None,
+        typer.Option(help="Joint angle per motor angle, 0.00446 for a 224:1 gear; or --robot."),
+    ] = None,
+    axis: Annotated[int, typer.Option(help="Number of the axis, from 1.")] = 1,
+    out: Out = None,
+    columns: Columns = None,
+    period_s: Annotated[
+        float | None, typer.Option(help="Period of the excitation (s). Default: found.")
+    ] = None,
+    band_hz: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW,HIGH",
+            help="Excited lines, all of the period in this band; needs --period-s. Default: found "
+            "from the reference, else from the torque.",
+        ),
+    ] = None,
+    drop_periods: Annotated[
+        int | None, typer.Option(help="Periods of transient. Default: found.")
+    ] = None,
+    cutoff_hz: Annotated[float, typer.Option(help="Filter of the slow motion (Hz).")] = 5.0,
+    notch_band_hz: Annotated[
+        str | None, typer.Option(metavar="LOW,HIGH", help="Where to look for the notch (Hz).")
+    ] = None,
+    plateau_from_hz: Annotated[
+        float | None, typer.Option(help="Where the response is flat from (Hz).")
+    ] = None,
+    masses: Annotated[int, typer.Option(help="2 to 4, the motor included.")] = 2,
+    stribeck: Annotated[
+        bool, typer.Option("--stribeck", help="Friction that rises to standstill.")
+    ] = False,
+    backlash: Annotated[bool, typer.Option("--backlash", help="Play in the gear.")] = False,
+    offset: Annotated[bool, typer.Option("--offset", help="Constant torque.")] = False,
+    smoothing_rad_s: Annotated[
+        float,
+        typer.Option(help="Width of the sign of friction; 0 is the sign itself."),
+    ] = 0.0,
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Parameter that keeps its initial value (repeatable)."),
+    ] = None,
+    noise_model: Annotated[
+        str, typer.Option(help="output_error, innovations or ar.")
+    ] = "output_error",
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="No controller was at work.")
+    ] = False,
+    unchecked: Unchecked = False,
+    force: Force = False,
+) -> None:
+    """One axis in three steps: rigid body and friction, flexibility, prediction-error fit.
+
+    Prints the values of each step with standard errors, fits, residual tests and findings. --out
+    writes the robot with gear stiffness and damping, motor inertia and friction of the
+    axis. The exit status is 1 if the fit did not converge.
+    """
+    with errors():
+        refuse_in_the_way(out, force)
+        machine = None if robot is None else load_source(robot)
+        if out is not None and machine is None:
+            raise InputError("--out: expected the robot to write values into, in --robot")
+        ratio = _ratio(machine, gear_ratio, axis)
+        files = [slow, *broadband]
+        logs = read_logs(files, columns, machine, unchecked=unchecked)
+        found = axisight.graybox.identify_axis(
+            logs[0],
+            logs[1:],
+            gear_ratio=ratio,
+            axis=axis,
+            model=axisight.graybox.AxisModel(
+                n_masses=masses,
+                gear_ratio=ratio,
+                stribeck=stribeck,
+                backlash=backlash,
+                torque_offset=offset,
+                friction_smoothing_rad_s=smoothing_rad_s,
+                output="velocity_difference",
+            ),
+            fixed=fixed or [],
+            noise_model=cast("NoiseKind", noise_model),
+            closed_loop=not open_loop,
+            period_s=period_s,
+            lines=_lines(band_hz, period_s),
+            drop_periods=drop_periods,
+            cutoff_hz=cutoff_hz,
+            notch_band_hz=band("--notch-band-hz", notch_band_hz),
+            plateau_from_hz=plateau_from_hz,
+        )
+        say(found.report())
+        if machine is not None:
+            against = axisight.graybox.compare_with_robot(found.fit, machine, axis)
+            for text in against.findings:
+                say(f"- {text}")
+            if out is not None and against.one_factor and not unchecked:
+                raise InputError(
+                    f"--out: nothing was written, for {against.findings[0]} (or write with "
+                    "--unchecked)"
+                )
+        if out is not None and machine is not None:
+            source = provenance("axis", files, options(ctx), columns)
+            values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
+            write_robot(machine, out, values, force=force)
+            say(values.provenance.notes)
+        if not found.fit.converged:
+            raise typer.Exit(1)
+
+
+def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
+    if given is not None:
+        if not 0 < given <= 1:
+            raise InputError(
+                f"--gear-ratio: expected joint angle per motor angle, 1/224 for a gear of 224:1, "
+                f"got {given}"
+            )
+        return given
+    if machine is None:
+        raise InputError("--gear-ratio: expected a number, or --robot that has it, got neither")
+    if not 1 <= axis <= machine.n_axes:
+        raise InputError(f"--axis: expected 1 to {machine.n_axes}, got {axis}")
+    # Motor-side data do not show which way the joint turns.
+    return abs(float(machine.gear_ratio[axis - 1]))
+
+
+def _lines(band_hz: str | None, period_s: float | None) -> NDArray[np.int64] | None:
+    limits = band("--band-hz", band_hz)
+    if limits is None:
+        return None
+    if period_s is None:
+        raise InputError("--band-hz: expected --period-s with it, got none")
+    low, high = (round(frequency * period_s) for frequency in limits)
+    if not 1 <= low <= high:
+        raise InputError(f"--band-hz: expected 0 < LOW <= HIGH, got {band_hz!r}")
+    return np.arange(low, high + 1, dtype=np.int64)

@@ -1,0 +1,147 @@
+"""What the commands ``axisight identify`` share: writing the robot, options with names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from axisight.cli.common import OUT, numbers
+from axisight.errors import InputError
+from axisight.logs import Log, check_log, read_log
+from axisight.robot import Robot
+from axisight.robot_file import (
+    Identified,
+    Provenance,
+    hash_file,
+    load_with_effects,
+    sidecar_path,
+    write_identified,
+)
+
+Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        "-o",
+        help="Robot file to write; NAME.identified.json beside it has standard errors, data "
+        "and settings.",
+    ),
+]
+Unchecked = Annotated[
+    bool,
+    typer.Option("--unchecked", help="Take logs in which `axisight check` finds errors."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+
+
+def load_source(robot: str) -> Robot:
+    """Return a preset or the robot of a file, with the effects that an earlier command found."""
+    return load_with_effects(robot, check=True)[0]
+
+
+def read_logs(
+    paths: Sequence[Path], columns: Path | None, robot: Robot | None, *, unchecked: bool
+) -> list[Log]:
+    """Return logs that pass what ``axisight check`` looks at; warnings are printed.
+
+    Identification fits data in wrong units as well as any. Raises InputError for an error that the
+    check finds, unless ``unchecked``, and for an axis that turns where that of the robot slides.
+    """
+    logs = []
+    for path in paths:
+        for finding in check_log(path, columns).findings:
+            text = f"{path.name}: {finding.column}: {finding.message}"
+            if finding.severity == "error" and not unchecked:
+                raise InputError(
+                    f"{text} (put it right in a column map, or go on with --unchecked)"
+                )
+            if finding.severity != "ok":
+                say(f"{finding.severity}: {text}")
+        log = read_log(path, columns, n_axes=None if robot is None else robot.n_axes)
+        slides = [kind == "prismatic" for kind in log.axis_kinds]
+        if robot is not None and slides != list(robot.axis_is_prismatic):
+            raise InputError(
+                f"{path.name}: expected axes that {_kinds(robot.axis_is_prismatic)} as the "
+                f"robot's, got axes that {_kinds(slides)} by their units"
+            )
+        logs.append(log)
+    return logs
+
+
+def _kinds(slides: Sequence[bool]) -> str:
+    return ", ".join("slide" if one else "turn" for one in slides)
+
+
+def refuse_in_the_way(out: Path | None, force: bool) -> None:
+    """Refuse files in the way before any work; raises InputError."""
+    for path in [] if out is None or force else [out, sidecar_path(out)]:
+        if path.exists():
+            raise InputError(f"--out: {path} exists; --force replaces it")
+
+
+def options(ctx: typer.Context) -> dict[str, Any]:
+    """Return the options of a command that say how it worked: numbers, choices, names of files."""
+    out: dict[str, Any] = {}
+    for name, value in ctx.params.items():
+        if isinstance(value, list | tuple):
+            out[name] = [v.name if isinstance(v, Path) else v for v in value]
+        elif name not in ("robot", "out", "force"):
+            out[name] = value.name if isinstance(value, Path) else value
+    return out
+
+
+def provenance(
+    method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
+) -> Provenance:
+    """Return where values come from: hashes of files, the column map too, and the options given."""
+    files = [*files, *([] if columns is None else [columns])]
+    count = Counter(path.name for path in files)
+    names = [path.name if count[path.name] == 1 else str(path) for path in files]
+    return Provenance(
+        f"axisight identify {method}",
+        {name: hash_file(path) for name, path in zip(names, files, strict=True)},
+        {name: value for name, value in settings.items() if value is not None},
+    )
+
+
+def write_robot(source: Robot, out: Path, found: Identified, *, force: bool) -> None:
+    """Write robot and sidecar and say so; raises InputError if they cannot be written."""
+    try:
+        sidecar = write_identified(source, out, found, overwrite=force)
+    except OSError as error:
+        raise InputError(f"--out: {out} cannot be written: {error}") from None
+    for path in (out, sidecar):
+        OUT.print(f"written: {path}", soft_wrap=True, highlight=False)
+
+
+def say(text: str) -> None:
+    """Print a text as it is."""
+    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
+    """Return the numbers in NAME=VALUE texts; raises InputError naming the option."""
+    out: dict[str, float] = {}
+    for text in given or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise InputError(f"{option}: expected NAME=VALUE, got {text!r}")
+        if name in out:
+            raise InputError(f"{option}: expected {name} once, got it twice")
+        (out[name],) = numbers(f"{option} {name}", value)
+    return out
+
+
+def band(option: str, text: str | None) -> tuple[float, float] | None:
+    """Return two numbers; raises InputError naming the option."""
+    if text is None:
+        return None
+    found = numbers(option, text)
+    if len(found) != 2:
+        raise InputError(f"{option}: expected LOW,HIGH, got {text!r}")
+    return found[0], found[1]

@@ -1,0 +1,185 @@
+"""The command ``axisight identify elastic``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import numpy as np
+import typer
+import xarray as xr
+from rich.table import Table
+
+import axisight
+from axisight.cli.common import OUT, errors, numbers
+from axisight.cli.identify_common import (
+    Force,
+    Out,
+    load_source,
+    options,
+    pairs,
+    provenance,
+    refuse_in_the_way,
+    say,
+    write_robot,
+)
+from axisight.errors import InputError
+from axisight.fitting import robot_parameters
+from axisight.frf.interop import load_netcdf
+from axisight.robot import Robot
+
+if TYPE_CHECKING:
+    from axisight.frequency_fit import FrequencyFit
+    from axisight.frequency_fit.measured import Sampling
+    from axisight.frequency_fit.options import Criterion
+
+_USUAL = ("*.stiffness", "*.damping")
+_LINEAR = ("payload", "joint_stiffness", "joint_damping", "motor_inertia")
+_CONVERGED = ("loss_converged", "step_converged")
+POSE = "joint_angle_rad"
+"""Attribute of a response that holds its operating point."""
+
+
+def elastic_command(
+    ctx: typer.Context,
+    robot: Annotated[str, typer.Argument(help="robot.toml or a preset: where the search starts.")],
+    responses: Annotated[
+        list[Path],
+        typer.Argument(help="Frequency responses, one per operating point (NetCDF, save_netcdf)."),
+    ],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Parameter to fit, by name or with wildcards (repeatable), e.g. "
+            "'axis*.stiffness'. Default: all stiffnesses and dampings."
+        ),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ANGLE,...",
+            help="Operating point of each response in turn: angles of the driven joints (rad). "
+            f"Default: the attribute {POSE} of the files.",
+        ),
+    ] = None,
+    out: Out = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE", help="Start of a parameter (repeatable). Default: the robot's."
+        ),
+    ] = None,
+    criterion: Annotated[
+        str,
+        typer.Option(
+            help="(weighted_)log_least_squares compares logarithms, (weighted_)least_squares values."
+        ),
+    ] = "weighted_log_least_squares",
+    sampling: Annotated[
+        str, typer.Option(help="zero_order_hold, as a sampled loop shows, or continuous.")
+    ] = "zero_order_hold",
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Hold back lines that the model misses (Huber).")
+    ] = False,
+    starts: Annotated[int, typer.Option(help="Searches, from random starts but the first.")] = 1,
+    seed: Annotated[int, typer.Option(help="Rules the random starts.")] = 0,
+    force: Force = False,
+) -> None:
+    """Stiffness and damping of gears and links from frequency responses at several poses.
+
+    Prints values with standard errors and 95 % intervals, and warnings. The exit status is 1 if the
+    search did not converge.
+    """
+    with errors():
+        refuse_in_the_way(out, force)
+        machine = load_source(robot)
+        linear = [effect for effect in machine.effects if effect.name in _LINEAR]
+        model = machine.with_effects(linear)
+        data = _responses(machine, responses, at)
+        begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
+        search = axisight.frequency_fit.FrequencyFitOptions(
+            criterion=cast("Criterion", criterion),
+            sampling=cast("Sampling", sampling),
+            loss="huber" if robust else "squared",
+            starts=starts,
+            seed=seed,
+        )
+        fit = axisight.frequency_fit.fit_responses(model, data, begin, options=search)
+        _show(fit)
+        if len(linear) < len(machine.effects):
+            left = ", ".join(e.label for e in machine.effects if e not in linear)
+            say(f"not in the linear model, kept as they are: {left}")
+        if out is not None:
+            # What patterns and files stood for takes their place.
+            settings = options(ctx) | {
+                "parameters": list(begin),
+                "start": begin,
+                "operating_points_rad": [list(angles) for angles, _ in data],
+            }
+            source = provenance("elastic", responses, settings)
+            found = axisight.frequency_fit.identified_responses(fit, source)
+            write_robot(machine, out, found, force=force)
+        if fit.status not in _CONVERGED:
+            raise typer.Exit(1)
+
+
+def _responses(
+    robot: Robot, paths: Sequence[Path], at: Sequence[str] | None
+) -> list[tuple[list[float], xr.Dataset]]:
+    poses = [numbers("--at", text) for text in at or []]
+    if poses and len(poses) != len(paths):
+        raise InputError(f"--at: expected one for each of {len(paths)} responses, got {len(poses)}")
+    out = []
+    for i, path in enumerate(paths):
+        response = load_netcdf(path)
+        if not poses and POSE not in response.attrs:
+            raise InputError(
+                f"{path}: expected its operating point, in --at (once per response) or as the "
+                f"attribute {POSE}, got none"
+            )
+        pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
+        if len(pose) != robot.n_axes:
+            raise InputError(
+                f"{path}: operating point: expected {robot.n_axes} angles of driven joints, got "
+                f"{len(pose)}"
+            )
+        out.append((pose, response))
+    return out
+
+
+def _starts(robot: Robot, patterns: Sequence[str], given: dict[str, float]) -> dict[str, float]:
+    """Return the parameters that patterns name, in the order of the robot, with their starts."""
+    known = robot_parameters(robot)
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in known):
+            raise InputError(
+                f"--parameters: expected names or patterns of {', '.join(known)}, got {pattern!r}"
+            )
+    names = [name for name in known if any(fnmatchcase(name, p) for p in patterns)]
+    for name in given:
+        if name not in names:
+            raise InputError(f"--start: expected one of {', '.join(names)}, got {name!r}")
+    return {name: given.get(name, known[name]) for name in names}
+
+
+def _show(fit: FrequencyFit) -> None:
+    table = Table()
+    for title in ("parameter", "value", "std. error", "rel.", "95 % interval"):
+        table.add_column(title, justify="left" if title == "parameter" else "right")
+    for row in fit.table().itertuples():
+        table.add_row(
+            str(row.parameter),
+            f"{row.value:.6g}",
+            f"{row.std:.2g}",
+            f"{100 * cast(float, row.relative_std):.2g} %",
+            f"{row.lower:.5g} .. {row.upper:.5g}",
+        )
+    OUT.print(table)
+    say(
+        f"status {fit.status} after {fit.iterations} iterations, misfit {fit.misfit:.3g} (1 if "
+        f"model and uncertainty are right), standard errors from the {fit.std_from}"
+    )
+    for text in fit.warnings:
+        say(f"warning: {text}")

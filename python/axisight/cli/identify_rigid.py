@@ -1,0 +1,222 @@
+"""The command ``axisight identify rigid-body``."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+import xarray as xr
+from rich.table import Table
+
+import axisight
+from axisight.cli.common import OUT, errors
+from axisight.cli.identify_common import (
+    Columns,
+    Force,
+    Out,
+    Unchecked,
+    load_source,
+    options,
+    pairs,
+    provenance,
+    read_logs,
+    refuse_in_the_way,
+    say,
+    write_robot,
+)
+from axisight.errors import IdentificationWarning, InputError, RobotError
+from axisight.fitting import robot_parameters
+
+if TYPE_CHECKING:
+    from axisight.rigid_body import DriveTerms, LogIdentification
+    from axisight.rigid_body.estimate import Method
+    from axisight.robot import Robot
+    from axisight.robot_file import Provenance
+
+_FRICTION = ("viscous", "coulomb", "offset")
+_PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
+
+
+def rigid_body_command(
+    ctx: typer.Context,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="robot.toml or a preset: chain, gears, and the values of what motions do not show."
+        ),
+    ],
+    logs: Annotated[list[Path], typer.Argument(help="Motor logs to fit to.")],
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log that takes no part, for the torque errors (repeatable)."),
+    ] = None,
+    out: Out = None,
+    columns: Columns = None,
+    cutoff_hz: Annotated[
+        float,
+        typer.Option(help="Filter (Hz): well above the motion, well below the first resonance."),
+    ] = 10.0,
+    friction: Annotated[
+        str,
+        typer.Option(
+            metavar="TERM,...", help="Out of viscous, coulomb, offset, on every motor; or none."
+        ),
+    ] = "viscous,coulomb,offset",
+    rotors: Annotated[
+        bool,
+        typer.Option(
+            "--rotors/--no-rotors", help="Estimate motor inertias, or hold those of the file."
+        ),
+    ] = True,
+    dead_band_rad_s: Annotated[
+        float, typer.Option(help="Motor speed below which Coulomb friction counts as zero.")
+    ] = 0.0,
+    reversal_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Time (s) around each turn of a motor that is left out: the filter smears "
+            "Coulomb friction there. Default: two periods of the cutoff."
+        ),
+    ] = None,
+    torque_measured: Annotated[
+        bool,
+        typer.Option(
+            "--torque-measured",
+            help="The torque is measured at the samples, not a command held from each to the next.",
+        ),
+    ] = False,
+    method: Annotated[
+        str, typer.Option(help="ls, wls (axes weighted by their residuals) or tls.")
+    ] = "wls",
+    known: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Parameter held at a value (repeatable)."),
+    ] = None,
+    eliminate: Annotated[
+        float | None,
+        typer.Option(help="Set to zero what has a larger relative standard error, e.g. 0.3."),
+    ] = None,
+    group: Annotated[
+        bool,
+        typer.Option(
+            "--group", help="Go on with fewer combinations if motions do not separate all."
+        ),
+    ] = False,
+    consistent: Annotated[
+        bool,
+        typer.Option(
+            "--consistent", help="Only bodies that can exist, near those in the robot file."
+        ),
+    ] = False,
+    combinations: Annotated[
+        bool, typer.Option("--combinations", help="Say what each base parameter is made of.")
+    ] = False,
+    prior_share: Annotated[
+        float,
+        typer.Option(help="How near, with --consistent: share of each link's own size."),
+    ] = 1.0,
+    unchecked: Unchecked = False,
+    force: Force = False,
+) -> None:
+    """Masses, inertias and friction from logs of motor angles and torques, by regression.
+
+    Prints base parameters with standard errors, and torque errors on every log. --out writes a
+    robot file; most often it takes --consistent, since a fit alone may have bodies that cannot exist.
+    The exit status is 1 if these were not found to full accuracy.
+    """
+    with errors():
+        refuse_in_the_way(out, force)
+        machine = load_source(robot)
+        paths = [*logs, *(held_out or [])]
+        read = read_logs(paths, columns, machine, unchecked=unchecked)
+        held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
+        with warnings.catch_warnings():
+            # They are among the notes that are printed.
+            warnings.simplefilter("ignore", IdentificationWarning)
+            found = axisight.rigid_body.identify_logs(
+                machine,
+                read[: len(logs)],
+                held_out=read[len(logs) :],
+                cutoff_hz=cutoff_hz,
+                reversal_s=reversal_s,
+                torque_held=not torque_measured,
+                terms=_terms(friction, dead_band_rad_s),
+                method=cast("Method", method),
+                known=held,
+                eliminate=eliminate,
+                deficient="group" if group else "raise",
+                consistent=consistent,
+                prior_share=prior_share,
+            )
+        if combinations:
+            say(str(found.estimate.base))
+        _show(found)
+        if out is not None:
+            source = provenance("rigid-body", paths, options(ctx), columns)
+            _write(found, machine, out, source, force=force)
+        if found.consistent is not None and found.consistent.status in ("inaccurate", "failed"):
+            raise typer.Exit(1)
+
+
+def _write(
+    found: LogIdentification, machine: Robot, out: Path, source: Provenance, *, force: bool
+) -> None:
+    """Write the robot, or say why not if there are no bodies to write."""
+    if found.consistent is not None and found.consistent.status == "failed":
+        say(f"not written: {out}: no bodies that can exist were found")
+        return
+    try:
+        write_robot(machine, out, found.identified(source), force=force)
+    except RobotError as error:
+        if found.consistent is not None:
+            raise
+        raise InputError(f"{error}; --consistent finds bodies that can exist") from None
+
+
+def _rotors(machine: Robot) -> dict[str, float]:
+    """Motor inertias of the robot: without a term for them, links would hold them once more."""
+    return {n: v for n, v in robot_parameters(machine).items() if n.endswith(".motor_inertia")}
+
+
+def _terms(friction: str, dead_band_rad_s: float) -> DriveTerms:
+    chosen = [] if friction == "none" else friction.split(",")
+    for term in chosen:
+        if term not in _FRICTION:
+            raise InputError(
+                f"--friction: expected some of {', '.join(_FRICTION)}, or none, got {term!r}"
+            )
+    return axisight.rigid_body.DriveTerms(
+        inertia="motor",
+        viscous="motor" if "viscous" in chosen else None,
+        coulomb="motor" if "coulomb" in chosen else None,
+        offset="motor" if "offset" in chosen else None,
+        dead_band_rad_s=dead_band_rad_s,
+    )
+
+
+def _show(found: LogIdentification) -> None:
+    fitted = found.errors["log"].values[~found.errors["held_out"].values]
+    for name, motion in zip(fitted, found.motions, strict=True):
+        say(f"{name}: {motion}")
+    say(str(found.estimate))
+    if found.consistent is not None:
+        say(f"bodies that can exist: {found.consistent.status} {found.consistent.advice}".rstrip())
+    for which in found.errors["parameters"].values:
+        OUT.print(_error_table(found.errors.sel(parameters=which), _PARAMETERS[str(which)]))
+
+
+def _error_table(of: xr.Dataset, title: str) -> Table:
+    table = Table("log", title=f"torque error, {title}")
+    for axis in of["axis"].values:
+        table.add_column(f"axis {axis}", justify="right")
+    for i in range(of.sizes["log"]):
+        one = of.isel(log=i)
+        name = str(one["log"].item()) + (" (held out)" if one["held_out"].item() else "")
+        cells = [
+            f"{rms:.3g} Nm, {100 * share:.3g} %"
+            for rms, share in zip(one["rms_nm"].values, one["relative_error"].values, strict=True)
+        ]
+        table.add_row(name, *cells)
+    return table

@@ -1,0 +1,103 @@
+"""The command ``axisight montecarlo``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import Progress as Bars
+from rich.table import Table
+
+from axisight import montecarlo
+from axisight.cli.common import ERR, OUT, errors
+from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.effects import Effect
+from axisight.montecarlo.progress import Progress, Report
+from axisight.robot import load_robot
+
+
+def montecarlo_command(
+    study: Annotated[Path, typer.Argument(help="Study (TOML).")],
+    out: Annotated[Path, typer.Option(help="Folder for the results.")],
+    runs: Annotated[
+        int | None, typer.Option(help="Number of realizations. Default: the study's.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Default: the study's.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the study in the folder, or to more runs.")
+    ] = False,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, e.g. tcp://10.0.0.1:8786.")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Threads here. Default: all processors.")
+    ] = None,
+    identified_effects: IdentifiedEffects = True,
+) -> None:
+    """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
+    with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
+        design = _with_effects(montecarlo.read_study(study), identified=identified_effects)
+        with _bar() as progress:
+            result = montecarlo.run(
+                design,
+                runs=runs,
+                seed=seed,
+                out=out,
+                resume=resume,
+                backend="local" if scheduler is None else "dask",
+                scheduler=scheduler,
+                threads=threads,
+                progress=progress,
+            )
+        failed = montecarlo.failures(result)
+        counted = int(result["count"].max())
+        if len(failed):
+            table = Table("run", "seed", "experiment", "kind", "detail", title="failed runs")
+            for row in failed.head(10).itertuples(index=False):
+                table.add_row(*(str(cell) for cell in row))
+            OUT.print(table)
+        runs_failed = failed["run"].nunique()
+        OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
+        if counted == 0:
+            raise typer.Exit(1)
+
+
+def _with_effects(study: montecarlo.Study, *, identified: bool) -> montecarlo.Study:
+    """Return the study with the effects in the sidecar of its robot among its own."""
+    given = [Effect(e.name, e.axis, e.parameters) for e in study.effect]
+    robot = load_simulator(study.robot, given, identified=identified)
+    own = {effect.label for effect in load_robot(study.robot).effects}
+    added = [
+        montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=dict(e.parameters or {}))
+        for e in robot.effects
+        if e.label not in own
+    ]
+    return study.model_copy(update={"effect": [*study.effect, *added]})
+
+
+@contextmanager
+def _bar() -> Iterator[Report]:
+    columns = (
+        TextColumn("runs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[pace]}"),
+    )
+    with Bars(*columns, console=ERR) as bars:
+        task = bars.add_task("runs", total=None, pace="")
+
+        def report(state: Progress) -> None:
+            if state.message:
+                bars.console.print(state.message, highlight=False, soft_wrap=True)
+            pace = f"{state.rate_hz:.3g} runs/s, {state.remaining_s:.0f} s left"
+            if state.failed:
+                pace += f", {state.failed} failed"
+            shown = "" if math.isnan(state.rate_hz) else pace
+            bars.update(task, completed=state.done, total=state.total, pace=shown)
+
+        yield report

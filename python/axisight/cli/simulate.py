@@ -1,0 +1,146 @@
+"""The command ``axisight simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, cast, get_args
+
+import numpy as np
+import pandas as pd
+import typer
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.cli.common import OUT, errors, numbers
+from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.logs import Log, read_log
+from axisight.robot import Robot
+from axisight.simulation import Method, Model, simulate
+from axisight.storage import write_bytes
+
+# A share of the sample time by which a log may miss that of the robot.
+_SAME_RATE = 1e-4
+
+
+def simulate_command(
+    robot: Annotated[str, typer.Argument(help="robot.toml or a preset.")],
+    log: Annotated[
+        Path, typer.Argument(help="Log whose velocity references (or torques) drive the run.")
+    ],
+    out: Annotated[Path, typer.Option(help="Parquet log to write.")],
+    columns: Annotated[
+        Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")
+    ] = None,
+    torque: Annotated[
+        bool, typer.Option("--torque", help="Drive with the log's torques, without controller.")
+    ] = False,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME@AXIS:PARAM=VALUE,...",
+            help="Further effect (repeatable), e.g. coulomb_friction@2:coulomb_nm=0.5; the whole "
+            "arm without @AXIS, neutral values for parameters left out. It takes the place of an "
+            "identified one of that name and axis.",
+        ),
+    ] = None,
+    identified_effects: IdentifiedEffects = True,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ANGLE,...",
+            help="Driven joint angles at rest (rad). Default: the operating point.",
+        ),
+    ] = None,
+    model: Annotated[
+        str, typer.Option(help=f"Equations of the plant: {' or '.join(get_args(Model))}.")
+    ] = "nonlinear",
+    method: Annotated[
+        str, typer.Option(help=f"Integrator: {', '.join(get_args(Method))}.")
+    ] = "dopri5",
+    tolerance: Annotated[
+        float, typer.Option(help="Relative local error; rk4, rkn4 have none.")
+    ] = 1e-7,
+    substeps: Annotated[int, typer.Option(help="Steps per sample of rk4, rkn4.")] = 1,
+    noise_seed: Annotated[int | None, typer.Option(help="Add sensor noise.")] = None,
+    run: Annotated[int, typer.Option(help="Number of the run: another noise per run.")] = 0,
+    noise_cutoff_hz: Annotated[
+        float | None, typer.Option(help="Corner of a first-order noise spectrum. Default: white.")
+    ] = None,
+    resolution: Annotated[
+        float, typer.Option(help="Step of the position sensor (rad), motor side.")
+    ] = 0.0,
+) -> None:
+    """Simulate a robot along the references or torques of a log and write the result as a log."""
+    with errors():
+        added = [parse_effect(text) for text in effect or []]
+        machine = load_simulator(robot, added, identified=identified_effects)
+        inputs = _inputs(read_log(log, columns, n_axes=machine.n_axes), machine, torque=torque)
+        result = simulate(
+            machine,
+            **inputs,
+            effects=added,
+            start_rad=None if start is None else numbers("--start", start),
+            model=cast(Model, model),
+            method=cast(Method, method),
+            tolerance=tolerance,
+            substeps=substeps,
+            noise_seed=noise_seed,
+            run=run,
+            noise_cutoff_hz=noise_cutoff_hz,
+            position_resolution_rad=resolution,
+        )
+        write_bytes(out, _log_table(result, inputs).to_parquet(index=False))
+        OUT.print(f"{result.attrs['status']}: {out}", soft_wrap=True)
+        if result.attrs["status"] != "completed":
+            raise typer.Exit(1)
+
+
+def _inputs(log: Log, robot: Robot, *, torque: bool) -> dict[str, NDArray[np.float64]]:
+    """Return the input of `simulate` that the log has, by name."""
+    if abs(log.sample_time_s / robot.sample_time_s - 1) > _SAME_RATE:
+        raise InputError(
+            f"{log.source}: expected the sample time of the robot, {robot.sample_time_s:g} s, "
+            f"got {log.sample_time_s:g} s; resample the log or change the robot"
+        )
+    if torque:
+        return {"torque_nm": log.torque_nm}
+    if log.velocity_ref_rad_s is None:
+        raise InputError(f"{log.source}: expected velocity references; --torque does without")
+    return {"velocity_ref_rad_s": log.velocity_ref_rad_s}
+
+
+def _log_table(result: xr.Dataset, inputs: dict[str, NDArray[np.float64]]) -> pd.DataFrame:
+    """Return the run in the native columns of a log."""
+    data = {"time_s": np.asarray(result["time"].values)}
+    reference = inputs.get("velocity_ref_rad_s")
+    for i in range(result.sizes["axis"]):
+        if reference is not None:
+            data[f"velocity_ref_{i + 1}"] = reference[: result.sizes["time"], i]
+        data[f"torque_cmd_{i + 1}"] = result["torque_cmd_nm"].values[:, i]
+        data[f"position_{i + 1}"] = result["position_rad"].values[:, i]
+    return pd.DataFrame(data)
+
+
+def parse_effect(text: str) -> Effect:
+    """Return the effect that ``NAME@AXIS:PARAM=VALUE,...`` describes.
+
+    Axis and parameters may be left out. Raises InputError quoting ``text``.
+    """
+    head, _, tail = text.partition(":")
+    name, at, axis = head.partition("@")
+    if at and not axis.isdecimal():
+        raise InputError(f"--effect {text!r}: expected an axis number after @, got {axis!r}")
+    parameters: dict[str, float] = {}
+    for item in tail.split(",") if tail else []:
+        key, equals, value = item.partition("=")
+        if not equals:
+            raise InputError(f"--effect {text!r}: expected PARAM=VALUE, got {item!r}")
+        if key in parameters:
+            raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
+        (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
+    try:
+        return Effect(name, int(axis) if at else None, parameters)
+    except InputError as error:
+        raise InputError(f"--effect {text!r}: {error}") from None

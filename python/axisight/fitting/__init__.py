@@ -1,0 +1,23 @@
+"""Fitting robot and effect parameters to logs."""
+
+from axisight.fitting.simulation_error import (
+    FitOptions,
+    Fitted,
+    Parameter,
+    Weighting,
+    effect_parameter,
+    fit,
+    robot_parameter,
+    robot_parameters,
+)
+
+__all__ = [
+    "FitOptions",
+    "Fitted",
+    "Parameter",
+    "Weighting",
+    "effect_parameter",
+    "fit",
+    "robot_parameter",
+    "robot_parameters",
+]

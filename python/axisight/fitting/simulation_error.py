@@ -1,0 +1,319 @@
+"""Fitting robot and effect parameters to logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects, effect_info
+from axisight.errors import InputError
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number to fit.
+
+    ``robot`` names a robot parameter (``axis1.stiffness``; see
+    `robot_parameters`), or ``effect`` gives the position of an effect in the
+    list of effects and ``name`` its parameter. ``scale`` is the natural size
+    of a change; ``prior`` a mean and standard deviation; ``nuisance`` marks a
+    parameter whose sensitivity is computed once and refreshed at the end.
+    """
+
+    name: str
+    initial: float
+    lower: float
+    upper: float
+    scale: float
+    effect: int | None = None
+    prior: tuple[float, float] | None = None
+    frozen: bool = False
+    nuisance: bool = False
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """Weight of residuals over frequency, one table per axis, and decimation.
+
+    ``frequency_hz`` (n_freq,), ``weight`` (n_axes, n_freq); linear in between,
+    constant outside; nothing above the Nyquist frequency after decimation
+    passes. A residual of standard deviation s weighted by 1/s counts one.
+    """
+
+    frequency_hz: Array
+    weight: Array
+    decimation: int = 1
+
+    @classmethod
+    def flat(cls, n_axes: int) -> Weighting:
+        """No weighting."""
+        return cls(np.zeros(1), np.ones((n_axes, 1)))
+
+    def core(self) -> list[tuple[list[float], list[float], int]]:
+        """Return the tables as the compiled core takes them."""
+        f = self.frequency_hz.tolist()
+        return [(f, w.tolist(), self.decimation) for w in self.weight]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Settings of a fit.
+
+    Stop after ``max_iterations`` accepted steps, when the loss falls by less
+    than ``loss_tolerance`` of itself, or when no parameter moves by
+    ``step_tolerance`` of its scale. ``loss`` with ``loss_scale`` in units of
+    the whitened residual. ``method`` as in `axisight.simulate`.
+    """
+
+    max_iterations: int = 50
+    loss_tolerance: float = 1e-10
+    step_tolerance: float = 1e-8
+    loss: Literal["squared", "huber", "soft_l1"] = "squared"
+    loss_scale: float = 1.0
+    nuisance_refreshes: int = 2
+    block_s: float = 1.0
+    method: Literal["rk4", "dopri5"] = "rk4"
+    substeps: int = 1
+    tolerance: float = 1e-7
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Result of a fit.
+
+    ``status``: ``loss_converged``, ``step_converged``, ``max_iterations`` or
+    ``stalled``; ``warnings`` say in words what to mind (status, parameters on a
+    bound, poor conditioning). ``values``, ``std`` and the matrices run over
+    ``names``, the free parameters; ``std`` is from the sandwich covariance of
+    data blocks, which stays valid when the model is incomplete.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    std: Array
+    covariance: Array
+    correlation: Array
+    status: str
+    loss: float
+    initial_loss: float
+    iterations: int
+    evaluations: int
+    condition: float
+    at_bound: tuple[str, ...]
+    warnings: tuple[str, ...]
+    core: _core.FitResult = field(repr=False)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return values and uncertainty as a Dataset over ``parameter``."""
+        return xr.Dataset(
+            {
+                "value": ("parameter", self.values),
+                "std": ("parameter", self.std),
+                "correlation": (("parameter", "other"), self.correlation),
+            },
+            coords={"parameter": list(self.names), "other": list(self.names)},
+            attrs={"status": self.status, "loss": self.loss, "condition": self.condition},
+        )
+
+
+@dataclass(frozen=True)
+class _Spec:
+    """A parameter as the compiled core reads it."""
+
+    robot: str | None
+    effect: tuple[int, int] | None
+    initial: float
+    lower: float
+    upper: float
+    scale: float
+    prior: tuple[float, float] | None
+    frozen: bool
+    nuisance: bool
+
+
+def robot_parameters(robot: Robot) -> dict[str, float]:
+    """Return the names and values of all physical parameters of a robot."""
+    return robot.parameters()
+
+
+def robot_parameter(
+    robot: Robot, name: str, *, relative_tolerance: float | None = None, nuisance: bool = False
+) -> Parameter:
+    """Return a robot parameter at its nominal value, free or within a tolerance.
+
+    A ``relative_tolerance`` becomes the standard deviation of a prior, with
+    bounds at four of them; ``nuisance`` as in `Parameter`. Raises InputError for an unknown name.
+    """
+    known = robot_parameters(robot)
+    if name not in known:
+        raise InputError(f"parameter {name!r}: expected one of {', '.join(known)}")
+    nominal = known[name]
+    size = abs(nominal) if nominal else 1.0
+    signed = name.rsplit(".", 1)[1].startswith("com_")
+    if relative_tolerance is None:
+        lower = -10 * size if signed else 1e-6 * size
+        return Parameter(name, nominal, lower, max(100 * size, lower), size, nuisance=nuisance)
+    spread = relative_tolerance * size
+    lower = nominal - 4 * spread if signed else max(nominal - 4 * spread, 1e-6 * size)
+    return Parameter(
+        name,
+        nominal,
+        lower,
+        nominal + 4 * spread,
+        spread,
+        prior=(nominal, spread),
+        nuisance=nuisance,
+    )
+
+
+def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parameter:
+    """Return a parameter of ``effects[index]`` at its present value, within the table's bounds."""
+    info = {p.name: p for p in effect_info(effects[index].name).parameters}
+    if name not in info:
+        raise InputError(
+            f"effect {effects[index].name!r}: parameter {name!r}: expected {', '.join(info)}"
+        )
+    p = info[name]
+    initial = (effects[index].parameters or {}).get(name, p.neutral)
+    return Parameter(name, initial, p.lower, p.upper, p.typical, effect=index)
+
+
+def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> _Spec:
+    """Return a parameter as the compiled core reads it."""
+    place = None
+    if parameter.effect is not None:
+        names = [p.name for p in effect_info(effects[parameter.effect].name).parameters]
+        place = (parameter.effect, names.index(parameter.name))
+    return _Spec(
+        robot=parameter.name if parameter.effect is None else None,
+        effect=place,
+        initial=parameter.initial,
+        lower=parameter.lower,
+        upper=parameter.upper,
+        scale=parameter.scale,
+        prior=parameter.prior,
+        frozen=parameter.frozen,
+        nuisance=parameter.nuisance,
+    )
+
+
+def fit(
+    robot: Robot,
+    logs: Sequence[Log],
+    parameters: Sequence[Parameter],
+    *,
+    effects: Iterable[Effect] = (),
+    weighting: Weighting | None = None,
+    options: FitOptions | None = None,
+) -> Fitted:
+    """Fit parameters to several logs at once by simulation error.
+
+    The simulated commanded torque is compared with the logged one when the
+    logs have velocity references and the robot a controller; otherwise the
+    simulation is driven by the logged torque and positions are compared.
+    Effect parameters refer to positions in ``effects`` (the robot's own
+    effects come before them in the model but are not counted).
+    Raises InputError for misuse; non-convergence is a status.
+    """
+    chosen = options or FitOptions()
+    extra = list(effects)
+    model = [*robot.effects, *extra]
+    shifted = [
+        replace(p, effect=p.effect + len(robot.effects)) if p.effect is not None else p
+        for p in parameters
+    ]
+    closed = robot.controller_kind != "none" and all(
+        log.velocity_ref_rad_s is not None for log in logs
+    )
+    result = _core.fit_simulation(
+        robot.core,
+        core_effects(model),
+        [core_spec(p, model) for p in shifted],
+        records(logs, closed=closed),
+        (weighting or Weighting.flat(robot.n_axes)).core(),
+        chosen,
+        input="reference" if closed else "torque",
+        output="torque" if closed else "position",
+    )
+    return fitted(result, shifted, model)
+
+
+def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array]]:
+    """Return (input, target) arrays of logs, in closed loop or driven by torque."""
+    out = []
+    for log in logs:
+        reference = log.velocity_ref_rad_s
+        if closed and reference is None:
+            raise InputError(
+                f"log {log.name!r}: expected velocity references for a closed-loop fit"
+            )
+        pair = (reference, log.torque_nm) if closed else (log.torque_nm, log.position_rad)
+        first, second = (np.ascontiguousarray(x, dtype=np.float64) for x in pair)
+        out.append((first, second))
+    return out
+
+
+def fitted(
+    result: _core.FitResult, parameters: Sequence[Parameter], effects: Sequence[Effect]
+) -> Fitted:
+    """Wrap a core result with names and warnings."""
+    names = tuple(_full_name(p, effects) for p in parameters)
+    free = result.free
+    covariance = result.sandwich
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = covariance / np.outer(std, std)
+    at_bound = tuple(names[i] for i in result.at_bound)
+    return Fitted(
+        names=tuple(names[i] for i in free),
+        values=result.theta[free],
+        std=std,
+        covariance=covariance,
+        correlation=correlation,
+        status=result.status,
+        loss=result.loss,
+        initial_loss=result.initial_loss,
+        iterations=result.iterations,
+        evaluations=result.evaluations,
+        condition=result.condition,
+        at_bound=at_bound,
+        warnings=tuple(_warnings(result, at_bound)),
+        core=result,
+    )
+
+
+def _full_name(parameter: Parameter, effects: Sequence[Effect]) -> str:
+    if parameter.effect is None:
+        return parameter.name
+    return f"{effects[parameter.effect].label}.{parameter.name}"
+
+
+# Beyond this, a parameter combination is known a thousand times worse than the best one.
+_POOR_CONDITION = 1e6
+
+
+def _warnings(result: _core.FitResult, at_bound: Sequence[str]) -> list[str]:
+    out = []
+    if result.status == "max_iterations":
+        out.append("stopped at the iteration limit: start closer or allow more iterations")
+    if result.status == "stalled":
+        out.append(
+            "no step lowers the loss although the gradient is not zero: tighten the integrator"
+        )
+    if at_bound:
+        out.append(f"on a bound: {', '.join(at_bound)}")
+    if result.condition > _POOR_CONDITION:
+        out.append(
+            f"condition number {result.condition:.1e}: the data hardly separates some parameters"
+        )
+    return out

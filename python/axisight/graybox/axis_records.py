@@ -1,0 +1,57 @@
+"""Records of one axis, however they are given, as data for the fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.graybox.axis_model import AxisData
+from axisight.logs import Log
+
+Real = NDArray[np.float64]
+
+
+def axis_data(log: Log, axis: int = 1) -> AxisData:
+    """Return one axis of a log as data for a fit.
+
+    Torque, position and the backward difference of the position, zero at the first sample, as
+    the velocity: models of it have ``output="velocity_difference"``. Raises InputError for an
+    axis the log does not have.
+    """
+    if isinstance(axis, bool) or axis not in range(1, log.n_axes + 1):
+        raise InputError(f"axis: expected 1 to {log.n_axes}, got {axis!r}")
+    position = log.position_rad[:, axis - 1]
+    velocity = np.diff(position, prepend=position[:1]) / log.sample_time_s
+    torque = log.torque_nm[:, axis - 1]
+    return AxisData(torque, velocity, position, sample_time_s=log.sample_time_s, name=log.name)
+
+
+def reference_of(record: AxisData | Log, axis: int) -> Real | None:
+    """Return the velocity reference of a log (n,) [rad/s]; None where there is none that moves."""
+    if not isinstance(record, Log) or record.velocity_ref_rad_s is None:
+        return None
+    reference = record.velocity_ref_rad_s[:, axis - 1]
+    return reference if np.isfinite(reference).all() and np.ptp(reference) > 0 else None
+
+
+def as_data(record: AxisData | Log, axis: int, name: str) -> AxisData:
+    """Return a record, or one axis of a log, with velocity and a name; InputError for another type."""
+    if isinstance(record, Log):
+        return axis_data(record, axis)
+    if not isinstance(record, AxisData):
+        raise InputError(f"{name}: expected AxisData or a Log, got {type(record).__name__}")
+    if record.velocity_rad_s is None:
+        position = position_of(record)
+        velocity = np.diff(position, prepend=position[:1]) / record.sample_time_s
+        record = replace(record, velocity_rad_s=velocity)
+    return record if record.name else replace(record, name=name)
+
+
+def position_of(data: AxisData) -> Real:
+    """Return the position (n,) [rad]; raises InputError for a record without."""
+    if data.position_rad is None:
+        raise InputError(f"{data.name or 'record'}: expected position_rad, got none")
+    return np.asarray(data.position_rad, dtype=np.float64)

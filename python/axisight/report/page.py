@@ -1,0 +1,242 @@
+"""A diagnosis as one self-contained page: no network, opens from disk, prints."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, VerdictKind
+from axisight.palette import cell_colors
+from axisight.report.figures import (
+    TOP,
+    first_overlay,
+    overlay_items,
+    page_json,
+    ranking_figure,
+)
+from axisight.report.wording import (
+    NO_VALUE,
+    GapMap,
+    after_words,
+    cell_percent,
+    gap_maps,
+    interval_texts,
+    number,
+    percent,
+    place,
+    plain_name,
+    probability,
+    ranked,
+    share_limit,
+    standard_errors,
+    title_of,
+    title_of_label,
+    where_text,
+)
+from axisight.storage import write_whole
+
+_VERDICTS: dict[VerdictKind, tuple[str, str]] = {
+    "none": ("No significant gap", "The measured difference is no larger than noise explains."),
+    "explained": ("Explained", "The causes below explain the gap on data they were not fitted to."),
+    "unknown": ("Unknown cause", "There is a gap, but no known effect explains it well enough."),
+    "undecidable": (
+        "Undecidable on this data",
+        "Two or more effects explain the gap equally well on this data.",
+    ),
+}
+_MODES = {
+    "closed_loop": "Closed loop: the simulator ran under the same references and controller.",
+    "inverse_dynamics": "Inverse dynamics: torque predicted from the measured motion.",
+}
+
+
+def render_report(diagnosis: Diagnosis) -> str:
+    """Return the diagnosis as one HTML page with everything it needs inside.
+
+    The same diagnosis gives the same text. All names and sentences are escaped.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("axisight.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.j2").render(_page(diagnosis)).strip() + "\n"
+
+
+def save_report(diagnosis: Diagnosis, path: Path | str) -> None:
+    """Write the page to ``path``; the file appears whole or not at all."""
+    write_whole(Path(path), render_report(diagnosis))
+
+
+def _page(diagnosis: Diagnosis) -> dict[str, Any]:
+    badge, meaning = _VERDICTS[diagnosis.verdict]
+    logs, items, left_out = overlay_items(diagnosis)
+    ranking = ranked(diagnosis)
+    return {
+        "name": diagnosis.name,
+        "headline": diagnosis.headline,
+        "verdict": diagnosis.verdict,
+        "badge": badge,
+        "meaning": meaning,
+        "mode": _MODES[diagnosis.mode],
+        "numbers": _numbers(diagnosis),
+        "gap_rows": _gap_rows(diagnosis.gap),
+        "where": [
+            {"title": where_text(w), "share": percent(w.share), "evidence": w.evidence}
+            for w in diagnosis.where
+        ],
+        "maps": _maps(gap_maps(diagnosis)),
+        "causes": [_cause(cause) for cause in diagnosis.causes],
+        "ranking": [_candidate(c) for c in ranking],
+        "top": TOP,
+        "ranking_json": Markup(page_json(ranking_figure(diagnosis).to_plotly_json())),
+        "logs": logs,
+        "axes": sorted({item["axis"] for item in items}),
+        "overlays_json": Markup(page_json({"first": first_overlay(diagnosis), "items": items})),
+        "n_overlays": len(items),
+        "overlays_left_out": left_out,
+        "alternatives": [_candidate(c) for c in diagnosis.alternatives],
+        "equivalent": [[title_of_label(label) for label in g] for g in diagnosis.equivalent],
+        "next_experiment": diagnosis.next_experiment,
+        "checks": diagnosis.checks,
+        "refit": _refit(diagnosis.refit),
+        "provenance": _flat(diagnosis.provenance),
+        "plotly": Markup(get_plotlyjs()),
+    }
+
+
+def _numbers(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    gap = diagnosis.gap
+    added = after_words(diagnosis).removeprefix("after, ")
+    after = f"With what was found: {added}."
+    rows = (
+        ("before", "Gap before", gap.before, "The simulator as given."),
+        ("refitted", "Re-fitted", gap.refitted, "Its own parameters fitted within tolerances."),
+        ("after", "After", gap.after, after),
+        ("floor", "Floor", gap.floor, "What a perfect model would leave: sensor noise."),
+    )
+    largest = max((x for _, _, x, _ in rows if math.isfinite(x)), default=0.0)
+    return [
+        {
+            "kind": kind,
+            "title": title,
+            "value": percent(value, 3 if value >= 1 else 2),
+            "why": why,
+            "width": f"{100 * value / largest:.1f}%" if math.isfinite(value) and largest else "0",
+        }
+        for kind, title, value, why in rows
+    ]
+
+
+def _gap_rows(gap: Gap) -> list[list[str]]:
+    columns = (
+        gap.before_per_axis,
+        gap.refitted_per_axis,
+        gap.after_per_axis,
+        gap.floor_per_axis,
+    )
+    rows = zip(*columns, strict=True)
+    return [[str(i), *(percent(float(x)) for x in row)] for i, row in enumerate(rows, 1)]
+
+
+def _maps(maps: list[GapMap]) -> dict[str, Any]:
+    limit = share_limit(maps)
+    ticks = [limit * i / 4 for i in range(5)]
+    return {
+        "threshold": number(maps[0].threshold, 2) if maps else NO_VALUE,
+        "scale": [
+            {"color": cell_colors(tick, limit)[0], "label": percent(tick, 2)} for tick in ticks
+        ],
+        "shown": [
+            {"title": m.title, "columns": m.columns, "rows": _map_rows(m, limit)} for m in maps
+        ],
+    }
+
+
+def _map_rows(m: GapMap, limit: float) -> list[dict[str, Any]]:
+    rows = []
+    for i, axis in enumerate(m.axes):
+        cells = []
+        for j, column in enumerate(m.columns):
+            share, errors = float(m.share[i, j]), float(m.significance[i, j])
+            kind = "absent" if math.isnan(share) else "counts" if m.significant[i, j] else "muted"
+            background, ink = cell_colors(share, limit)
+            told = (
+                "no data"
+                if kind == "absent"
+                else f"{percent(share)} of the axis's gap, {standard_errors(errors)} standard "
+                f"errors, squared error {number(float(m.excess[i, j]))} times the floor"
+            )
+            cells.append(
+                {
+                    "kind": kind,
+                    "style": f"background:{background};color:{ink}" if kind == "counts" else "",
+                    "share": cell_percent(share),
+                    "errors": "" if kind == "absent" else f"{standard_errors(errors)}σ",
+                    "told": f"Axis {axis}, {column}: {told}",
+                }
+            )
+        rows.append({"axis": axis, "cells": cells})
+    return rows
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    reduction, reduction_range = interval_texts(cause.gap_reduction, 100.0)
+    parameters = []
+    for name, interval in cause.parameters.items():
+        value, span = interval_texts(interval)
+        unit = cause.units.get(name, "1")
+        parameters.append(
+            {"name": name, "value": value, "range": span, "unit": NO_VALUE if unit == "1" else unit}
+        )
+    return {
+        "title": title_of(cause),
+        "probability": probability(cause.probability),
+        "reduction": reduction,
+        "reduction_range": reduction_range,
+        "parameters": parameters,
+    }
+
+
+def _candidate(candidate: Candidate) -> dict[str, str]:
+    return {
+        "effect": plain_name(candidate.effect),
+        "place": place(candidate.axis),
+        "probability": probability(candidate.probability),
+        "score": percent(candidate.score),
+        "significance": standard_errors(candidate.significance),
+        "status": candidate.status,
+    }
+
+
+def _refit(refit: Mapping[str, Interval]) -> list[dict[str, Any]]:
+    def size(item: tuple[str, Interval]) -> float:
+        return -abs(item[1].value) if math.isfinite(item[1].value) else math.inf
+
+    rows = []
+    for name, interval in sorted(refit.items(), key=size):
+        value, span = interval_texts(interval, 100.0)
+        rows.append({"name": name, "value": value, "range": span})
+    return rows
+
+
+def _flat(data: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for key, value in data.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            rows += _flat(value, f"{name}.")
+        elif isinstance(value, str):
+            rows.append((name, value))
+        else:
+            rows.append((name, json.dumps(value, default=str)))
+    return rows

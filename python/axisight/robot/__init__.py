@@ -1,0 +1,6 @@
+"""The robot: read from a description or a preset, its kinematics, dynamics and linearization."""
+
+from axisight.robot.description import Drive, Joint, Link, Spring
+from axisight.robot.robot import Robot, load_robot
+
+__all__ = ["Drive", "Joint", "Link", "Robot", "Spring", "load_robot"]

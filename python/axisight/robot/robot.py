@@ -1,0 +1,330 @@
+"""Robots: reading descriptions, kinematics, dynamics, linearization."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.errors import InputError, RobotError
+from axisight.robot.description import Joint, joint_of
+from axisight.robot.presets import PRESETS
+
+Array = NDArray[np.float64]
+ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "none"]
+
+
+class Robot:
+    """A robot in the format ``axisight.robot/1``, with the effects its simulator already models.
+
+    Joint arrays run over all joints, driven and elastic, base to tip; axis
+    arrays over driven joints only. ``q`` [rad or m], ``v``, ``a`` and forces
+    [Nm or N] may have shape (n_joints,) or (n, n_joints).
+
+    ``core`` hands the robot to functions of the compiled core; everything that can be known of
+    it is an attribute or a method here.
+    """
+
+    def __init__(self, core: _core.Robot, effects: Sequence[Effect] = ()) -> None:
+        self.core = core
+        self.effects = tuple(effects)
+
+    @classmethod
+    def from_toml(cls, text: str, effects: Sequence[Effect] = ()) -> Robot:
+        """Return the robot of a description; raises RobotError naming line, key and expectation."""
+        return cls(_core.Robot.from_toml(text), effects)
+
+    def __repr__(self) -> str:
+        """Name and size."""
+        return f"<Robot {self.name!r}: {self.n_axes} axes, {self.n_joints} joints>"
+
+    @property
+    def name(self) -> str:
+        """Name in the description."""
+        return self.core.name
+
+    @property
+    def n_axes(self) -> int:
+        """Number of driven axes."""
+        return self.core.n_axes
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, driven and elastic."""
+        return self.core.n_joints
+
+    @property
+    def sample_time_s(self) -> float:
+        """Sample time of controller and log [s]."""
+        return self.core.sample_time_s
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of all joints, base to tip."""
+        return self.core.joint_names
+
+    @property
+    def toml(self) -> str:
+        """The description it was read from; parameters replaced since do not show in it."""
+        return self.core.toml
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints with link, spring and drive, base to tip, at the present parameters."""
+        return tuple(joint_of(entry) for entry in self.core.joints())
+
+    @property
+    def gravity_m_s2(self) -> Array:
+        """Gravity in the base frame [m/s^2], shape (3,)."""
+        return np.array(self.core.gravity_m_s2)
+
+    @property
+    def axis_joints(self) -> list[int]:
+        """Place in the chain, from 0, of the joint that each axis drives."""
+        return self.core.axis_joints
+
+    @property
+    def axis_names(self) -> list[str]:
+        """Name of the joint that each axis drives."""
+        names = self.joint_names
+        return [names[joint] for joint in self.axis_joints]
+
+    @property
+    def axis_is_prismatic(self) -> list[bool]:
+        """Whether each axis slides."""
+        return self.core.axis_is_prismatic
+
+    @property
+    def axis_is_rigid(self) -> list[bool]:
+        """Whether each axis has a rigid transmission."""
+        return self.core.axis_is_rigid
+
+    @property
+    def gear_ratio(self) -> Array:
+        """Joint angle per motor angle, shape (n_axes,) [1, m/rad if the axis slides]."""
+        return self.core.gear_ratio
+
+    @property
+    def operating_point(self) -> Array:
+        """Driven joint angles at the operating point, shape (n_axes,) [rad or m]."""
+        return self.core.operating_point
+
+    @property
+    def position_noise_std(self) -> float:
+        """Standard deviation of the white noise on motor positions, per sample [rad]."""
+        return self.core.position_noise_std
+
+    @property
+    def controller_kind(self) -> ControllerKind:
+        """``pi_velocity``, ``p_velocity``, ``cascade``, or ``none``."""
+        return self.core.controller_kind
+
+    @property
+    def controller_gains(self) -> dict[str, Array]:
+        """Gains by name, shape (n_axes,) each, motor side.
+
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
+        """
+        return self.core.controller_gains
+
+    def parameters(self) -> dict[str, float]:
+        """Return all physical parameters by name (``axis1.stiffness``), in SI units."""
+        return dict(self.core.parameters())
+
+    def with_parameters(self, values: Mapping[str, float]) -> Robot:
+        """Return the same robot with some parameters replaced, by name, in SI units.
+
+        Raises InputError for a name that `parameters` does not have.
+        """
+        return Robot(self.core.with_parameters(list(values.items())), self.effects)
+
+    def with_effects(self, effects: Iterable[Effect]) -> Robot:
+        """Return the same robot with ``effects`` in place of its own."""
+        return Robot(self.core, tuple(effects))
+
+    def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
+        out = []
+        single = True
+        for name, value in arrays.items():
+            x = np.asarray(value, dtype=np.float64)
+            if x.ndim not in (1, 2) or x.shape[-1] != self.n_joints:
+                raise InputError(
+                    f"{name}: expected shape ({self.n_joints},) or (n, {self.n_joints}), got {x.shape}"
+                )
+            single = single and x.ndim == 1
+            out.append(np.ascontiguousarray(np.atleast_2d(x)))
+        return out, single
+
+    def inertia_matrix(self, q: ArrayLike) -> Array:
+        """Return M(q), shape (n_joints, n_joints) or (n, n_joints, n_joints) [kg m^2]."""
+        (rows,), single = self._rows(q=q)
+        out = self.core.inertia_matrix(rows)
+        return out[0] if single else out
+
+    def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return Coriolis, centrifugal and gravity forces c(q, v) + g(q) [Nm]."""
+        (rows, rates), single = self._rows(q=q, v=v)
+        out = self.core.bias(rows, rates)
+        return out[0] if single else out
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """Return gravity forces g(q) [Nm]."""
+        (rows,), single = self._rows(q=q)
+        out = self.core.gravity(rows)
+        return out[0] if single else out
+
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Return joint forces M(q) a + c(q, v) + g(q) [Nm], without motors and springs."""
+        (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
+        out = self.core.inverse_dynamics(rows, rates, accelerations)
+        return out[0] if single else out
+
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> Array:
+        """Return joint accelerations [rad/s^2] under joint forces ``tau`` [Nm]."""
+        (rows, rates, forces), single = self._rows(q=q, v=v, tau=tau)
+        out = self.core.forward_dynamics(rows, rates, forces)
+        return out[0] if single else out
+
+    def pose(self, q: ArrayLike, joint: int | str = -1) -> tuple[Array, Array]:
+        """Return rotation (3, 3) and origin (3,) [m] of a link frame in the base frame.
+
+        ``joint`` is a joint name or a position in the chain (from 0; -1 is the last).
+        """
+        (rows,), _ = self._rows(q=q)
+        return self.core.pose(rows[0].tolist(), self._joint(joint))
+
+    def jacobian(
+        self, q: ArrayLike, joint: int | str = -1, point_m: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> Array:
+        """Return the Jacobian (6, n_joints) of a point fixed in a link frame.
+
+        Rows: linear velocity, then angular velocity, in the base frame.
+        """
+        (rows,), _ = self._rows(q=q)
+        x, y, z = (float(c) for c in point_m)
+        return self.core.jacobian(rows[0].tolist(), self._joint(joint), (x, y, z))
+
+    def _joint(self, joint: int | str) -> int:
+        if isinstance(joint, str):
+            if joint not in self.joint_names:
+                raise InputError(
+                    f"joint: expected one of {', '.join(self.joint_names)}, got {joint!r}"
+                )
+            return self.joint_names.index(joint)
+        index = joint + self.n_joints if joint < 0 else joint
+        if not 0 <= index < self.n_joints:
+            raise InputError(f"joint: expected 0 to {self.n_joints - 1}, got {joint}")
+        return index
+
+    def equilibrium(
+        self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
+    ) -> xr.Dataset:
+        """Return the static equilibrium with the driven joints at ``joint_angle_rad``.
+
+        Default is the operating point. Variables ``joint_angle_rad`` (joint),
+        ``motor_angle_rad`` (axis), ``motor_torque_nm`` (axis). Raises InputError
+        if the elastic joints do not settle.
+        """
+        at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
+        out = self.core.equilibrium(self._effects(effects), at)
+        return xr.Dataset(
+            {
+                "joint_angle_rad": ("joint", out["joint_angle"], {"units": "rad"}),
+                "motor_angle_rad": ("axis", out["motor_angle"], {"units": "rad"}),
+                "motor_torque_nm": ("axis", out["motor_torque"], {"units": "Nm"}),
+            },
+            coords={"joint": self.joint_names, "axis": self.axis_numbers()},
+        )
+
+    def linearize(
+        self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
+    ) -> tuple[Array, Array, Array]:
+        """Return A, B, C of ``x' = A x + B u``, ``phi = C x`` at rest at an operating point.
+
+        States ``[phi, q, phi', q']``, inputs motor torques [Nm], outputs motor
+        angles [rad]; derivatives are exact (dual numbers).
+        """
+        at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
+        return self.core.linearize(self._effects(effects), at)
+
+    def modes(
+        self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
+    ) -> xr.Dataset:
+        """Return the modes, slowest first.
+
+        Variables ``eigenvalue_rad_s``, ``frequency_hz``, ``damping_ratio``
+        (mode) and ``shape`` (mode, state; largest element one).
+        """
+        at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
+        values, frequency, damping, shapes = self.core.modes(self._effects(effects), at)
+        return xr.Dataset(
+            {
+                "eigenvalue_rad_s": ("mode", values[:, 0] + 1j * values[:, 1]),
+                "frequency_hz": ("mode", frequency, {"units": "Hz"}),
+                "damping_ratio": ("mode", damping),
+                "shape": (("mode", "state"), shapes[..., 0] + 1j * shapes[..., 1]),
+            }
+        )
+
+    def zoh_response(
+        self,
+        frequency_hz: ArrayLike,
+        joint_angle_rad: Sequence[float] | None = None,
+        effects: Iterable[Effect] = (),
+    ) -> xr.DataArray:
+        """Return the zero-order-hold response from motor torque to motor angle.
+
+        Dims (frequency_hz, output, input), complex [rad/Nm]. This, not the
+        continuous response, is the true response of a sampled loop.
+        """
+        f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
+        pairs = self.core.zoh_response(f.tolist(), self._effects(effects), at)
+        return xr.DataArray(
+            pairs[..., 0::2] + 1j * pairs[..., 1::2],
+            dims=("frequency_hz", "output", "input"),
+            coords={
+                "frequency_hz": f,
+                "output": self.axis_numbers(),
+                "input": self.axis_numbers(),
+            },
+            attrs={"units": "rad/Nm"},
+        )
+
+    def axis_numbers(self) -> list[int]:
+        """Return the axis numbers, from 1."""
+        return list(range(1, self.n_axes + 1))
+
+    def _effects(self, extra: Iterable[Effect]) -> list[tuple[str, int | None, list[float]]]:
+        return core_effects([*self.effects, *extra])
+
+
+def load_robot(source: Path | str) -> Robot:
+    """Return the robot in a TOML file, or the preset of that name.
+
+    Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
+    model m3, with its cubic spring and Coulomb friction). Raises RobotError
+    naming file, line, key and expectation.
+    """
+    if isinstance(source, str) and source in PRESETS:
+        text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
+        return Robot.from_toml(text, PRESETS[source])
+    path = Path(source)
+    try:
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        known = ", ".join(PRESETS)
+        raise RobotError(
+            f"{path}: expected a robot description or a preset ({known}): {error}"
+        ) from error
+    try:
+        return Robot.from_toml(text)
+    except RobotError as error:
+        raise RobotError(f"{path}: {error}") from None

@@ -1,0 +1,26 @@
+"""Identified values in robot files: written back with their uncertainty, and read again.
+
+Apart from `axisight.robot`, because it stands above the fits: they use robots, and what
+they find is written here.
+"""
+
+from axisight.robot_file.document import (
+    hash_file,
+    load_identified,
+    load_with_effects,
+    sidecar_path,
+    write_identified,
+)
+from axisight.robot_file.identified import Identified, Provenance, identified, identified_by_fit
+
+__all__ = [
+    "Identified",
+    "Provenance",
+    "hash_file",
+    "identified",
+    "identified_by_fit",
+    "load_identified",
+    "load_with_effects",
+    "sidecar_path",
+    "write_identified",
+]

@@ -1,0 +1,429 @@
+"""Robots written back with what was identified, and read again.
+
+The format ``axisight.robot/1`` is a contract that refuses keys it does not know, so a robot file
+says what a robot is and no more. What stands beside it:
+
+- comments in the robot file, ``# identified: ...``, above the line of each value: for people;
+- a JSON file ``<name>.identified.json``, schema ``axisight.identified/1``: values, standard
+  errors, covariance, effects, and where they come from: for programs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
+
+from axisight.effects import Effect, without
+from axisight.errors import InputError, RobotError
+from axisight.robot import Robot, load_robot
+from axisight.robot.presets import PRESETS
+from axisight.robot_file.checks import check_agreement, check_effects, checked_covariance
+from axisight.robot_file.identified import Identified, Provenance
+from axisight.robot_file.sidecar import Sidecar, first_fault, text_hash
+from axisight.robot_file.toml_spans import value_spans
+from axisight.storage import write_whole
+
+Array = NDArray[np.float64]
+Key = tuple[str | int, ...]
+
+INERTIA = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
+_PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
+    **{f"origin_{x}": (("origin", k), "m") for k, x in enumerate("xyz")},
+    **{f"axis_{x}": (("axis", k), "1") for k, x in enumerate("xyz")},
+    "mass": (("link", "mass"), "kg"),
+    **{f"com_{x}": (("link", "com", k), "m") for k, x in enumerate("xyz")},
+    **{name: (("link", "inertia", k), "kg m^2") for k, name in enumerate(INERTIA)},
+    "stiffness": (("stiffness",), "Nm/rad"),
+    "damping": (("damping",), "Nm s/rad"),
+    "motor_inertia": (("drive", "motor_inertia"), "kg m^2"),
+    "viscous_friction": (("drive", "viscous_friction"), "Nm s/rad"),
+}
+_MARK = "# identified: "
+_HEADER = "# identified by axisight"
+
+
+def hash_file(path: Path | str) -> str:
+    """Return the SHA-256 of a file, hexadecimal. Raises InputError if it cannot be read."""
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"path: expected a readable file, got {path}: {error}") from error
+
+
+def write_identified(
+    source: Robot | Path | str,
+    target: Path | str,
+    found: Identified,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write a robot with identified values and, beside it, all that is known of them.
+
+    source
+        The robot the values belong to: a file, the name of a preset, or a Robot. Text that no value
+        replaces stays as it is, comments and number formats included; a value equal to
+        the old one keeps its text too.
+    target
+        File to write; the sidecar is ``<stem>.identified.json`` in the same folder.
+    found
+        Values from `identified`. ``<joint>.inertia_scale`` multiplies the inertia in ``source``.
+    overwrite
+        Replace files that exist.
+
+    Returns the path of the sidecar. Each file is written whole or not at all, the sidecar first, whose
+    hash of the robot tells whether both belong together. Raises RobotError for values no body has
+    (mass or stiffness not positive, negative damping or friction, Coulomb friction of effects
+    included, an inertia that is not positive definite or breaks the triangle inequality),
+    InputError for unknown names, axes the robot does not have, values that their effect
+    contradicts, a covariance that is none, and files in the way.
+    """
+    robot = source if isinstance(source, Robot) else load_robot(source)
+    check_effects(found.effects, robot.n_axes)
+    check_agreement(found.names, found.values, found.effects)
+    if found.covariance is not None:
+        checked_covariance(found.covariance, len(found.names))
+    path = Path(target)
+    sidecar = sidecar_path(path)
+    for file in (path, sidecar):
+        if file.exists() and not overwrite:
+            raise InputError(f"target: {file} exists: choose another name or pass overwrite=True")
+    stamped = replace(
+        found.provenance,
+        created=found.provenance.created or datetime.now(UTC),
+        axisight_version=found.provenance.axisight_version or version("axisight"),
+    )
+    # What the simulator models already has no place in the robot file either.
+    kept = without(robot.effects, found.effects)
+    found = replace(found, provenance=stamped, effects=(*found.effects, *kept))
+    text = render(robot, found, sidecar.name)
+    report = Sidecar.of(found, robot, text, path.name)
+    try:
+        dumped = report.model_dump_json(indent=1, by_alias=True)
+    except PydanticSerializationError as error:
+        raise InputError(f"provenance: expected settings of JSON types: {error}") from None
+    write_whole(sidecar, dumped + "\n")
+    write_whole(path, text)
+    return sidecar
+
+
+def sidecar_path(robot_file: Path | str) -> Path:
+    """Return the path of the sidecar of ``robot_file``."""
+    path = Path(robot_file)
+    return path.with_name(f"{path.stem}.identified.json")
+
+
+def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
+    """Return the text of ``robot`` with the values ``found`` in it, checked by reading it.
+
+    ``sidecar_name`` is named in the head comment.
+    """
+    text = robot.toml
+    document = tomllib.loads(text)
+    changes, notes = _changes(robot, document, found)
+    spans = value_spans(text)
+    edits: list[tuple[int, int, str]] = []
+    comments: dict[int, list[str]] = {}
+    for key, value in changes.items():
+        span = spans[key]
+        if not _same(float(_at(document, key)), value):
+            edits.append((span.start, span.end, repr(value)))
+    for key, lines in notes.items():
+        comments.setdefault(spans[key].line, []).extend(lines)
+    for line, lines in comments.items():
+        indent = re.match(r"[ \t]*", text[line:])
+        lead = indent.group() if indent else ""
+        edits.append((line, line, "".join(f"{lead}{note}\n" for note in lines)))
+    for start, end, new in sorted(edits, reverse=True):
+        text = text[:start] + new + text[end:]
+    text = _headed(_without_old(text, found), found, sidecar_name)
+    _check(text, document, changes)
+    return text
+
+
+def _changes(
+    robot: Robot, document: dict[str, Any], found: Identified
+) -> tuple[dict[Key, float], dict[Key, list[str]]]:
+    """Return new values and comments by the place they belong to."""
+    changes: dict[Key, float] = {}
+    notes: dict[Key, list[str]] = {}
+    labels = {
+        f"{effect.label}.{name}" for effect in found.effects for name in effect.parameters or {}
+    }
+    for name, value, error in zip(found.names, found.values, found.standard_errors, strict=True):
+        if name in labels:
+            continue
+        joint, quantity = _place(robot, document, name)
+        base: Key = ("joint", joint)
+        if quantity == "inertia_scale":
+            inertia: Key = (*base, "link", "inertia")
+            if any((*inertia, k) in changes for k in range(6)):
+                raise InputError(
+                    f"{name}: expected either a scale or moments of one link, got both"
+                )
+            if value <= 0:
+                raise RobotError(f"{name}: expected a positive factor, got {value}")
+            for k, old in enumerate(_at(document, inertia)):
+                changes[(*inertia, k)] = float(old) * float(value)
+            notes.setdefault(inertia, []).append(_note(name, value, error, "1", 1.0))
+            continue
+        key, unit = _PLACES[quantity]
+        full = (*base, *key)
+        if full in changes:
+            raise InputError(f"{name}: expected either a scale or moments of one link, got both")
+        if document["joint"][joint].get("motion") == "prismatic":
+            unit = {"Nm/rad": "N/m", "Nm s/rad": "N s/m"}.get(unit, unit) if len(key) == 1 else unit
+        old = float(_at(document, full))
+        changes[full] = float(value)
+        notes.setdefault(full, []).append(_note(name, value, error, unit, old))
+        _refuse(name, quantity, float(value), rigid="stiffness" not in document["joint"][joint])
+    for place in {int(key[1]) for key in changes}:
+        _refuse_inertia(document, changes, place)
+    return changes, notes
+
+
+def _place(robot: Robot, document: dict[str, Any], name: str) -> tuple[int, str]:
+    joint_name, _, quantity = name.rpartition(".")
+    names = [joint["name"] for joint in document["joint"]]
+    if joint_name in names and quantity in (*_PLACES, "inertia_scale"):
+        joint = names.index(joint_name)
+        key = _PLACES.get(quantity, (("link", "inertia"), ""))[0]
+        try:
+            _at(document, ("joint", joint, *key))
+            return joint, quantity
+        except (KeyError, TypeError):
+            pass
+    known = ", ".join(robot.parameters())
+    raise InputError(
+        f"found: expected parameters among {known}, inertia_xx.., "
+        f"origin_x.. and axis_x.., got {name!r}"
+    )
+
+
+def _refuse(name: str, quantity: str, value: float, *, rigid: bool) -> None:
+    positive = ("mass", "stiffness") if rigid else ("mass", "stiffness", "motor_inertia")
+    if quantity in positive and not value > 0:
+        raise RobotError(f"{name}: expected a positive number, got {value}")
+    if quantity in ("damping", "viscous_friction", "motor_inertia") and value < 0:
+        raise RobotError(f"{name}: expected no negative number, got {value}")
+
+
+def _refuse_inertia(document: dict[str, Any], changes: dict[Key, float], joint: int) -> None:
+    place: Key = ("joint", joint, "link", "inertia")
+    if not any((*place, k) in changes for k in range(6)):
+        return
+    xx, yy, zz, xy, xz, yz = (
+        changes.get((*place, k), float(old)) for k, old in enumerate(_at(document, place))
+    )
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    name = document["joint"][joint]["name"]
+    if moments[0] <= 0:
+        raise RobotError(
+            f"{name}.inertia: expected a positive definite inertia, got principal moments {moments}"
+        )
+    # A rod has equality, which rounding may break.
+    if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        raise RobotError(
+            f"{name}.inertia: expected no principal moment above the sum of the others (no mass is "
+            f"distributed so), got {moments}"
+        )
+
+
+def _check(text: str, before: dict[str, Any], changes: dict[Key, float]) -> None:
+    """Read the text back: it says what it should, bit for bit, and the robot loads."""
+    wanted = before
+    for key, value in changes.items():
+        wanted = _replaced(wanted, key, value)
+    if not _equal(tomllib.loads(text), wanted):
+        raise RobotError(
+            "source: its text cannot be edited faithfully; write it in plain TOML tables"
+        )
+    Robot.from_toml(text)
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_equal(a[k], b[k]) for k in a)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(_equal, a, b))
+    if isinstance(a, float) or isinstance(b, float):
+        return _same(float(a), float(b))
+    return bool(a == b)
+
+
+def _replaced(node: Any, key: Key, value: float) -> Any:
+    if not key:
+        return value
+    copy: Any = dict(node) if isinstance(node, dict) else list(node)
+    copy[key[0]] = _replaced(node[key[0]], key[1:], value)
+    return copy
+
+
+def _same(a: float, b: float) -> bool:
+    return a == b and math.copysign(1, a) == math.copysign(1, b)
+
+
+def _at(document: Any, key: Key) -> Any:
+    for part in key:
+        document = document[part]
+    return document
+
+
+def _note(name: str, value: float, error: float, unit: str, old: float) -> str:
+    text = f"{_MARK}{name} = {value:.6g} {unit}"
+    if np.isfinite(error):
+        share = f" ({100 * error / abs(value):.2g} %)" if value else ""
+        text += f", standard error {error:.2g}{share}"
+    return f"{text}, before {old:.6g}"
+
+
+def _without_old(text: str, found: Identified) -> str:
+    """Drop comments of an earlier identification of the same parameters, and the old head."""
+    kept, seen = [], set()
+    names = set(found.names)
+    # From below: the comment nearest to the value is the new one.
+    for line in reversed(text.splitlines(keepends=True)):
+        bare = line.strip()
+        if bare.startswith(_HEADER):
+            continue
+        if bare.startswith(_MARK):
+            name = bare[len(_MARK) :].split(" = ")[0]
+            if name in seen and name in names:
+                continue
+            seen.add(name)
+        kept.append(line)
+    return "".join(reversed(kept))
+
+
+def _headed(text: str, found: Identified, sidecar_name: str) -> str:
+    created = found.provenance.created
+    when = created.date().isoformat() if created else "unknown date"
+    method = " ".join(found.provenance.method.split())
+    release = found.provenance.axisight_version
+    return f"{_HEADER} {release}, {when}: {method}; see {sidecar_name}\n{text}"
+
+
+def load_identified(path: Path | str, *, check: bool = True) -> Identified:
+    """Return what `write_identified` wrote: values, uncertainty, effects, provenance, robot.
+
+    path
+        The robot file, or its sidecar.
+    check
+        Raise if the robot file is not the one the sidecar was written with (edited since);
+        False takes both as they are.
+
+    The result's ``robot`` has the effects that were found. Raises InputError for files that are missing, of
+    another schema, or do not belong together, RobotError for the robot and impossible effects.
+    """
+    given = Path(path)
+    sidecar = given if given.name.endswith(".identified.json") else sidecar_path(given)
+    report = _read_sidecar(sidecar)
+    if Path(report.robot).name != report.robot:
+        raise InputError(f"{sidecar}: robot: expected a file beside it, got {report.robot!r}")
+    robot = load_robot(sidecar.with_name(report.robot))
+    if check and text_hash(robot.toml) != report.robot_sha256:
+        raise InputError(_changed(sidecar, report.robot))
+    source = report.provenance
+    effects = _effects(report, robot)
+    names = tuple(p.name for p in report.parameters)
+    values = np.array([p.value for p in report.parameters])
+    errors = [np.nan if p.standard_error is None else p.standard_error for p in report.parameters]
+    return Identified(
+        names=names,
+        values=values,
+        standard_errors=np.array(errors),
+        covariance=None
+        if report.covariance is None
+        else checked_covariance(report.covariance, len(names)),
+        effects=effects,
+        robot=robot.with_effects(effects),
+        provenance=Provenance(
+            source.method,
+            source.data,
+            source.settings,
+            _created(source.created, sidecar),
+            source.axisight_version,
+            source.notes,
+        ),
+    )
+
+
+def load_with_effects(
+    source: Path | str, given: Iterable[Effect] = (), *, check: bool = False
+) -> tuple[Robot, str]:
+    """Return a robot with the effects that its sidecar knows of, and one line about them.
+
+    source
+        A robot file or the name of a preset, as for `load_robot`.
+    given
+        Effects that the caller adds himself: those of the sidecar on the same axis with the
+        same name are left out.
+    check
+        Raise InputError for a robot file that was edited since its sidecar was written.
+
+    The line names the effects and the sidecar. It is empty where a sidecar has nothing to add: for
+    presets, for files without one, and where no effect in it does anything. Effects of a sidecar
+    that was written with another text of the robot are not used, and the line says so. Raises
+    InputError for a sidecar of another schema, RobotError for the robot and impossible effects.
+    """
+    robot = load_robot(source)
+    sidecar = sidecar_path(source)
+    if (isinstance(source, str) and source in PRESETS) or not sidecar.is_file():
+        return robot, ""
+    report = _read_sidecar(sidecar)
+    if text_hash(robot.toml) != report.robot_sha256:
+        if check:
+            raise InputError(_changed(sidecar, Path(source).name))
+        unused = ", ".join(Effect(e.name, e.axis, e.parameters).label for e in report.effects)
+        text = f"{Path(source).name} was changed after {sidecar} was written: its effects are not"
+        return robot, f"{text} used ({unused})" if unused else ""
+    effects = without(_effects(report, robot), given)
+    named = ", ".join(effect.label for effect in effects if effect.acts)
+    line = f"with the effects in {sidecar}: {named}" if named else ""
+    return robot.with_effects(effects), line
+
+
+def _read_sidecar(sidecar: Path) -> Sidecar:
+    try:
+        text = sidecar.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"path: expected the sidecar {sidecar}: {error}") from error
+    try:
+        return Sidecar.model_validate_json(text)
+    except ValidationError as error:
+        raise InputError(f"{sidecar}: {first_fault(error)}") from None
+
+
+def _changed(sidecar: Path, robot: str) -> str:
+    return (
+        f"{sidecar}: the robot {robot} was changed after it was written: identify again, "
+        "or pass check=False to take both as they are"
+    )
+
+
+def _effects(report: Sidecar, robot: Robot) -> tuple[Effect, ...]:
+    """Return the effects in a sidecar, checked for its robot."""
+    effects = tuple(Effect(e.name, e.axis, e.parameters) for e in report.effects)
+    check_effects(effects, robot.n_axes)
+    return effects
+
+
+def _created(text: str, sidecar: Path) -> datetime:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise InputError(
+            f"{sidecar}: provenance.created: expected an ISO date, got {text!r}"
+        ) from None

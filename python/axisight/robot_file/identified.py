@@ -1,0 +1,153 @@
+"""Identified values with their uncertainty and where they come from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.fitting import Fitted
+from axisight.robot import Robot
+from axisight.robot_file.checks import check_agreement, checked_covariance
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where identified values come from.
+
+    ``method`` in words; ``data`` maps the names of logs to SHA-256 hashes of their files (see
+    `hash_file`), ``settings`` whatever the method was told, JSON types; ``created`` UTC.
+    """
+
+    method: str
+    data: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    created: datetime | None = None
+    axisight_version: str = ""
+    notes: str = ""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Identified values with their uncertainty and provenance.
+
+    ``names`` are those of `axisight.robot_parameters` (``axis1.stiffness``), with
+    ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes,
+    ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are; and for
+    effects ``<effect label>.<parameter>``, which are uncertain too but stand in ``effects``.
+    ``values`` in SI units; ``standard_errors`` NaN where unknown; ``covariance`` over ``names``
+    or None. ``effects`` are what was found that the robot format has no place for.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    standard_errors: Array
+    provenance: Provenance
+    covariance: Array | None = None
+    effects: tuple[Effect, ...] = ()
+    robot: Robot | None = None
+
+    def value(self, name: str) -> float:
+        """Return one value; raises InputError for a name that was not identified."""
+        if name not in self.names:
+            raise InputError(f"name: expected one of {', '.join(self.names)}, got {name!r}")
+        return float(self.values[self.names.index(name)])
+
+
+def identified(
+    values: Mapping[str, float],
+    provenance: Provenance,
+    *,
+    standard_errors: Mapping[str, float] | None = None,
+    covariance: ArrayLike | None = None,
+    effects: Sequence[Effect] = (),
+) -> Identified:
+    """Return identified values, checked.
+
+    values
+        By name, SI units.
+    provenance
+        Where they come from.
+    standard_errors
+        By name; by default from ``covariance``, NaN without.
+    covariance
+        (n, n) in the order of ``values``.
+    effects
+        Effects found, with their parameters.
+
+    Raises InputError for values that are not finite, negative standard errors, a covariance
+    that is not symmetric and positive semidefinite, of another size, or at odds with the standard
+    errors, and values of effect parameters that ``effects`` contradict.
+    """
+    names = tuple(values)
+    numbers = np.array([_number(f"values[{n!r}]", values[n]) for n in names])
+    matrix = None if covariance is None else checked_covariance(covariance, len(names))
+    errors = np.full(len(names), np.nan)
+    if matrix is not None:
+        errors = np.sqrt(np.diag(matrix))
+    for name, error in (standard_errors or {}).items():
+        if name not in names:
+            raise InputError(f"standard_errors: expected names among values, got {name!r}")
+        number = _number(f"standard_errors[{name!r}]", error)
+        if number < 0:
+            raise InputError(f"standard_errors[{name!r}]: expected no negative number, got {error}")
+        place = names.index(name)
+        if matrix is not None and not math.isclose(number, errors[place], rel_tol=1e-6):
+            raise InputError(
+                f"standard_errors[{name!r}]: expected {errors[place]} as the covariance has it, "
+                f"got {number}"
+            )
+        errors[place] = number
+    check_agreement(names, numbers, effects)
+    return Identified(names, numbers, errors, provenance, matrix, tuple(effects))
+
+
+def identified_by_fit(
+    fitted: Fitted, provenance: Provenance, *, effects: Sequence[Effect] = ()
+) -> Identified:
+    """Return what `axisight.fit` found, ready to be written.
+
+    ``fitted`` gives values, standard errors and, where it is finite, the covariance; ``effects``
+    are those that were fitted along, to which its effect parameters are written; ``provenance`` as
+    in `identified`. Raises InputError for an effect parameter without its effect.
+    """
+    values = dict(zip(fitted.names, fitted.values.tolist(), strict=True))
+    updated = []
+    for effect in effects:
+        own = f"{effect.label}."
+        new = {n.removeprefix(own): v for n, v in values.items() if n.startswith(own)}
+        updated.append(Effect(effect.name, effect.axis, {**(effect.parameters or {}), **new}))
+    labels = [effect.label for effect in updated]
+    for name in values:
+        if "@" in name and name.rpartition(".")[0] not in labels:
+            raise InputError(f"effects: expected the effect of {name!r}, got {labels}")
+    known = bool(np.isfinite(fitted.covariance).all())
+    errors = {
+        n: s for n, s in zip(fitted.names, fitted.std.tolist(), strict=True) if np.isfinite(s)
+    }
+    return identified(
+        values,
+        provenance,
+        standard_errors=None if known else errors,
+        covariance=fitted.covariance if known else None,
+        effects=updated,
+    )
+
+
+def _number(name: str, value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected a number, got {value!r}") from None
+    if isinstance(value, bool) or not math.isfinite(number):
+        raise InputError(f"{name}: expected a finite number, got {value!r}")
+    return number

@@ -1,0 +1,66 @@
+"""What all ways from a result into a robot file share: uncertainty carried along, and notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.robot_file.identified import Identified, Provenance, identified
+
+Array = NDArray[np.float64]
+
+UNPLACED = "no_place"
+"""Key of the settings that holds what was found and has no place in a robot file."""
+
+
+def values_of(
+    values: Mapping[str, float],
+    jacobian: Array,
+    covariance: Array,
+    provenance: Provenance,
+    *,
+    effects: Iterable[Effect] = (),
+) -> Identified:
+    """Return ``values`` with the covariance of what they were made from.
+
+    ``jacobian`` (len(values), n) are the derivatives by the n numbers of ``covariance`` (n, n); a row
+    of zeros is a value that was held. Where the covariance is not finite, the standard
+    errors that do not need those elements are kept, and the others are unknown.
+    """
+    spread = np.full((len(values), len(values)), np.nan)
+    used = [np.flatnonzero(row) for row in jacobian]
+    for i, one in enumerate(used):
+        for j, other in enumerate(used):
+            part = covariance[np.ix_(one, other)]
+            spread[i, j] = jacobian[i, one] @ part @ jacobian[j, other]
+    spread = (spread + spread.T) / 2
+    errors = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    known = bool(np.isfinite(spread).all())
+    return identified(
+        values,
+        provenance,
+        standard_errors=None
+        if known
+        else {n: float(e) for n, e in zip(values, errors, strict=True) if np.isfinite(e)},
+        covariance=spread if known else None,
+        effects=tuple(effects),
+    )
+
+
+def noted(
+    provenance: Provenance, notes: Iterable[str], unplaced: Mapping[str, Any] | None = None
+) -> Provenance:
+    """Return ``provenance`` with more notes, a line each, and with what has no place."""
+    if not isinstance(provenance, Provenance):
+        raise InputError(f"provenance: expected a Provenance, got {type(provenance).__name__}")
+    text = "\n".join([*([provenance.notes] if provenance.notes else []), *notes])
+    settings = dict(provenance.settings)
+    if unplaced:
+        settings[UNPLACED] = dict(unplaced)
+    return replace(provenance, notes=text, settings=settings)

@@ -1,0 +1,25 @@
+"""Wernholt (2004), chapters 7 to 9 and appendix A, on the preset robot and a stand-in for axis 1.
+
+The thesis is "On Multivariable and Nonlinear Identification of Industrial Robots".
+Every table and figure is an item: a function from a :class:`Context` to an :class:`Item`,
+registered by name (``"table-8.2"``, ``"figure-8.9"``). :func:`run` computes items and writes
+tables as CSV, figures as PDF and PNG, and the claims of the text as a computed yes or no with
+its evidence.
+"""
+
+from axisight_thesis.context import Context, context
+from axisight_thesis.item import Claim, Item, item, item_names, registered
+from axisight_thesis.write import run, write_claims, write_item
+
+__all__ = [
+    "Claim",
+    "Context",
+    "Item",
+    "context",
+    "item",
+    "item_names",
+    "registered",
+    "run",
+    "write_claims",
+    "write_item",
+]
