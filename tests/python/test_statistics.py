@@ -1,0 +1,59 @@
+"""What several kinds of fits share: scaled least squares, intervals, scatter, correlation, starts."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from axisight.statistics.correlation import (
+    covariance_spread,
+    covariances,
+    joint_p_value,
+    pooled_autocovariance,
+    whiteness_p_value,
+)
+
+
+def test_covariances_are_sums_over_time() -> None:
+    rng = np.random.default_rng(5)
+    x, y = rng.normal(size=(2, 40))
+    want = [x[lag:] @ y[: 40 - lag] / 40 for lag in range(40)]
+    np.testing.assert_allclose(covariances(x, y, 39), want, atol=1e-15)
+    np.testing.assert_allclose(covariances(x, y, 3), want[:4], atol=1e-15)
+    parts = [x, y[:3]]
+    want = [sum(p[lag:] @ p[: max(len(p) - lag, 0)] for p in parts) for lag in range(6)]
+    np.testing.assert_allclose(pooled_autocovariance(parts, 5), want, atol=1e-13)
+
+
+def test_spread_is_the_sum_over_both_covariances() -> None:
+    rng = np.random.default_rng(6)
+    first, second = rng.normal(size=4), rng.normal(size=6)
+    for lag, found in enumerate(covariance_spread(first, second, 3)):
+        want = sum(first[abs(k)] * second[abs(k + lag)] for k in range(-3, 4))
+        assert found == pytest.approx(want, abs=1e-14)
+
+
+def test_p_values_are_even_where_there_is_nothing() -> None:
+    """1000 draws: shares below 0.1, 0.5 and 0.9 within three deviations, 0.05 at most."""
+    rng = np.random.default_rng(7)
+    spread = 0.8 ** np.arange(7)
+    lags = np.arange(-3, 4)
+    draws = np.linalg.cholesky(spread[np.abs(lags[:, None] - lags)]) @ rng.normal(size=(7, 1000))
+    joint = [joint_p_value(d, lags, spread, 1e-6) for d in draws.T]
+    n = 400
+    noise = rng.normal(size=(1000, n))
+    rho = np.stack([covariances(e, e, 20) for e in noise])
+    for p in (
+        np.array(joint),
+        whiteness_p_value(rho[:, 1:] / rho[:, :1], n, short=True),
+        whiteness_p_value(rho[:, 1:] / rho[:, :1], n, short=False),
+    ):
+        for level in (0.1, 0.5, 0.9):
+            assert np.mean(p < level) == pytest.approx(level, abs=0.05)
+
+
+def test_directions_without_spread_carry_no_test() -> None:
+    lags = np.arange(4)
+    # A constant input: all lags are one and the same.
+    same = joint_p_value(np.full(4, 1.5), lags, np.ones(4), 1e-6)
+    assert same == pytest.approx(stats.chi2.sf(1.5**2, 1), rel=1e-9)
+    assert np.isnan(joint_p_value(np.zeros(4), lags, np.zeros(4), 1e-6))
