@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 from scipy import stats
 
+from axisight.statistics.cluster_scatter import ClusterScatter
 from axisight.statistics.correlation import (
     covariance_spread,
     covariances,
@@ -11,6 +13,50 @@ from axisight.statistics.correlation import (
     pooled_autocovariance,
     whiteness_p_value,
 )
+
+
+def scatter(rows: np.ndarray, target: np.ndarray) -> ClusterScatter:
+    """Of least squares of rows (n_clusters, n_equations, n) and their right sides."""
+    n = rows.shape[-1]
+    _, r = np.linalg.qr(rows.reshape(-1, n))
+    root = np.linalg.inv(r)
+    values = np.linalg.lstsq(rows.reshape(-1, n), target.ravel())[0]
+    return ClusterScatter(root, rows @ root, rows @ values - target)
+
+
+def test_scatter_is_that_of_the_definition() -> None:
+    rng = np.random.default_rng(2)
+    rows, target = rng.normal(size=(9, 4, 3)), rng.normal(size=(9, 4))
+    found = scatter(rows, target)
+    inverse = np.linalg.inv(np.einsum("bij,bik->jk", rows, rows))
+    want = np.zeros((3, 3))
+    for part, left in zip(rows, found.residual, strict=True):
+        enlarge = np.linalg.inv(scipy.linalg.sqrtm(np.eye(4) - part @ inverse @ part.T))
+        change = inverse @ part.T @ enlarge @ left
+        want += np.outer(change, change)
+    np.testing.assert_allclose(found.covariance, want, rtol=0, atol=1e-12 * np.abs(want).max())
+
+
+def test_the_mean_of_clusters_has_their_number_less_one() -> None:
+    """A mean of k clusters of one size: variance of their means over k, k - 1 degrees of freedom."""
+    target = np.random.default_rng(3).normal(size=(6, 5))
+    found = scatter(np.ones((6, 5, 1)), target)
+    want = np.var(target.mean(axis=1), ddof=1) / 6
+    assert found.covariance[0, 0] == pytest.approx(want, rel=1e-12)
+    assert found.degrees_of_freedom[0] == pytest.approx(5.0, rel=1e-12)
+    assert found.shown.all()
+
+
+def test_a_parameter_of_one_cluster_shows_no_scatter() -> None:
+    rng = np.random.default_rng(4)
+    rows = rng.normal(size=(8, 3, 2))
+    rows[:, :, 1] = 0.0
+    rows[5, 1, 1] = 7.0
+    found = scatter(rows, rng.normal(size=(8, 3)))
+    assert found.shown.tolist() == [True, False]
+    assert np.isnan(found.covariance[1]).all() and np.isnan(found.covariance[0, 1])
+    assert found.covariance[0, 0] > 0
+    assert found.degrees_of_freedom[0] > 4 and found.degrees_of_freedom[1] == 0
 
 
 def test_covariances_are_sums_over_time() -> None:
