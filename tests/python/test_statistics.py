@@ -13,6 +13,7 @@ from axisight.statistics.correlation import (
     pooled_autocovariance,
     whiteness_p_value,
 )
+from axisight.statistics.starts import StartRange, drawn_start
 
 
 def scatter(rows: np.ndarray, target: np.ndarray) -> ClusterScatter:
@@ -103,3 +104,24 @@ def test_directions_without_spread_carry_no_test() -> None:
     same = joint_p_value(np.full(4, 1.5), lags, np.ones(4), 1e-6)
     assert same == pytest.approx(stats.chi2.sf(1.5**2, 1), rel=1e-9)
     assert np.isnan(joint_p_value(np.zeros(4), lags, np.zeros(4), 1e-6))
+
+
+def test_starts_depend_on_seed_and_number_alone() -> None:
+    ranges = [
+        StartRange(1e-3, 10.0, True, (-np.inf, np.inf)),
+        None,
+        StartRange(-4.0, -1.0, True, (-2.0, -1.5)),
+        StartRange(-1.0, 3.0, False, (-np.inf, np.inf)),
+    ]
+    middle = [0.1, 7.0, -1.8, 1.0]
+    shares = np.random.default_rng([5, 2]).random(4)
+    found = drawn_start(middle, ranges, 5, 2)
+    want = [1e-3 * 1e4 ** shares[0], 7.0, np.clip(-4 * 0.25 ** shares[2], -2, -1.5)]
+    np.testing.assert_allclose(found, [*want, -1 + 4 * shares[3]], rtol=1e-14)
+    assert found != drawn_start(middle, ranges, 5, 3)
+    # One that stays changes nothing for the others.
+    assert drawn_start(middle, [ranges[0], *ranges[1:3], None], 5, 2)[:3] == found[:3]
+    many = np.array([drawn_start(middle, ranges, 0, k) for k in range(200)])
+    assert (many[:, 2] <= -1.5).all() and (many[:, 2] >= -2).all()
+    # Half of the logarithms below the middle: 0.5 +- 3 sqrt(0.25 / 200).
+    assert np.mean(many[:, 0] < 0.1) == pytest.approx(0.5, abs=0.11)
