@@ -5,6 +5,7 @@ import pytest
 import scipy.linalg
 from scipy import stats
 
+from axisight.errors import InputError
 from axisight.statistics.cluster_scatter import ClusterScatter
 from axisight.statistics.correlation import (
     covariance_spread,
@@ -13,7 +14,52 @@ from axisight.statistics.correlation import (
     pooled_autocovariance,
     whiteness_p_value,
 )
+from axisight.statistics.intervals import student_factor, student_interval
+from axisight.statistics.least_squares import (
+    condition,
+    inverse_root,
+    scaled_solution,
+    unit_columns,
+)
 from axisight.statistics.starts import StartRange, drawn_start
+
+
+def test_units_of_the_unknowns_decide_nothing() -> None:
+    rng = np.random.default_rng(0)
+    matrix, target = rng.normal(size=(30, 4)), rng.normal(size=30)
+    units = np.array([1e-12, 1.0, 1e9, 1e-3])
+    want = np.linalg.lstsq(matrix, target)[0]
+    found = scaled_solution(matrix * units, target, 1e-13)
+    np.testing.assert_allclose(found * units, want, rtol=1e-12)
+    assert condition(matrix * units) == pytest.approx(condition(matrix), rel=1e-12)
+    root = inverse_root(matrix * units, 1e-10)
+    assert root is not None
+    inverse = np.linalg.inv(matrix.T @ matrix)
+    np.testing.assert_allclose(root @ root.T * np.outer(units, units), inverse, atol=1e-12)
+
+
+def test_columns_that_show_nothing() -> None:
+    rng = np.random.default_rng(1)
+    matrix = np.column_stack([rng.normal(size=(20, 2)), np.zeros(20)])
+    unit, size = unit_columns(matrix)
+    np.testing.assert_allclose(np.linalg.norm(unit, axis=0), [1, 1, 0], atol=1e-15)
+    assert size[2] == 1.0 and np.isinf(condition(matrix))
+    assert inverse_root(matrix, 1e-10) is None
+    assert inverse_root(matrix[:, [0, 1, 0]], 1e-10) is None
+    # The shortest solution leaves what has no effect at zero, and shares what is told twice.
+    found = scaled_solution(matrix[:, [0, 1, 2, 0]], matrix[:, 0], 1e-10)
+    np.testing.assert_allclose(found, [0.5, 0, 0, 0.5], atol=1e-14)
+
+
+def test_student_intervals() -> None:
+    """Quantiles of the printed tables: 2.776 for four degrees of freedom, 1.960 for all."""
+    np.testing.assert_allclose(student_factor(0.95, [4, np.inf]), [2.776, 1.960], atol=5e-4)
+    low, high = student_interval(np.array([1.0, -2.0]), np.array([0.5, 0.1]), [4.0, np.inf], 0.95)
+    np.testing.assert_allclose(low, [1 - 2.776 / 2, -2 - 0.196], atol=5e-4)
+    np.testing.assert_allclose(high, [1 + 2.776 / 2, -2 + 0.196], atol=5e-4)
+    for level in (0.0, 1.0, -0.5, np.nan):
+        with pytest.raises(InputError, match="level: expected a number between 0 and 1"):
+            student_factor(level, 3)
 
 
 def scatter(rows: np.ndarray, target: np.ndarray) -> ClusterScatter:

@@ -25,6 +25,7 @@ from axisight.errors import AxisightError, InputError
 from axisight.frf.pooled import MISFIT_EXPLAINED, few_words
 from axisight.frf.response import DIMS, frequency_response
 from axisight.statistics.evaluation import last_value
+from axisight.statistics.least_squares import inverse_root
 
 
 @dataclass(frozen=True)
@@ -505,12 +506,10 @@ def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Re
     if sections.order == 0:
         return np.zeros((0, 0)), []
     jacobian = projected_jacobian(problem, sections, problem.residues(sections))
-    size = np.linalg.norm(jacobian, axis=0)
-    _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-    if size.min() == 0 or s[-1] <= 1e-10 * s[0]:
+    root = inverse_root(jacobian, 1e-10)
+    if root is None:
         text = "the lines do not determine all poles: lower the order; standard errors are NaN"
         return np.full((sections.order,) * 2, np.nan), [text]
-    root = vt.T / s / size[:, None]
     scores = jacobian.T @ (scale * problem.row_spread.reshape(-1, 1) * jacobian)
     return root @ (root.T @ scores @ root) @ root.T, []
 
