@@ -27,6 +27,7 @@ import numpy as np
 import pinocchio as pin
 
 from axisight import _core
+from axisight.simulation import Integrator
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
@@ -111,10 +112,13 @@ def rows(repeats: int) -> list[tuple[str, float, float, str]]:
     )
 
     dt, steps = robot.sample_time_s, 4000
-    torque = np.tile(robot.equilibrium([])["motor_torque"], (steps, 1))
+    torque = np.tile(robot.equilibrium([])["motor_torque"], (1, steps, 1))
+    rk4 = Integrator("rk4")
     ours = (
         best(
-            lambda: _core.simulate(robot, [], torque, reference=False, method="rk4", substeps=1),
+            lambda: _core.simulate_batch(
+                robot, [], torque, reference=False, integrator=rk4, threads=1
+            ),
             repeats,
         )
         * 1e6

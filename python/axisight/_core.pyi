@@ -27,6 +27,7 @@ __all__ = [
     "axis_fit",
     "axis_linearize",
     "axis_simulate",
+    "check_integrator",
     "design_poses",
     "directions",
     "effect_table",
@@ -49,7 +50,6 @@ __all__ = [
     "record_spectra",
     "regression_factors",
     "right_divide_matrices",
-    "simulate",
     "simulate_batch",
     "square_period",
     "torque_regressor",
@@ -64,7 +64,6 @@ _Effect: TypeAlias = tuple[str, int | None, _Numbers]
 _Effects: TypeAlias = Sequence[_Effect]
 # Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
 _Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
-_Method: TypeAlias = Literal["rk4", "rkn4", "dopri5", "radau5", "rodas4", "auto"]
 _Model: TypeAlias = Literal["nonlinear", "linear"]
 
 @type_check_only
@@ -118,37 +117,16 @@ class Equilibrium(TypedDict):
     motor_torque: _Array
 
 @type_check_only
-class SimulationOutput(TypedDict):
-    """What a simulated run recorded; fewer samples than asked for if it did not complete.
+class BatchOutput(TypedDict):
+    """What simulated runs recorded, by run.
 
-    Arrays have shape (n_samples, n_axes) except ``joint_position_rad`` (n_samples, n_joints).
-    ``position_rad`` is the measurement: ``motor_position_rad`` plus
-    ``position_disturbance_rad``, which includes the noise. ``stopped_at`` is the sample
-    (from 0) at which a run that did not complete ended. The counters are right-hand sides,
+    Arrays have shape (n_runs, n_samples, n_axes) except ``joint_position_rad`` (n_runs,
+    n_samples, n_joints). ``position_rad`` is the measurement: ``motor_position_rad`` plus
+    ``position_disturbance_rad``, which includes the noise. ``status`` is "completed",
+    "diverged", "step_size_collapsed" or "cancelled"; ``stopped_at`` the sample (from 0) at which a
+    run that did not complete ended, after which it is NaN. The counters are right-hand sides,
     sub-steps, rejected sub-steps, Jacobians, factorized matrices and samples that were
     integrated by an implicit method; all zero for the linear model.
-    """
-
-    torque_cmd_nm: _Array
-    position_rad: _Array
-    motor_position_rad: _Array
-    joint_position_rad: _Array
-    torque_disturbance_nm: _Array
-    position_disturbance_rad: _Array
-    status: Literal["completed", "diverged", "step_size_collapsed", "cancelled"]
-    stopped_at: int | None
-    evaluations: int
-    steps: int
-    rejections: int
-    jacobians: int
-    factorizations: int
-    implicit_samples: int
-
-@type_check_only
-class BatchOutput(TypedDict):
-    """What many runs recorded: as `SimulationOutput` with a first dimension (or list) of runs.
-
-    A run that ended early is NaN after the sample at which it stopped.
     """
 
     torque_cmd_nm: _Array
@@ -165,6 +143,17 @@ class BatchOutput(TypedDict):
     jacobians: list[int]
     factorizations: list[int]
     implicit_samples: list[int]
+
+@type_check_only
+class IntegratorSpec(Protocol):
+    """How to integrate: any object with these attributes, see `axisight.simulation.Integrator`."""
+
+    @property
+    def method(self) -> str: ...
+    @property
+    def substeps(self) -> int: ...
+    @property
+    def tolerance(self) -> float: ...
 
 @type_check_only
 class ParameterSpec(Protocol):
@@ -202,9 +191,8 @@ class OptionSpec(Protocol):
 
     ``loss`` is "squared", "huber" or "soft_l1"; ``loss_scale`` is in standard deviations.
     ``loss_tolerance`` is a share of the loss, ``step_tolerance`` a share of each parameter's
-    scale. ``block_s`` [s] is the length of the blocks of `FitResult.blocks`. ``method`` is
-    "rk4" or "rkn4" (with ``substeps`` per sample) or "dopri5" (with a relative ``tolerance`` per
-    sub-step); `fit_inverse_dynamics` ignores these three.
+    scale. ``block_s`` [s] is the length of the blocks of `FitResult.blocks`.
+    `fit_inverse_dynamics` ignores the integrator.
     """
 
     @property
@@ -222,11 +210,7 @@ class OptionSpec(Protocol):
     @property
     def block_s(self) -> float: ...
     @property
-    def method(self) -> str: ...
-    @property
-    def substeps(self) -> int: ...
-    @property
-    def tolerance(self) -> float: ...
+    def integrator(self) -> IntegratorSpec: ...
 
 @final
 class CancelToken:
@@ -594,30 +578,8 @@ def design_poses(
 def effect_table() -> list[EffectInfo]:
     """Every effect with its description and parameters."""
 
-def simulate(
-    robot: Robot,
-    effects: _Effects,
-    input: _Array,
-    *,
-    reference: bool,
-    noise: _Array | None = None,
-    start: _Numbers | None = None,
-    method: _Method | str = "dopri5",
-    substeps: int = 1,
-    tolerance: float = 1e-7,
-    model: _Model | str = "nonlinear",
-    resolution: float = 0.0,
-    cancel: CancelToken | None = None,
-) -> SimulationOutput:
-    """Simulate one run from rest.
-
-    ``input`` (n_samples, n_axes) is a motor-side velocity reference [rad/s] through the
-    controller if ``reference``, else a commanded torque [Nm]. ``noise`` [rad], of the same
-    shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
-    angles at rest, None the operating point. ``method`` is "rk4" or "rkn4" with ``substeps`` per sample, or
-    an error-controlled one with a relative ``tolerance`` per step. ``resolution`` [rad] is the
-    step of the position sensor, 0 for none.
-    """
+def check_integrator(integrator: IntegratorSpec) -> None:
+    """Raise InputError for an integrator that no simulation would take."""
 
 def simulate_batch(
     robot: Robot,
@@ -625,19 +587,21 @@ def simulate_batch(
     input: _Array,
     *,
     reference: bool,
+    integrator: IntegratorSpec,
     noise: _Array | None = None,
     start: _Numbers | None = None,
-    method: _Method | str = "dopri5",
-    substeps: int = 1,
-    tolerance: float = 1e-7,
     model: _Model | str = "nonlinear",
     resolution: float = 0.0,
     threads: int = 0,
     cancel: CancelToken | None = None,
 ) -> BatchOutput:
-    """Simulate many runs: as `simulate` with arrays (n_runs, n_samples, n_axes).
+    """Simulate runs from rest.
 
-    ``threads`` 0 takes every core; results do not depend on it.
+    ``input`` (n_runs, n_samples, n_axes) are motor-side velocity references [rad/s] through the
+    controller if ``reference``, else commanded torques [Nm]. ``noise`` [rad], of the same
+    shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
+    angles at rest, None the operating point. ``resolution`` [rad] is the step of the position
+    sensor, 0 for none. ``threads`` 0 takes every core; results do not depend on it.
     """
 
 def measurement_noise(
@@ -728,9 +692,7 @@ class MonteCarloStudy:
         effects: _Effects,
         *,
         model: str,
-        method: str,
-        substeps: int,
-        tolerance: float,
+        integrator: IntegratorSpec,
         start: Sequence[float] | None,
         period_s: float,
         band_hz: tuple[float, float],

@@ -12,7 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import axisight
-from axisight import Effect, Robot, _core, effect_info, load_robot
+from axisight import Effect, FitOptions, InputError, Robot, _core, effect_info, load_robot
+from axisight.simulation import Integrator
 from lugre_model import (
     KP,
     LINK_INERTIA,
@@ -43,6 +44,32 @@ def sines(n: int, amplitude: float, n_axes: int = 3) -> Array:
     """Velocity references of 5, 6, 7 Hz."""
     t = np.arange(n) * SAMPLE_TIME_S
     return amplitude * np.sin(2 * np.pi * (5 + np.arange(n_axes)) * t[:, None])
+
+
+# --- the value object --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"method": "euler"}, r"method: expected rk4, .* auto, got euler"),
+        ({"tolerance": 1.0}, r"tolerance: expected between 1e-14 and 1, got 1"),
+        ({"method": "auto", "tolerance": np.nan}, r"tolerance: .*NaN"),
+        ({"method": "rkn4", "substeps": 0}, r"substeps: expected at least 1, got 0"),
+        ({"substeps": -1}, r"substeps: expected at least 1, got -1"),
+    ],
+)
+def test_an_integrator_is_checked_when_made(given: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Integrator(**given)  # type: ignore[arg-type]
+
+
+def test_integrators_of_fits_and_what_does_not_count() -> None:
+    assert FitOptions(substeps=3).integrator == Integrator("rk4", 1e-7, 3)
+    # Fixed steps have no tolerance.
+    assert Integrator("rk4", tolerance=0.0).tolerance == 0.0
+    with pytest.raises(InputError, match="method"):
+        _ = FitOptions(method="euler").integrator  # type: ignore[arg-type]
 
 
 # --- tolerance ---------------------------------------------------------------------------

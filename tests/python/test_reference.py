@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.simulation import Integrator
 
 Array = NDArray[np.float64]
 Effects = list[tuple[str, int | None, list[float]]]
@@ -138,24 +139,23 @@ METHODS = [
 def test_trajectory(robot: Any, folder: Path, name: str, method: tuple[str, int, float]) -> None:
     frame = pd.read_parquet(folder / f"trajectory_{name}.parquet")
     kind, substeps, tolerance = method
-    out = _core.simulate(
+    out = _core.simulate_batch(
         robot,
         TRAJECTORIES[name],
-        _columns(frame, "velocity_ref", 3),
+        _columns(frame, "velocity_ref", 3)[None],
         reference=True,
-        method=kind,
-        substeps=substeps,
-        tolerance=tolerance,
+        integrator=Integrator(kind, tolerance, substeps),
     )
-    assert out["status"] == "completed"
-    assert _rms_error(out["torque_cmd_nm"], _columns(frame, "torque_cmd", 3)) <= BOUND
-    assert _rms_error(out["position_rad"], _columns(frame, "position", 3)) <= BOUND
-    assert _rms_error(out["joint_position_rad"], _columns(frame, "joint", 7)) <= BOUND
+    assert out["status"] == ["completed"]
+    assert _rms_error(out["torque_cmd_nm"][0], _columns(frame, "torque_cmd", 3)) <= BOUND
+    assert _rms_error(out["position_rad"][0], _columns(frame, "position", 3)) <= BOUND
+    assert _rms_error(out["joint_position_rad"][0], _columns(frame, "joint", 7)) <= BOUND
 
 
 def test_effects_matter_in_the_trajectories(robot: Any, folder: Path) -> None:
     """Without its effects the simulation misses each log: the bound above has teeth."""
     for name in ("ripple", "friction_axis2_cubic_axis1"):
         frame = pd.read_parquet(folder / f"trajectory_{name}.parquet")
-        out = _core.simulate(robot, [], _columns(frame, "velocity_ref", 3), reference=True)
-        assert _rms_error(out["torque_cmd_nm"], _columns(frame, "torque_cmd", 3)) > 1e3 * BOUND
+        reference = _columns(frame, "velocity_ref", 3)[None]
+        out = _core.simulate_batch(robot, [], reference, reference=True, integrator=Integrator())
+        assert _rms_error(out["torque_cmd_nm"][0], _columns(frame, "torque_cmd", 3)) > 1e3 * BOUND

@@ -4,7 +4,7 @@ use crate::convert::{array1, array2, array3, rows};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use crate::robot::Robot;
-use crate::simulation::method;
+use crate::simulation::IntegratorSpec;
 use axisight_core::identification::{
     Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
     ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
@@ -40,9 +40,7 @@ pub struct OptionSpec {
     loss_scale: f64,
     nuisance_refreshes: usize,
     block_s: f64,
-    method: String,
-    substeps: usize,
-    tolerance: f64,
+    integrator: IntegratorSpec,
 }
 
 /// Frequencies [Hz], weights and decimation of one axis.
@@ -301,7 +299,7 @@ pub fn fit_simulation(
             }
         },
         weighting: weightings(weighting),
-        method: method(&options.method, options.substeps, options.tolerance)?,
+        method: options.integrator.method()?,
         block_s: options.block_s,
         cancel: Some(cancel.clone()),
     };

@@ -38,7 +38,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<entry::CancelToken>()?;
     module.add_class::<fit::FitResult>()?;
     module.add_function(wrap_pyfunction!(effects::effect_table, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::check_integrator, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;

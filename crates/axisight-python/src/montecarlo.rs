@@ -3,7 +3,7 @@
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
-use crate::simulation::method;
+use crate::simulation::IntegratorSpec;
 use axisight_core::ensemble::{Moments, QuantileSketch, STATISTICS};
 use axisight_core::excitation::{Grid, Multisine, Square, directions};
 use axisight_core::frf::Output;
@@ -52,15 +52,13 @@ fn choice<T: Copy>(field: &str, name: &str, table: &[(&str, T)]) -> PyResult<T> 
 #[pymethods]
 impl MonteCarloStudy {
     #[new]
-    #[pyo3(signature = (robot, effects, *, model, method, substeps, tolerance, start, period_s, band_hz, grid, peak_rad_s, square, directions, direction_matrix, waiting_periods, periods, noise, noise_cutoff_hz, resolution, output, spread, relative_accuracy))]
+    #[pyo3(signature = (robot, effects, *, model, integrator, start, period_s, band_hz, grid, peak_rad_s, square, directions, direction_matrix, waiting_periods, periods, noise, noise_cutoff_hz, resolution, output, spread, relative_accuracy))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn new(
         robot: &Robot,
         effects: Vec<EffectTuple>,
         model: &str,
-        method: &str,
-        substeps: usize,
-        tolerance: f64,
+        integrator: IntegratorSpec,
         start: Option<Vec<f64>>,
         period_s: f64,
         band_hz: (f64, f64),
@@ -81,10 +79,12 @@ impl MonteCarloStudy {
         let description = robot.description.clone();
         let (n, sample_time) = (description.n_axes(), description.sample_time);
         let effects = settings(effects);
-        let method = self::method(method, substeps, tolerance)?;
+        let linear = Model::Linear {
+            substeps: integrator.substeps,
+        };
         let models = [
-            ("linear", Model::Linear { substeps }),
-            ("nonlinear", Model::Nonlinear(method)),
+            ("linear", linear),
+            ("nonlinear", Model::Nonlinear(integrator.method()?)),
         ];
         let outputs = [
             ("position", Output::Position),

@@ -1,44 +1,61 @@
-//! Simulation of one run and of many.
+//! Simulation of many runs; one run is a batch of one.
 
-use crate::convert::{array2, array3, planes, rows};
+use crate::convert::{array2, array3, planes};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::simulation::{
     self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, Status, Traces,
 };
-use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Integrator by name: `rk4` and `rkn4` with sub-steps, the others with a tolerance.
-pub fn method(name: &str, substeps: usize, tolerance: f64) -> PyResult<Method> {
-    let controlled = match name {
-        "rk4" if substeps >= 1 => return Ok(Method::RungeKutta4 { substeps }),
-        "rkn4" if substeps >= 1 => return Ok(Method::Nystrom4 { substeps }),
-        "rk4" | "rkn4" => {
-            return Err(input_error(format!(
-                "substeps: expected at least 1, got {substeps}"
-            )));
+/// Integrator, as Python hands it over.
+#[derive(FromPyObject)]
+pub struct IntegratorSpec {
+    method: String,
+    pub substeps: usize,
+    tolerance: f64,
+}
+
+impl IntegratorSpec {
+    /// `rk4` and `rkn4` with sub-steps, the others with a tolerance.
+    pub fn method(&self) -> PyResult<Method> {
+        let (substeps, tolerance) = (self.substeps, self.tolerance);
+        let controlled = match self.method.as_str() {
+            "rk4" if substeps >= 1 => return Ok(Method::RungeKutta4 { substeps }),
+            "rkn4" if substeps >= 1 => return Ok(Method::Nystrom4 { substeps }),
+            "rk4" | "rkn4" => {
+                return Err(input_error(format!(
+                    "substeps: expected at least 1, got {substeps}"
+                )));
+            }
+            "dopri5" => Method::DormandPrince { tolerance },
+            "radau5" => Method::RadauIia { tolerance },
+            "rodas4" => Method::Rosenbrock { tolerance },
+            "auto" => Method::Automatic { tolerance },
+            name => {
+                return Err(input_error(format!(
+                    "method: expected rk4, rkn4, dopri5, radau5, rodas4 or auto, got {name}"
+                )));
+            }
+        };
+        // Below this the states cannot even be written down.
+        if (1e-14..1.0).contains(&tolerance) {
+            Ok(controlled)
+        } else {
+            Err(input_error(format!(
+                "tolerance: expected between 1e-14 and 1, got {tolerance}"
+            )))
         }
-        "dopri5" => Method::DormandPrince { tolerance },
-        "radau5" => Method::RadauIia { tolerance },
-        "rodas4" => Method::Rosenbrock { tolerance },
-        "auto" => Method::Automatic { tolerance },
-        _ => {
-            return Err(input_error(format!(
-                "method: expected rk4, rkn4, dopri5, radau5, rodas4 or auto, got {name}"
-            )));
-        }
-    };
-    // Below this the states cannot even be written down.
-    if (1e-14..1.0).contains(&tolerance) {
-        Ok(controlled)
-    } else {
-        Err(input_error(format!(
-            "tolerance: expected between 1e-14 and 1, got {tolerance}"
-        )))
     }
+}
+
+/// Refuse an integrator that no simulation would take.
+#[pyfunction]
+pub fn check_integrator(integrator: IntegratorSpec) -> PyResult<()> {
+    integrator.method().map(|_| ())
 }
 
 /// Equations by name.
@@ -85,60 +102,15 @@ pub fn measurement_noise(
 struct Options {
     reference: bool,
     start: Option<Vec<f64>>,
-    method: String,
-    substeps: usize,
-    tolerance: f64,
-    model: String,
+    method: Method,
+    model: Model,
     resolution: f64,
     threads: usize,
 }
 
-/// Simulate one run from rest.
+/// Simulate runs from rest; the shape of the inputs is `(n_runs, n_samples, n_axes)`.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, input, *, reference, noise=None, start=None, method="dopri5", substeps=1, tolerance=1e-7, model="nonlinear", resolution=0.0, cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn simulate<'py>(
-    py: Python<'py>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    input: PyReadonlyArray2<'py, f64>,
-    reference: bool,
-    noise: Option<PyReadonlyArray2<'py, f64>>,
-    start: Option<Vec<f64>>,
-    method: &str,
-    substeps: usize,
-    tolerance: f64,
-    model: &str,
-    resolution: f64,
-    cancel: Option<&Bound<'py, CancelToken>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let n_axes = robot.description.n_axes();
-    let field = if reference { "velocity_ref" } else { "torque" };
-    let input = vec![rows(&input, field, n_axes)?];
-    let noise = match noise {
-        Some(n) => vec![rows(&n, "noise", n_axes)?],
-        None => Vec::new(),
-    };
-    let options = Options {
-        reference,
-        start,
-        method: method.to_owned(),
-        substeps,
-        tolerance,
-        model: model.to_owned(),
-        resolution,
-        threads: 1,
-    };
-    let (traces, outcomes) = run(py, robot, effects, &input, &noise, options, cancel)?;
-    let Some(outcome) = outcomes.first() else {
-        return Err(input_error("input: expected a run"));
-    };
-    single(py, robot, traces, *outcome)
-}
-
-/// Simulate many runs from rest; the shape of the inputs is `(n_runs, n_samples, n_axes)`.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, input, *, reference, noise=None, start=None, method="dopri5", substeps=1, tolerance=1e-7, model="nonlinear", resolution=0.0, threads=0, cancel=None))]
+#[pyo3(signature = (robot, effects, input, *, reference, integrator, noise=None, start=None, model="nonlinear", resolution=0.0, threads=0, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn simulate_batch<'py>(
     py: Python<'py>,
@@ -146,11 +118,9 @@ pub fn simulate_batch<'py>(
     effects: Vec<EffectTuple>,
     input: PyReadonlyArray3<'py, f64>,
     reference: bool,
+    integrator: IntegratorSpec,
     noise: Option<PyReadonlyArray3<'py, f64>>,
     start: Option<Vec<f64>>,
-    method: &str,
-    substeps: usize,
-    tolerance: f64,
     model: &str,
     resolution: f64,
     threads: usize,
@@ -166,10 +136,8 @@ pub fn simulate_batch<'py>(
     let options = Options {
         reference,
         start,
-        method: method.to_owned(),
-        substeps,
-        tolerance,
-        model: model.to_owned(),
+        method: integrator.method()?,
+        model: self::model(model)?,
         resolution,
         threads,
     };
@@ -204,8 +172,8 @@ fn run(
         },
         noise,
         resolution: options.resolution,
-        model: model(&options.model)?,
-        method: method(&options.method, options.substeps, options.tolerance)?,
+        model: options.model,
+        method: options.method,
         cancel: Some(&*cancel),
     };
     let pool = rayon::ThreadPoolBuilder::new()
@@ -254,28 +222,6 @@ fn signals(traces: Traces, robot: &Robot) -> [(&'static str, Vec<f64>, usize); 6
             n_axes,
         ),
     ]
-}
-
-/// One run; its arrays end with the sample at which it stopped.
-fn single<'py>(
-    py: Python<'py>,
-    robot: &Robot,
-    traces: Traces,
-    outcome: Outcome,
-) -> PyResult<Bound<'py, PyDict>> {
-    let out = PyDict::new(py);
-    let (name, at) = status(outcome.status);
-    out.set_item("status", name)?;
-    out.set_item("stopped_at", at)?;
-    for (name, count) in counters(outcome.effort) {
-        out.set_item(name, count)?;
-    }
-    let seen = at.map_or(traces.n_samples, |k| k + 1);
-    for (name, mut data, columns) in signals(traces, robot) {
-        data.truncate(seen * columns);
-        out.set_item(name, array2(py, data, columns)?)?;
-    }
-    Ok(out)
 }
 
 fn many<'py>(

@@ -15,6 +15,7 @@ from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.robot import Robot
+from axisight.simulation import Integrator
 
 Array = NDArray[np.float64]
 
@@ -85,6 +86,11 @@ class FitOptions:
     method: Literal["rk4", "dopri5"] = "rk4"
     substeps: int = 1
     tolerance: float = 1e-7
+
+    @property
+    def integrator(self) -> Integrator:
+        """``method``, ``substeps`` and ``tolerance``; raises InputError as `Integrator`."""
+        return Integrator(self.method, self.tolerance, self.substeps)
 
 
 @dataclass(frozen=True)
@@ -232,9 +238,7 @@ def fit(
         replace(p, effect=p.effect + len(robot.effects)) if p.effect is not None else p
         for p in parameters
     ]
-    closed = robot.controller_kind != "none" and all(
-        log.velocity_ref_rad_s is not None for log in logs
-    )
+    closed = is_closed_loop(robot, logs)
     result = _core.fit_simulation(
         robot.core,
         core_effects(model),
@@ -246,6 +250,13 @@ def fit(
         output="torque" if closed else "position",
     )
     return fitted(result, shifted, model)
+
+
+def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
+    """Whether a simulation can run as the logs did: a controller, and references to all of them."""
+    return robot.controller_kind != "none" and all(
+        log.velocity_ref_rad_s is not None for log in logs
+    )
 
 
 def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array]]:

@@ -16,12 +16,46 @@ from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
 from axisight.gap.settings import Settings
 from axisight.gap.torques import Variant
+from axisight.gap.view import View
 from axisight.logs import Log, differentiate, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
+
+# Below the first resonance of most machines, above the spectrum of their motions.
+INVERSE_CUTOFF_HZ = 60.0
+
+
+class InverseView(View):
+    """Torque predicted from the measured motion."""
+
+    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+        cutoff = min(INVERSE_CUTOFF_HZ, 0.2 / robot.sample_time_s)
+        self.cutoff_hz = cutoff
+        floor = inverse_floor(robot, logs, cutoff, settings)
+        fitter = InverseDynamicsFitter(
+            robot,
+            [motion(log, cutoff) for log in logs],
+            floor.weighting,
+            settings.tolerances,
+            settings.block_s,
+        )
+        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
+
+    def measured(self, log: Log) -> Array:
+        """Return the low-passed torque."""
+        return motion(log, self.cutoff_hz)[3]
+
+    def torque(self, variant: Variant, log: Log) -> Array:
+        """Return the predicted torque."""
+        return predicted_torque(self.robot, variant, motion(log, self.cutoff_hz))
+
+    def noise(self, log: Log, run: int) -> Array:
+        """Return the error that noise of position and torque causes."""
+        std = self.floor.position_std_rad
+        return inverse_noise(self.robot, log, std, self.cutoff_hz, self.settings.seed, 2 * run)
 
 
 def motion(log: Log, cutoff_hz: float) -> Motion:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects, without
+from axisight.effects import Effect, without
 from axisight.fitting import (
     FitOptions,
     Parameter,
@@ -19,7 +19,6 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
-from axisight.fitting.simulation_error import core_spec
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -263,45 +262,3 @@ def _evidence(
         residual=result.residual,
         nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(names) if e is None},
     )
-
-
-class ClosedLoopFitter(ModelFitter):
-    """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
-
-    In a linear loop this is the torque by which a run driven by the references
-    would be off; in a nonlinear one the simulator also stays in phase with the
-    log, without which lost motion and stiction have no smooth error to fit.
-    ``records``: (position [rad], torque [Nm]) of each log, (n, n_axes).
-    """
-
-    def __init__(
-        self,
-        robot: Robot,
-        records: list[tuple[Array, Array]],
-        weighting: Weighting,
-        tolerances: Mapping[str, float],
-        block_s: float,
-    ) -> None:
-        super().__init__(robot, weighting, tolerances, block_s)
-        self.records = records
-
-    def solve(
-        self,
-        effects: Sequence[Effect],
-        parameters: Sequence[Parameter],
-        options: FitOptions,
-        warm: list[tuple[int, Array]],
-    ) -> _core.FitResult:
-        """Run the fit in the core."""
-        return _core.fit_simulation(
-            self.robot.core,
-            core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
-            self.records,
-            self.weighting.core(),
-            options,
-            input="tracking",
-            output="torque",
-            warm=warm,
-            cancel=self.cancel,
-        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -14,32 +13,20 @@ from numpy.typing import NDArray
 
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
-from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.howfar import Stage, gap_figures, gap_reduction, overlays, stage
-from axisight.gap.inverse import (
-    InverseDynamicsFitter,
-    inverse_floor,
-    inverse_noise,
-    motion,
-    predicted_torque,
-)
-from axisight.gap.model import ClosedLoopFitter, Evidence, FreeEffect, ModelFitter
-from axisight.gap.noise import Floor, closed_loop_floor, noise_torque
-from axisight.gap.result import Cause, Diagnosis, Gap, Interval, Mode, Overlay
+from axisight.gap.model import Evidence
+from axisight.gap.modes import view_of
+from axisight.gap.result import Cause, Diagnosis, Gap, Interval, Overlay
 from axisight.gap.search import Progress, Search, search
 from axisight.gap.settings import Settings
-from axisight.gap.torques import AS_GIVEN, Variant, relative_squares, simulated_torque
+from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.verdict import Conclusion, conclude
+from axisight.gap.view import View
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Case, Log, check_same_rate, read_case
 from axisight.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
-
-# Below the first resonance of most machines, above the spectrum of their motions.
-INVERSE_CUTOFF_HZ = 60.0
-# A torque ripple is followed by the controller one to one up to about here.
-_RIPPLE_BANDWIDTH_HZ = 20.0
 
 
 def _silent(_label: str, _done: int, _total: int) -> None:
@@ -81,14 +68,7 @@ def diagnose(
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
-    closed = machine.controller_kind != "none" and all(
-        log.velocity_ref_rad_s is not None for log in [*fit_logs, *held_logs]
-    )
-    view = (
-        ClosedLoopView(machine, fit_logs, chosen)
-        if closed
-        else InverseView(machine, fit_logs, chosen)
-    )
+    view = view_of(machine, fit_logs, held_logs, chosen)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
@@ -140,96 +120,6 @@ def _check_log(robot: Robot, log: Log) -> None:
             f"{log.source}: expected the robot's sample time {robot.sample_time_s:g} s, "
             f"got {log.sample_time_s:g} s"
         )
-
-
-@dataclass
-class View(ABC):
-    """One way of comparing simulator and logs: what to fit, what error it leaves, what floor."""
-
-    mode: Mode
-    robot: Robot
-    logs: list[Log]
-    settings: Settings
-    fitter: ModelFitter
-    floor: Floor
-
-    def candidates(self, model: Evidence) -> list[FreeEffect]:
-        """Return the candidates, with start values from the residual of a model."""
-        at = situation(
-            self.robot, self.logs, model, self.fitter.weighting.decimation, _RIPPLE_BANDWIDTH_HZ
-        )
-        inverse = self.mode == "inverse_dynamics"
-        return all_candidates(self.robot, self.logs, at, inverse_dynamics=inverse)
-
-    @abstractmethod
-    def measured(self, log: Log) -> Array:
-        """Return the torque errors are taken from (n, n_axes) [Nm]."""
-
-    @abstractmethod
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the torque of a simulator on a log (n, n_axes) [Nm]."""
-
-    @abstractmethod
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the torque error of noise alone (n, n_axes) [Nm]."""
-
-
-class ClosedLoopView(View):
-    """Simulator and machine driven by the same references."""
-
-    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        floor = closed_loop_floor(robot, logs, settings)
-        data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
-        fitter = ClosedLoopFitter(
-            robot, data, floor.weighting, settings.tolerances, settings.block_s
-        )
-        super().__init__("closed_loop", robot, logs, settings, fitter, floor)
-
-    def measured(self, log: Log) -> Array:
-        """Return the logged torque."""
-        return log.torque_nm
-
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the simulated torque."""
-        return simulated_torque(self.robot, variant, log)
-
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the torque that sensor noise causes through the loop."""
-        return noise_torque(self.robot, log, self.floor.position_std_rad, self.settings.seed, run)
-
-
-def _contiguous(x: Array) -> Array:
-    return np.ascontiguousarray(x, dtype=np.float64)
-
-
-class InverseView(View):
-    """Torque predicted from the measured motion."""
-
-    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        cutoff = min(INVERSE_CUTOFF_HZ, 0.2 / robot.sample_time_s)
-        self.cutoff_hz = cutoff
-        floor = inverse_floor(robot, logs, cutoff, settings)
-        fitter = InverseDynamicsFitter(
-            robot,
-            [motion(log, cutoff) for log in logs],
-            floor.weighting,
-            settings.tolerances,
-            settings.block_s,
-        )
-        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
-
-    def measured(self, log: Log) -> Array:
-        """Return the low-passed torque."""
-        return motion(log, self.cutoff_hz)[3]
-
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the predicted torque."""
-        return predicted_torque(self.robot, variant, motion(log, self.cutoff_hz))
-
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the error that noise of position and torque causes."""
-        std = self.floor.position_std_rad
-        return inverse_noise(self.robot, log, std, self.cutoff_hz, self.settings.seed, 2 * run)
 
 
 def _errors(view: View, variant: Variant, logs: Sequence[Log]) -> list[Array]:

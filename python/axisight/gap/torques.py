@@ -8,11 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, without
-from axisight.errors import InputError
+from axisight.effects import Effect
 from axisight.logs import Log
-from axisight.robot import Robot
-from axisight.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -26,23 +23,6 @@ class Variant:
 
 
 AS_GIVEN = Variant({})
-
-
-def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
-    """Return the commanded torque (n, n_axes) [Nm] of a simulator along a log's references.
-
-    Where the simulation fails (an unstable model), the rest is NaN.
-    """
-    if log.velocity_ref_rad_s is None:
-        raise InputError(f"log {log.name!r}: expected velocity references")
-    changed = robot.with_parameters(variant.robot_values).with_effects(
-        without(robot.effects, variant.effects)
-    )
-    out = simulate(changed, log.velocity_ref_rad_s, effects=variant.effects, method="rk4")
-    torque = np.full(log.torque_nm.shape, np.nan)
-    values = out["torque_cmd_nm"].values
-    torque[: len(values)] = values
-    return torque
 
 
 def relative_squares(log: Log, error: Array) -> Array:

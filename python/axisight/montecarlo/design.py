@@ -15,7 +15,8 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError, StudyError
 from axisight.montecarlo.study import Study
-from axisight.robot import load_robot
+from axisight.robot import Robot, load_robot
+from axisight.simulation import Integrator
 
 Arrays = dict[str, NDArray[Any]]
 """The accumulators of a block by name; see ``_core.MonteCarloStudy.block``."""
@@ -55,18 +56,14 @@ def core_study(design: str) -> _core.MonteCarloStudy:
     named = isinstance(directions, str)
     plant, measurement = d["plant"], d["measurement"]
     try:
-        robot = _core.Robot.from_toml(d["robot"]["toml"])
-        if d["robot_parameters"]:
-            robot = robot.with_parameters(list(d["robot_parameters"].items()))
+        robot = Robot.from_toml(d["robot"]["toml"]).with_parameters(d["robot_parameters"])
         effects = [(name, axis, values) for name, axis, values in d["robot"]["effects"]]
         effects += core_effects(Effect(**e) for e in d["effect"])
         return _core.MonteCarloStudy(
-            robot,
+            robot.core,
             effects,
             model=plant["model"],
-            method=plant["method"],
-            substeps=plant["substeps"],
-            tolerance=plant["tolerance"],
+            integrator=Integrator(plant["method"], plant["tolerance"], plant["substeps"]),
             start=plant["start_rad"],
             period_s=multisine["period_s"],
             band_hz=tuple(multisine["band_hz"]),

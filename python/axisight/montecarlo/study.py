@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.errors import StudyError
 from axisight.robot.presets import PRESETS
+from axisight.simulation import Method
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -40,7 +41,7 @@ class Plant(_Model):
     """
 
     model: Literal["linear", "nonlinear"] = "linear"
-    method: Literal["dopri5", "rk4", "rkn4", "radau5", "rodas4", "auto"] = "dopri5"
+    method: Method = "dopri5"
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-7
     substeps: AtLeastOne = 1
     start_rad: list[float] | None = None

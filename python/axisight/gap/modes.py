@@ -1,0 +1,22 @@
+"""The one place that decides how simulator and logs are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.inverse import InverseView
+from axisight.gap.settings import Settings
+from axisight.gap.view import View
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+def view_of(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], settings: Settings
+) -> View:
+    """Return closed loop if robot and all logs have what it takes, else inverse dynamics."""
+    closed = is_closed_loop(robot, [*estimation, *validation])
+    mode = ClosedLoopView if closed else InverseView
+    return mode(robot, list(estimation), settings)

@@ -1,0 +1,274 @@
+"""Closed-loop and torque-driven simulation: many runs at once, one as a batch of one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from importlib.metadata import version
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.errors import InputError
+from axisight.robot import Robot
+from axisight.simulation.inputs import given_noise, one_input, start_angles
+from axisight.simulation.integrator import Integrator, Method
+from axisight.simulation.noise import sensor_noise
+
+Array = NDArray[np.float64]
+Model = Literal["nonlinear", "linear"]
+
+
+def simulate(
+    robot: Robot,
+    velocity_ref_rad_s: ArrayLike | None = None,
+    *,
+    torque_nm: ArrayLike | None = None,
+    effects: Iterable[Effect] = (),
+    noise_seed: int | None = None,
+    run: int = 0,
+    noise: ArrayLike | None = None,
+    noise_cutoff_hz: float | None = None,
+    position_resolution_rad: float = 0.0,
+    start_rad: Sequence[float] | None = None,
+    model: Model = "nonlinear",
+    method: Method = "dopri5",
+    tolerance: float = 1e-7,
+    substeps: int = 1,
+) -> xr.Dataset:
+    """Simulate from rest at an operating point, sampled as the controller samples.
+
+    Parameters
+    ----------
+    robot : the robot; effects its preset models take part.
+    velocity_ref_rad_s : (n, n_axes), motor-side references through the controller; or
+    torque_nm : (n, n_axes), commanded motor torques without controller. Give exactly one.
+    effects : further effects.
+    noise_seed, run : position noise of the robot's sensor as a function of
+        (seed, run); no noise without a seed.
+    noise : (n, n_axes) position noise [rad] instead of a seeded one.
+    noise_cutoff_hz : corner of a first-order spectrum of the seeded noise; white without.
+    position_resolution_rad : step of the position sensor, motor side; zero for none.
+    start_rad : (n_axes,) driven joint angles at rest; default the operating point.
+    model : ``"nonlinear"``, or ``"linear"``: linearized at the start, exactly sampled, with
+        ripple and the torque path as they are (thesis section 8.1).
+    method, tolerance, substeps : integrator of the nonlinear model, e.g. ``"dopri5"`` with a
+        tolerance or ``"rk4"`` with sub-steps; all of them: :class:`axisight.simulation.Integrator`.
+
+    Returns
+    -------
+    Dataset with dims (time, axis) and (time, joint): ``torque_cmd_nm``,
+    ``position_rad`` (measured), ``motor_position_rad`` and
+    ``joint_position_rad`` (true), ``torque_disturbance_nm``,
+    ``position_disturbance_rad``. ``attrs["status"]`` is ``completed``,
+    ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either); the arrays
+    then end at the sample that failed. The attributes also count the effort. Raises InputError
+    for wrong shapes, non-finite input, unknown effects or a missing controller.
+
+    """
+    out = _simulated(
+        robot,
+        one_input(robot, velocity_ref_rad_s, torque_nm, dims=2),
+        [run],
+        effects=effects,
+        noise=noise,
+        noise_seed=noise_seed,
+        noise_cutoff_hz=noise_cutoff_hz,
+        resolution_rad=position_resolution_rad,
+        start_rad=start_rad,
+        model=model,
+        integrator=Integrator(method, tolerance, substeps),
+        threads=1,
+    )
+    at = out["stopped_at"][0]
+    attrs = {
+        "status": out["status"][0],
+        "stopped_at": -1 if at is None else at,
+        **{name: out[counter][0] for name, counter in _COUNTERS.items()},
+        "noise_seed": -1 if noise_seed is None else noise_seed,
+        "run": run,
+        "model": model,
+        "method": method,
+    }
+    seen = slice(None if at is None else at + 1)
+    return _dataset(robot, out, ("time",), (0, seen), attrs)
+
+
+def simulate_batch(
+    robot: Robot,
+    velocity_ref_rad_s: ArrayLike | None = None,
+    *,
+    torque_nm: ArrayLike | None = None,
+    effects: Iterable[Effect] = (),
+    noise_seed: int | None = None,
+    first_run: int = 0,
+    noise: ArrayLike | None = None,
+    noise_cutoff_hz: float | None = None,
+    position_resolution_rad: float = 0.0,
+    start_rad: Sequence[float] | None = None,
+    model: Model = "nonlinear",
+    method: Method = "dopri5",
+    tolerance: float = 1e-7,
+    substeps: int = 1,
+    threads: int = 0,
+) -> xr.Dataset:
+    """Simulate many runs of one robot: eight in lock-step per thread.
+
+    With fixed steps and with the linear model a run has the bits it has alone; with
+    an error-controlled method the eight take the shortest step any of them needs, so a run
+    differs from itself alone by what the tolerance allows. Implicit methods run one by one.
+
+    Parameters
+    ----------
+    robot : the robot; effects its preset models take part.
+    velocity_ref_rad_s : (n_runs, n, n_axes), motor-side references; or
+    torque_nm : (n_runs, n, n_axes), commanded motor torques. Give exactly one.
+    noise_seed, first_run : the noise of run ``i`` is that of ``run=first_run + i``.
+    noise : (n_runs, n, n_axes) position noise [rad] instead of a seeded one.
+    threads : 0 takes every core. The result does not depend on it.
+    effects, noise_cutoff_hz, position_resolution_rad, start_rad, model, method, tolerance,
+    substeps : as in :func:`simulate`, the same for all runs.
+
+    Returns
+    -------
+    Dataset with the variables of :func:`simulate` and a first dimension ``run``, and
+    ``status`` and ``stopped_at`` (run). Runs that failed are NaN from the sample after the
+    one that failed, and spoil no other. Raises InputError as :func:`simulate`.
+
+    """
+    drive = one_input(robot, velocity_ref_rad_s, torque_nm, dims=3)
+    runs = range(first_run, first_run + len(drive[0]))
+    out = _simulated(
+        robot,
+        drive,
+        runs,
+        effects=effects,
+        noise=noise,
+        noise_seed=noise_seed,
+        noise_cutoff_hz=noise_cutoff_hz,
+        resolution_rad=position_resolution_rad,
+        start_rad=start_rad,
+        model=model,
+        integrator=Integrator(method, tolerance, substeps),
+        threads=threads,
+    )
+    attrs = {
+        "noise_seed": -1 if noise_seed is None else noise_seed,
+        "model": model,
+        "method": method,
+    }
+    result = _dataset(robot, out, ("run", "time"), (), attrs)
+    stopped = [-1 if at is None else at for at in out["stopped_at"]]
+    return result.assign_coords(run=np.array(runs)).assign(
+        status=("run", np.array(out["status"])),
+        stopped_at=("run", np.array(stopped)),
+        right_hand_sides=("run", np.array(out["evaluations"])),
+    )
+
+
+def _simulated(
+    robot: Robot,
+    drive: tuple[Array, bool],
+    runs: Sequence[int],
+    *,
+    effects: Iterable[Effect],
+    noise: ArrayLike | None,
+    noise_seed: int | None,
+    noise_cutoff_hz: float | None,
+    resolution_rad: float,
+    start_rad: Sequence[float] | None,
+    model: Model,
+    integrator: Integrator,
+    threads: int,
+) -> _core.BatchOutput:
+    """Simulate ``runs``, whose numbers rule the noise; ``drive`` as `one_input` gives it.
+
+    The input of a single run may lack the dimension of runs, and so the noise given.
+    """
+    data, reference = drive
+    error = given_noise(robot, noise, data.shape, noise_seed, noise_cutoff_hz)
+    shape = (len(runs), *data.shape[-2:])
+    if noise_seed is not None:
+        error = np.empty(shape)
+        for row, run in zip(error, runs, strict=True):
+            row[:] = sensor_noise(robot, noise_seed, run, shape[1], noise_cutoff_hz)
+    if threads < 0:
+        raise InputError(f"threads: expected 0 (all cores) or more, got {threads}")
+    return _core.simulate_batch(
+        robot.core,
+        core_effects([*robot.effects, *effects]),
+        data.reshape(shape),
+        reference=reference,
+        integrator=integrator,
+        noise=None if error is None else error.reshape(shape),
+        start=start_angles(robot, start_rad),
+        model=model,
+        resolution=resolution_rad,
+        threads=threads,
+    )
+
+
+_Counter = Literal[
+    "evaluations", "steps", "rejections", "jacobians", "factorizations", "implicit_samples"
+]
+# What a run cost: names of attributes, and of the compiled core.
+_COUNTERS: dict[str, _Counter] = {
+    "right_hand_sides": "evaluations",
+    "steps": "steps",
+    "rejected_steps": "rejections",
+    "jacobians": "jacobians",
+    "factorizations": "factorizations",
+    "implicit_samples": "implicit_samples",
+}
+_UNITS = {"nm": "Nm", "rad": "rad"}
+_PER_AXIS: tuple[
+    Literal[
+        "torque_cmd_nm",
+        "position_rad",
+        "motor_position_rad",
+        "torque_disturbance_nm",
+        "position_disturbance_rad",
+    ],
+    ...,
+] = (
+    "torque_cmd_nm",
+    "position_rad",
+    "motor_position_rad",
+    "torque_disturbance_nm",
+    "position_disturbance_rad",
+)
+
+
+@cache
+def _version() -> str:
+    """Looking it up takes as long as a short run."""
+    return version("axisight")
+
+
+def _dataset(
+    robot: Robot,
+    out: _core.BatchOutput,
+    dims: tuple[str, ...],
+    part: tuple[int | slice, ...],
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    """Return the signals, those of ``part`` of runs and samples."""
+    variables = {
+        name: ((*dims, "axis"), out[name][part], {"units": _UNITS[name.rsplit("_", 1)[1]]})
+        for name in _PER_AXIS
+    }
+    joint = (*dims, "joint"), out["joint_position_rad"][part], {"units": "rad"}
+    n = joint[1].shape[-2]
+    return xr.Dataset(
+        {**variables, "joint_position_rad": joint},
+        coords={
+            "time": ("time", np.arange(n) * robot.sample_time_s, {"units": "s"}),
+            "axis": robot.axis_numbers(),
+            "joint": robot.joint_names,
+        },
+        attrs={"robot": robot.name, **attrs, "axisight_version": _version()},
+    )

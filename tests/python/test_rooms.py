@@ -1,0 +1,84 @@
+"""The borders of the package's rooms: few loose files, no circles, one way to the compiled robot."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from axisight import _core
+
+# What every room uses; the rest belongs to one.
+LOOSE = {
+    "__init__.py",
+    "_core.pyi",
+    "arguments.py",
+    "effects.py",
+    "errors.py",
+    "palette.py",
+    "storage.py",
+}
+# Names on other compiled results too, which may be asked for them.
+SHARED = {"jacobian"}
+
+
+@pytest.fixture(scope="module")
+def modules(repository: Path) -> dict[str, Path]:
+    """Modules of both packages by dotted name."""
+    found = {}
+    for root in (repository / "python", repository / "thesis"):
+        for path in root.rglob("*.py"):
+            parts = path.relative_to(root).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(path: Path, modules: dict[str, Path]) -> set[str]:
+    """Modules that a file names in its imports, wherever they stand in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in modules else node.module for name in inner}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found & modules.keys()
+
+
+def room(module: str) -> str:
+    return ".".join(module.split(".")[:2])
+
+
+def test_few_files_are_loose(repository: Path) -> None:
+    top = (repository / "python" / "axisight").iterdir()
+    loose = {p.name for p in top if p.suffix in {".py", ".pyi"}}
+    assert loose <= LOOSE, "a new file belongs to a room, or to this list with a reason"
+
+
+def test_modules_and_rooms_have_no_circles(modules: dict[str, Path]) -> None:
+    # The package itself names everything, for its users; nothing else stands on it.
+    graph = {m: imports(p, modules) - {m, "axisight"} for m, p in modules.items()}
+    TopologicalSorter(graph).prepare()  # raises CycleError, which lists the circle
+    rooms: dict[str, set[str]] = {}
+    for module, used in graph.items():
+        if module not in {"axisight", "axisight_thesis"}:
+            rooms.setdefault(room(module), set()).update(map(room, used - {room(module)}))
+    for name, used in rooms.items():
+        used.discard(name)
+    TopologicalSorter(rooms).prepare()
+
+
+def test_package_stands_without_the_study(modules: dict[str, Path]) -> None:
+    users = {m for m, p in modules.items() if "axisight_thesis" in imports(p, modules)}
+    assert {m for m in users if not m.startswith("axisight_thesis")} == {"axisight.cli.reproduce"}
+
+
+def test_only_its_room_looks_into_the_compiled_robot(modules: dict[str, Path]) -> None:
+    names = {n for n in dir(_core.Robot) if not n.startswith("_")} - SHARED
+    for module, path in modules.items():
+        if room(module) == "axisight.robot":
+            continue
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            inside = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute)
+            if inside and node.value.attr == "core":
+                assert node.attr not in names, f"{path}:{node.lineno}: ask the Robot"
