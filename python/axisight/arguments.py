@@ -201,3 +201,25 @@ def lines_below(field: str, value: object, n_samples: int) -> Lines:
     if np.any(np.diff(lines) <= 0):
         raise InputError(f"{field}: expected ascending lines without repetition")
     return lines
+
+
+def series_pair(first: str, a: object, second: str, b: object) -> tuple[Real, Real]:
+    """Return two series of finite real numbers of one length, (n,) each, by their field names."""
+    found = []
+    for field, value in ((first, a), (second, b)):
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf" or array.ndim != 1 or not array.size:
+            raise InputError(
+                f"{field}: expected real numbers of shape (n,), got {array.dtype} of {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            at = int(np.argmax(~np.isfinite(array)))
+            raise InputError(
+                f"{field}: expected finite numbers, got {array[at]} at sample {at + 1}"
+            )
+        found.append(array.astype(np.float64))
+    if len(found[0]) != len(found[1]):
+        raise InputError(
+            f"{second}: expected {len(found[0])} samples as {first}, got {len(found[1])}"
+        )
+    return found[0], found[1]

@@ -149,6 +149,33 @@ def test_exact_responses_come_back(step: float | None) -> None:
     assert (least.to_scipy().dt or None) == step
 
 
+@pytest.mark.parametrize("step", [None, 0.004])
+def test_zeros_are_where_the_element_is_zero(step: float | None) -> None:
+    """Oracle: SciPy's filter design; two outputs and inputs that share their poles."""
+    poles = np.array([-1 + 40j, -3 + 90j, -0.5 + 15j])
+    zeros = np.array([[[-1, 30], [-2, 70], [-0.3, 10]], [[-2, 35], [-1, 80], [-1, 12]]])
+    zeros = zeros[..., 0] + 1j * zeros[..., 1]
+    poles, zeros = (np.concatenate([x, x.conj()], axis=-1) for x in (poles, zeros))
+    s = 2j * np.pi * LINES
+    if step is not None:
+        poles, zeros, s = (np.exp(step * x) for x in (poles, zeros, s))
+    gain = np.array([[1.0, -2.0], [3.0, 0.5]])
+    g = np.empty((len(s), 2, 2), complex)
+    for i, j in np.ndindex(2, 2):
+        top, bottom = gain[i, j] * np.poly(zeros[(i + j) % 2]).real, np.poly(poles).real
+        _, g[:, i, j] = (
+            signal.freqs(top, bottom, s.imag)
+            if step is None
+            else signal.freqz(top, bottom, np.angle(s))
+        )
+    response = frequency_response(LINES, g, estimator="t")
+    model = fit_rational(response, 6, direct=True, weighting="relative", sample_time_s=step)
+    for i, j in np.ndindex(2, 2):
+        found = model.zeros(i + 1, j + 1)
+        for zero in zeros[(i + j) % 2]:
+            assert np.min(np.abs(found - zero)) < 1e-6 * abs(zero)
+
+
 def test_poles_are_those_of_adaptive_antoulas_anderson() -> None:
     """SciPy's AAA, one element at a time, as an independent rational fit; a direct term."""
     s = 2j * np.pi * LINES
@@ -408,6 +435,10 @@ def test_residuals_show_the_bias_of_an_estimate() -> None:
         (lambda r: realize(fit_rational(r, 2), rank=0), "rank"),
         (lambda r: realize(fit_rational(r, 2), rank_tolerance=2.0), "rank_tolerance"),
         (lambda r: fit_rational(r, 2).residual_tests(200), "lags"),
+        (lambda r: fit_rational(r, 2).zeros(), "zeros: expected a model with a direct term"),
+        (lambda r: fit_rational(r, 2, direct=True, integrators=1).zeros(), "got 1 integrators"),
+        (lambda r: fit_rational(r, 2, direct=True).zeros(3), "output: expected at most"),
+        (lambda r: fit_rational(r, 2, direct=True).zeros(1, 0), "input_: expected a whole"),
     ],
 )
 def test_misuse_is_named(call, words: str) -> None:

@@ -6,7 +6,14 @@ import pytest
 from scipy import signal
 
 import blackbox_data as known
-from axisight.blackbox import output_error, residual_tests, state_space, state_space_orders
+from axisight.blackbox import (
+    _propagation,
+    output_error,
+    residual_tests,
+    state_space,
+    state_space_orders,
+    subspace,
+)
 from axisight.blackbox.output_error import _Problem
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
@@ -109,6 +116,53 @@ def test_skipped_samples_are_not_compared() -> None:
     spoilt[:30] += 5.0
     model = output_error(Experiment(known.T, e.input, spoilt), nf=2, nb=2, skip=30)
     np.testing.assert_allclose(model.values, TRUTH, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7])
+@pytest.mark.parametrize("samples", [0, 1, 37])
+def test_states_are_those_of_the_recursion(n: int, samples: int, monkeypatch) -> None:
+    """Oracle: one sample after the other; in one block, and in blocks of ten samples or fewer."""
+    rng = np.random.default_rng([n, samples])
+    a, start = rng.normal(size=(n, n)) / max(n, 1) ** 0.5, rng.normal(size=(n, 3))
+    drive = rng.normal(size=(samples, n, 3))
+    wanted = [start]
+    for push in drive:
+        wanted.append(a @ wanted[-1] + push)
+    # Rounding of some 40 sums of 7 products, on values that grow to the largest.
+    bound = 1e-13 * max(np.abs(x).max(initial=1.0) for x in wanted)
+    for numbers in (_propagation.BAND_NUMBERS, 2 * n * n * 10):
+        monkeypatch.setattr(_propagation, "BAND_NUMBERS", numbers)
+        found = _propagation.states(a, drive, start)
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=bound)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_input_matrices_do_not_depend_on_blocks(direct: bool, monkeypatch) -> None:
+    """Oracle: B and D by the responses of python-control's simulation to every unit entry."""
+    a, b, c = known.modal_system()
+    e = known.modal_experiment(400, 0.1, 1)
+    past = subspace._triangle([e, e], 10)
+    u, y = e.input / past.input_scale, e.output / past.output_scale
+    columns = [
+        control.initial_response(control.ss(a, b, c, 0, True), np.arange(400), x).outputs
+        for x in np.eye(4)
+    ]
+    for j in range(2):
+        for k in range(4):
+            one = np.zeros((4, 2))
+            one[k, j] = 1.0
+            plant = control.ss(a, one, c, 0, True)
+            columns.append(control.forced_response(plant, np.arange(400), u.T).outputs)
+    if direct:
+        columns += [np.outer(np.eye(2)[i], u[:, j]) for j in range(2) for i in range(2)]
+    matrix = np.stack([np.asarray(x).T.ravel() for x in columns], axis=1)
+    theta = np.linalg.lstsq(matrix, y.ravel())[0][4:]
+    for numbers in (subspace.STATE_NUMBERS, 1000):
+        monkeypatch.setattr(subspace, "STATE_NUMBERS", numbers)
+        found_b, found_d = subspace._input_matrices(a, c, [e, e], past, direct)
+        np.testing.assert_allclose(found_b, theta[:8].reshape(2, 4).T, rtol=0, atol=1e-12)
+        wanted = theta[8:].reshape(2, 2).T if direct else np.zeros((2, 2))
+        np.testing.assert_allclose(found_d, wanted, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["moesp", "pbsid"])

@@ -13,11 +13,13 @@ from axisight.calibration import (
     Positions,
     SamePoint,
     calibrate,
+    identify,
     nominal_geometry,
 )
 from axisight.calibration.geometry import GROUPS
-from axisight.calibration.measurements import load_torque
+from axisight.calibration.measurements import check, load_torque
 from axisight.errors import InputError
+from axisight.statistics.evaluation import last_value
 from calibration_data import LOADS, arm, configurations, measured, nominal, truth
 
 NOISE_M = 5e-5
@@ -310,6 +312,27 @@ def test_an_iteration_that_is_cut_short_says_so(robot):
     found = calibrate(robot, data, nominal=nominal(robot), loads=LOADS, max_iterations=1, folds=0)
     assert found.status == "max_iterations"
     assert "more iterations" in found.advice
+
+
+def test_a_search_that_finds_no_way_down_says_so(robot, monkeypatch):
+    """With derivatives of the wrong sign every step goes uphill."""
+    errors, theta, data = noisy(robot, 0, groups=PARTS)
+    checked = check(data, robot, LOADS, "data")
+    problem = identify._Problem(errors, [checked], identify._scales(errors, [checked]), 200)
+    assert problem._search(0.1 * theta, 200).status == "converged"
+    true = problem.residual
+    monkeypatch.setattr(problem, "residual", lambda at: (true(at)[0], -true(at)[1]))
+    found = problem._search(0.1 * theta, 200)
+    assert found.status == "stalled" and 0 < found.iterations < 200
+    np.testing.assert_array_equal(found.theta, problem._search(0.1 * theta, 1).theta)
+
+
+def test_a_model_is_evaluated_once_at_a_place():
+    calls = []
+    square = last_value(lambda x: calls.append(x.copy()) or x @ x)
+    one, two = np.array([1.0, 2.0]), np.array([3.0, 0.0])
+    assert [square(x) for x in (one, one.copy(), two, two, one)] == [5.0, 5.0, 9.0, 9.0, 5.0]
+    assert [c.tolist() for c in calls] == [[1, 2], [3, 0], [1, 2]]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import xarray as xr
 
 from axisight.errors import InputError
 from axisight.frf import frequency_response
-from axisight.graybox.chain_fit import fit_chain
+from axisight.graybox.chain_fit import _start, fit_chain
 from axisight.graybox.collocated import Collocated, collocated, sandwich, standard_errors
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 from axisight.robot import load_robot
@@ -229,6 +229,18 @@ def test_fit_is_unbiased_and_its_intervals_hold(relative: float, periods: int | 
     assert np.abs(z.mean(axis=0)).max() < 0.45
     # Coverage 95 %; 60 runs of some four independent parameters: 1.4 %, three of these.
     assert 0.905 < np.mean(np.abs(z) < 1.96) < 0.99
+
+
+def test_friction_leaves_the_start_its_pairs() -> None:
+    """Friction is a real pole: without one of its own it took a pair of a weak mode."""
+    for run in (1, 3, 5):
+        true = chain(4, np.random.default_rng([4, run]))
+        data = collocated(rubbed_response(true, 0.003, np.random.default_rng(run)))
+        findings: list[str] = []
+        start = _start(data, 3, RATIO, findings)
+        assert not findings
+        np.testing.assert_allclose(start.poles_rad_s, true.poles_rad_s, rtol=0.01)
+        np.testing.assert_allclose(start.zeros_rad_s, true.zeros_rad_s, rtol=0.01)
 
 
 def test_a_variance_of_few_periods_is_pooled_relative_to_the_model() -> None:

@@ -3,6 +3,8 @@
 import json
 import re
 import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,8 +25,9 @@ from axisight.robot_file import (
     load_identified,
     write_identified,
 )
+from axisight.robot_file import text as text_module
 from axisight.robot_file.document import render
-from axisight.robot_file.toml_spans import value_spans
+from axisight.robot_file.text import edited
 from axisight.simulation import simulate
 
 WHEN = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
@@ -98,16 +101,79 @@ def test_unusual_toml_is_edited_in_place(text: str, tmp_path: Path) -> None:
     assert before == after
 
 
-def test_spans_are_the_values_of_the_document() -> None:
-    spans = value_spans(ODD)
-    document = tomllib.loads(ODD)
-    for path, span in spans.items():
-        node = document
-        for part in path:
-            node = node[part]
-        assert tomllib.loads(f"x = {ODD[span.start : span.end]}")["x"] == node, path
-    assert ("joint", 0, "link", "inertia", 2) in spans
-    assert ODD[spans["gravity", 2].line :].startswith("gravity")
+APART = """\
+a.b = [1,2, # two
+ 3]
+[x.y]
+  v = 1e3
+[z]
+t = {"u.w" = {k = [ {m = 1}, { m = 2 } ] } }
+[x.w]
+v=2 # last
+[[n]]
+[[n.o]]
+v = 1
+[[n.o]]
+v = 0x1F
+"""
+
+
+def numbers(node: object, place: tuple[str | int, ...] = ()) -> dict[tuple[str | int, ...], float]:
+    """All numbers of a document by their places."""
+    if isinstance(node, int | float):
+        return {place: float(node)}
+    pairs = node.items() if isinstance(node, dict) else enumerate(node)
+    parts = [numbers(x, (*place, key)) for key, x in pairs if not isinstance(x, str)]
+    return {key: value for part in parts for key, value in part.items()}
+
+
+def parsed(lines: list[str], first: int) -> Iterator[dict[str, object]]:
+    """What the document says up to each end of a statement from line ``first`` on."""
+    for end in range(first + 1, len(lines) + 1):
+        with suppress(tomllib.TOMLDecodeError):
+            yield tomllib.loads("".join(lines[:end]))
+
+
+@pytest.mark.parametrize("text", [ODD, APART, ODD.replace("\n", "\r\n"), APART.rstrip()])
+def test_any_number_is_replaced_alone(text: str) -> None:
+    """Every number in turn: the document says the new one, and no other character is another."""
+    before = numbers(tomllib.loads(text))
+    assert edited(text, before, {}) == text and len(before) > 8
+    for place in before:
+        new = edited(text, {place: -12.5}, {place: ["# one", "# two"]})
+        assert numbers(tomllib.loads(new)) == before | {place: -12.5}
+        lines, was = new.splitlines(keepends=True), text.splitlines(keepends=True)
+        first = next(k for k, line in enumerate(lines) if line.strip() == "# one")
+        lead = re.match("[ \t]*", was[first]).group()
+        assert lines[first : first + 2] == [f"{lead}# one\n", f"{lead}# two\n"]
+        # It is the next whole statement that holds the place.
+        assert place not in numbers(tomllib.loads("".join(lines[:first])))
+        assert place in numbers(next(parsed(lines, first + 2)))
+        other = "".join(lines[:first] + lines[first + 2 :])
+        start = other.index("-12.5")
+        old = text[start : len(text) - len(other) + start + 5]
+        assert text == other.replace("-12.5", old) and float(eval(old)) == before[place]
+
+
+def test_the_sign_of_zero_counts() -> None:
+    zero = ("joint", 0, "link", "com", 2)
+    assert edited(ODD, {zero: -0.0}, {}) == ODD
+    assert edited(ODD, {zero: 0.0}, {}) == ODD.replace("1e-3, -0.0", "1e-3, 0.0")
+
+
+def test_comments_of_one_statement_stand_together() -> None:
+    link = ("joint", 0, "link")
+    places = {(*link, "inertia", 4): ["# xz"], (*link, "mass"): ["# m"], (*link, "com"): ["# c"]}
+    assert edited(ODD, {}, places) == ODD.replace("link = {", "# xz\n# m\n# c\nlink = {")
+
+
+def test_text_that_cannot_be_kept_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(RobotError, match="source: expected TOML"):
+        edited("a = ", {}, {})
+    whole = text_module.tomlkit.parse
+    monkeypatch.setattr(text_module.tomlkit, "parse", lambda text: whole(text + "# more"))
+    with pytest.raises(RobotError, match="source: its text cannot be kept"):
+        edited(ODD, {}, {})
 
 
 NUMBER = st.floats(1e-6, 1e9, allow_nan=False)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
+
+from axisight.statistics.intervals import student_factor
 
 PROBABILITY = 0.95
 
@@ -41,5 +42,5 @@ def _interval(values: ArrayLike) -> tuple[float, float]:
     count = len(array)
     if count < 2:
         return float(array.mean()), float("inf")
-    width = float(scipy.stats.t.ppf((1 + PROBABILITY) / 2, count - 1))
+    width = float(student_factor(PROBABILITY, count - 1))
     return float(array.mean()), width * float(array.std(ddof=1)) / float(np.sqrt(count))

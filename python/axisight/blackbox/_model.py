@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy import signal
 
 from axisight.blackbox._data import Complex, Real, lines
+from axisight.blackbox._propagation import states
 from axisight.errors import InputError, MissingExtraError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
@@ -177,9 +178,5 @@ def control_module() -> Any:
 
 
 def _run(a: Real, b: Real, c: Real, d: Real, u: Real, x: Real) -> Real:
-    drive = u @ b.T
-    states = np.empty((len(u), len(a)))
-    for t, push in enumerate(drive):
-        states[t] = x
-        x = a @ x + push
-    return np.asarray(states @ c.T + u @ d.T)
+    found = states(a, (u @ b.T)[:, :, None], x[:, None])[:-1, :, 0]
+    return np.asarray(found @ c.T + u @ d.T)

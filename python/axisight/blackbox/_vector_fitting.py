@@ -12,11 +12,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from axisight.blackbox._data import Complex, Real
+from axisight.blackbox._data import Complex
 from axisight.blackbox._sections import Domain, Sections, Weighted
+from axisight.statistics.least_squares import scaled_solution
 
 SMALL_CONSTANT = 1e-8
 """A smaller d would throw the zeros of sigma to infinity."""
+
+ROUNDING = 1e-14
+"""Share of the largest singular value below which a direction is rounding."""
+
+NO_RATE = 1e-12
+"""Size of a pole that is at zero but for rounding."""
 
 
 def relocated(problem: Weighted, sections: Sections) -> Complex:
@@ -36,16 +43,10 @@ def relocated(problem: Weighted, sections: Sections) -> Complex:
     constraint = weight * np.concatenate([basis.real.sum(axis=0), [len(x)]])
     target = np.zeros(len(stacked) + 1)
     target[-1] = weight * len(x)
-    theta = _solved(np.vstack([stacked, constraint]), target)
+    theta = scaled_solution(np.vstack([stacked, constraint]), target, ROUNDING)
     if abs(theta[n]) < SMALL_CONSTANT:
-        theta = np.append(_solved(stacked[:, :n], -stacked[:, n]), 1.0)
+        theta = np.append(scaled_solution(stacked[:, :n], -stacked[:, n], ROUNDING), 1.0)
     return sections.zeros(theta[:n], float(theta[n]))
-
-
-def _solved(matrix: Real, target: Real) -> Real:
-    size = np.linalg.norm(matrix, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.lstsq(matrix / size, target, rcond=1e-14)[0] / size)
 
 
 def fitted(
@@ -78,5 +79,7 @@ def _conjugate(poles: Complex) -> Complex:
 
 
 def _moved(old: Complex, new: Complex) -> float:
-    distance = np.abs(old[:, None] - new[None, :]) / np.abs(new)[None, :]
+    # The band lies about one: a pole that is this much slower is one at zero.
+    size = np.maximum(np.abs(new), NO_RATE)
+    distance = np.abs(old[:, None] - new[None, :]) / size[None, :]
     return float(np.max(np.min(distance, axis=0)))

@@ -34,6 +34,7 @@ from axisight.blackbox._model import StateSpaceModel, expect_experiment
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
+from axisight.statistics.least_squares import unit_columns
 
 CHUNK = 8192
 """Rows of the regressor that are triangularized at a time."""
@@ -346,12 +347,10 @@ def _name(output: int, kind: str, channel: int, lag: int) -> str:
 
 def _inverse(regressor: Real, n_rows: int, output: int) -> tuple[Real, float]:
     """Return the pseudo-inverse of a triangle's columns and their scaled condition number."""
-    size = np.linalg.norm(regressor, axis=0)
-    silent = size == 0
-    scaled = regressor / np.where(silent, 1.0, size)
+    scaled, size = unit_columns(regressor)
     u, s, vt = np.linalg.svd(scaled, full_matrices=False)
     rank = int(np.sum(s > n_rows * np.finfo(float).eps * s[0])) if s.size else 0
-    if silent.any() or rank < len(s):
+    if rank < len(s):
         raise InputError(
             f"experiments: the regressors of output {output + 1} have rank {rank} of {len(s)}: an "
             "input does not excite this order, or noise-free data are of a lower one; lower "

@@ -37,6 +37,7 @@ from axisight.blackbox._model import StateSpaceModel
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
+from axisight.statistics.least_squares import inverse_root, scaled_solution
 
 START_ROUNDS = 20
 """Refits of the start; it has settled or wanders by then."""
@@ -359,11 +360,9 @@ def _equation_error(problem: _Problem, inputs: list[Real], outputs: list[Real]) 
 def _least_squares(matrix: Real, target: Real) -> Real:
     # The triangle first: its singular values are those of the tall matrix, at a tenth of the cost.
     (r,) = linalg.qr(np.column_stack([matrix, target]), mode="r", check_finite=False)
-    r, width = r[: matrix.shape[1] + 1], matrix.shape[1]
-    size = np.linalg.norm(r[:, :width], axis=0)
-    size = np.where(size > 0, size, 1.0)
-    solution = np.linalg.lstsq(r[:, :width] / size, r[:, width], rcond=EXACT)[0]
-    return np.asarray(solution / size)
+    width = matrix.shape[1]
+    triangle = np.asarray(r[: width + 1], np.float64)
+    return scaled_solution(triangle[:, :width], triangle[:, width], EXACT)
 
 
 def _pulses(problem: _Problem, order: int) -> list[_Problem]:
@@ -415,10 +414,8 @@ def _model(
         status = ended
         jacobian = problem.jacobian(theta)
         variance = float(np.sum(problem.residual(theta) ** 2) / (rows - len(theta)))
-        size = np.linalg.norm(jacobian, axis=0)
-        _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-        full = bool(size.min() > 0 and s[-1] > rows * np.finfo(float).eps * s[0])
-        if not full:
+        root = inverse_root(jacobian, rows * np.finfo(float).eps)
+        if root is None:
             status = "rank_deficient"
             warnings.append(
                 f"output {i + 1}: the data do not determine all parameters: lower nf and nb (poles "
@@ -426,7 +423,6 @@ def _model(
             )
             covariances.append(np.full((len(theta), len(theta)), np.nan))
         else:
-            root = vt.T / s / size[:, None]
             covariances.append(variance * root @ root.T)
         if status == "max_evaluations":
             warnings.append(f"output {i + 1}: stopped at the limit; allow more evaluations")

@@ -24,6 +24,8 @@ from axisight.blackbox._weights import UsableLines, Weighting, usable_lines
 from axisight.errors import AxisightError, InputError
 from axisight.frf.pooled import MISFIT_EXPLAINED, few_words
 from axisight.frf.response import DIMS, frequency_response
+from axisight.statistics.evaluation import last_value
+from axisight.statistics.least_squares import inverse_root
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,22 @@ class RationalModel:
     def stable(self) -> bool:
         """Whether all poles but the integrators are stable."""
         return self.domain.stable(self.sections.poles())
+
+    def zeros(self, output: int = 1, input_: int = 1) -> Complex:
+        """Return the zeros (n,) of element (``output``, ``input_``), from 1, as ``poles`` are given.
+
+        For models with a direct term and without integrators; raises InputError for others.
+        """
+        for name, value, most in (("output", output, self.n_out), ("input_", input_, self.n_in)):
+            if whole(name, value, 1) > most:
+                raise InputError(f"{name}: expected at most {most}, got {value}")
+        top = self.numerators[(output - 1) * self.n_in + input_ - 1]
+        if self.integrators or not self._direct or top[-1] == 0:
+            raise InputError(
+                "zeros: expected a model with a direct term and no integrators, got "
+                f"{self.integrators} integrators and the direct term {self.direct}"
+            )
+        return self.domain.natural(self.sections.zeros(top[: self.order], float(top[-1])))
 
     def modes(self) -> xr.Dataset:
         """Return the poles as modes, slowest first, with standard errors.
@@ -374,15 +392,7 @@ def _starts(
 def _searched(
     problem: Weighted, start: Sections, domain: Domain, stable: bool, limit: int
 ) -> tuple[Sections, int, bool]:
-    at: dict[bytes, Solved] = {}
-
-    def solved(vector: Real) -> Solved:
-        # Residual and Jacobian are asked for at the same place, one after the other.
-        key = vector.tobytes()
-        if key not in at:
-            at.clear()
-            at[key] = problem.residues(Sections.of_vector(vector))
-        return at[key]
+    solved = last_value(lambda vector: problem.residues(Sections.of_vector(vector)))
 
     def residual(vector: Real) -> Real:
         sections = Sections.of_vector(vector)
@@ -496,12 +506,10 @@ def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Re
     if sections.order == 0:
         return np.zeros((0, 0)), []
     jacobian = projected_jacobian(problem, sections, problem.residues(sections))
-    size = np.linalg.norm(jacobian, axis=0)
-    _, s, vt = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-    if size.min() == 0 or s[-1] <= 1e-10 * s[0]:
+    root = inverse_root(jacobian, 1e-10)
+    if root is None:
         text = "the lines do not determine all poles: lower the order; standard errors are NaN"
         return np.full((sections.order,) * 2, np.nan), [text]
-    root = vt.T / s / size[:, None]
     scores = jacobian.T @ (scale * problem.row_spread.reshape(-1, 1) * jacobian)
     return root @ (root.T @ scores @ root) @ root.T, []
 

@@ -23,6 +23,7 @@ from axisight.blackbox._sections import Weighted
 from axisight.blackbox.rational import RationalModel
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
+from axisight.statistics.least_squares import scaled_solution
 
 ROUNDS = 50
 """Of fitting inputs and outputs in turn."""
@@ -232,13 +233,9 @@ def _weighted_solution(
         values = values - offset[:, None]
     rows = (weight[:, :, None] * columns).reshape(-1, columns.shape[2])
     target = (weight * values).ravel()
-    rows, target = (
-        np.concatenate([rows.real, rows.imag]),
-        np.concatenate([target.real, target.imag]),
+    return scaled_solution(
+        np.concatenate([rows.real, rows.imag]), np.concatenate([target.real, target.imag]), 1e-13
     )
-    size = np.linalg.norm(rows, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.lstsq(rows / size, target, rcond=1e-13)[0] / size)
 
 
 def _loss(problem: Weighted, g: Complex) -> float:

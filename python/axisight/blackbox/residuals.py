@@ -7,10 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy import fft, stats
+from scipy import stats
 
 from axisight.blackbox._data import Real, whole
 from axisight.errors import InputError
+from axisight.statistics.correlation import (
+    covariance_spread,
+    covariances,
+    joint_p_value,
+    whiteness_p_value,
+)
+
+LEAST_SPREAD = 1e-6
+"""Share of the largest variance of cross-covariances below which a direction carries no test."""
 
 
 @dataclass(frozen=True)
@@ -124,29 +133,27 @@ def residual_tests(
         if np.any(np.ptp(x, axis=0) == 0):
             raise InputError(f"{name}: expected channels that move, got a constant one")
     e, u = e - e.mean(axis=0), u - u.mean(axis=0)
-    r_e = np.stack([_covariance(x, x, most) for x in e.T])
-    r_u = np.stack([_covariance(x, x, 2 * most) for x in u.T])
+    r_e = np.stack([covariances(x, x, most) for x in e.T])
+    r_u = np.stack([covariances(x, x, 2 * most) for x in u.T])
     white = r_e / r_e[:, :1]
-    weight = n * (n + 2) / (n - np.arange(1, most + 1))
-    whiteness = stats.chi2.sf((white[:, 1:] ** 2 * weight).sum(axis=1), most)
     cross = np.empty((e.shape[1], u.shape[1], 2 * most + 1))
     bound, independence = np.empty(cross.shape[:2]), np.empty(cross.shape[:2])
     one_sided = stats.norm.ppf((1 + probability) / 2)
     for i, x in enumerate(e.T):
         for j, w in enumerate(u.T):
-            after, before = _covariance(x, w, most), _covariance(w, x, most)
+            after, before = covariances(x, w, most), covariances(w, x, most)
             both = np.concatenate([before[:0:-1], after])
-            spread = _spread(r_e[i], r_u[j], most) / n
+            spread = covariance_spread(r_e[i], r_u[j], most + 1) / n
             size = np.sqrt(r_e[i, 0] * r_u[j, 0])
             cross[i, j] = both / size
-            bound[i, j] = one_sided * np.sqrt(spread[0, 0]) / size
-            independence[i, j] = _independence(after, spread)
+            bound[i, j] = one_sided * np.sqrt(spread[0]) / size
+            independence[i, j] = joint_p_value(after, np.arange(most + 1), spread, LEAST_SPREAD)
     return ResidualTests(
         white,
         cross,
         float(one_sided / np.sqrt(n)),
         bound,
-        np.asarray(whiteness),
+        whiteness_p_value(white[:, 1:], n, short=True),
         independence,
         probability,
         n,
@@ -159,31 +166,3 @@ def _rows(name: str, value: ArrayLike) -> Real:
     if x.ndim != 2 or 0 in x.shape:
         raise InputError(f"{name}: expected shape (n,) or (n, channels), got {np.shape(value)}")
     return x
-
-
-def _covariance(x: Real, y: Real, lags: int) -> Real:
-    """Return ``(1/n) sum_t x(t) y(t - lag)`` for lags from 0."""
-    n = len(x)
-    size = fft.next_fast_len(n + lags)
-    product = fft.rfft(x, size) * np.conj(fft.rfft(y, size))
-    return np.asarray(fft.irfft(product, size)[: lags + 1] / n)
-
-
-def _spread(r_e: Real, r_u: Real, lags: int) -> Real:
-    """Return n times the covariance of the cross-covariances at lags 0 to ``lags``."""
-    # sum_k R_e(k) R_u(k + i - j): a Toeplitz matrix of the convolution of both.
-    e = np.concatenate([r_e[:0:-1], r_e])
-    u = np.concatenate([r_u[:0:-1], r_u])
-    both = np.convolve(e, u[::-1], mode="full")
-    middle = len(both) // 2
-    index = np.abs(np.subtract.outer(np.arange(lags + 1), np.arange(lags + 1)))
-    return np.asarray(both[middle + index])
-
-
-def _independence(cross: Real, covariance: Real) -> float:
-    # Periodic or smooth inputs make neighbouring lags nearly one: directions without spread
-    # of their own carry no test.
-    values, vectors = np.linalg.eigh(covariance)
-    kept = values > 1e-6 * values[-1]
-    statistic = float(np.sum((vectors[:, kept].T @ cross) ** 2 / values[kept]))
-    return float(stats.chi2.sf(statistic, int(kept.sum())))

@@ -27,11 +27,15 @@ from scipy import linalg
 
 from axisight.blackbox._data import Complex, Real, fit_percent, gathered, whole
 from axisight.blackbox._model import StateSpaceModel
+from axisight.blackbox._propagation import states
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
 
 CHUNK = 4096
 """Rows that are triangularized at a time."""
+
+STATE_NUMBERS = 1 << 22
+"""Numbers of simulated states that are kept at a time."""
 
 ROUNDING = 1e-9
 """Innovations below this share of the output are rounding, not noise."""
@@ -350,28 +354,39 @@ def _input_matrices(
         if largest > 1:
             length = int(min(length, max(4 * n, np.log(1e6) / np.log(largest))))
         r: Real = np.zeros((0, n + width + 1))
-        x: Real = np.eye(n, n + n * m)
-        push = np.zeros((m, n, n + n * m))
-        for j in range(m):
-            push[j][:, n + j * n : n + (j + 1) * n] = np.eye(n)
-        rows = []
-        for t in range(length):
-            block = np.zeros((p, n + width + 1))
-            block[:, : n + n * m] = c @ x
-            if direct:
-                block[:, n + n * m : -1] = np.kron(u[t], np.eye(p))
-            block[:, -1] = y[t]
-            rows.append(block)
-            x = np.asarray(a @ x + np.tensordot(u[t], push, axes=1))
-            if len(rows) == CHUNK or t == length - 1:
-                (low,) = linalg.qr(np.vstack([r, *rows]), mode="r", check_finite=False)
-                r, rows = np.asarray(low[: n + width + 1], np.float64), []
+        start = np.eye(n, n + n * m)
+        span = max(1, STATE_NUMBERS // start.size)
+        for first in range(0, length, span):
+            t = slice(first, min(first + span, length))
+            rows, start = _simulated_columns(a, c, u[t], y[t], start, direct)
+            (low,) = linalg.qr(np.vstack([r, rows]), mode="r", check_finite=False)
+            r = np.asarray(low[: n + width + 1], np.float64)
         factors.append(r[n:, n:])
     both = np.vstack(factors)
     theta = _solve(both[:, :-1], both[:, -1:])[:, 0]
     b = theta[: n * m].reshape(m, n).T
     d = theta[n * m :].reshape(m, p).T if direct else np.zeros((p, m))
     return b, d
+
+
+def _simulated_columns(
+    a: Real, c: Real, u: Real, y: Real, start: Real, direct: bool
+) -> tuple[Real, Real]:
+    """Return what each start, entry of B and entry of D makes of the output, then the output.
+
+    Rows are samples by outputs; ``start`` holds the state that each of the first two has made,
+    and is returned as it is after the last sample.
+    """
+    n, m, p = len(a), u.shape[1], y.shape[1]
+    drive = np.zeros((len(u), n, n + n * m))
+    # Entry (k, j) of B drives state k with input j.
+    drive[:, :, n:] = (u[:, None, :, None] * np.eye(n)[:, None, :]).reshape(len(u), n, m * n)
+    state = states(a, drive, start)
+    blocks = [c @ state[:-1]]
+    if direct:
+        blocks.append((u[:, None, :, None] * np.eye(p)[:, None, :]).reshape(len(u), p, m * p))
+    blocks.append(y[:, :, None])
+    return np.concatenate(blocks, axis=2).reshape(len(u) * p, -1), state[-1]
 
 
 def _solve(matrix: Real, target: Real) -> Real:

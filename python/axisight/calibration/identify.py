@@ -1,4 +1,4 @@
-"""Gauss-Newton identification of geometric and elastostatic errors, Wernholt (2004), (4.1)."""
+"""Identification of geometric and elastostatic errors, Wernholt (2004), (4.1)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -21,6 +22,7 @@ from axisight.calibration.geometry import (
 from axisight.calibration.measurements import Checked, Loads, Measurement, check
 from axisight.errors import InputError
 from axisight.robot import Robot
+from axisight.statistics.evaluation import last_value
 
 Status = Literal["converged", "max_iterations", "stalled"]
 
@@ -34,6 +36,12 @@ _NAMED = 0.01
 """Share of a typical error from which on a parameter is named in a combination."""
 _ROUNDING = 1e-9
 """A joint torque below this share of the largest is rounding: the load lies on the axis."""
+_STEP = 1e-9
+"""A step this small against the errors found is the last: rounding, or the end."""
+_FALL = 1e-14
+"""A loss that falls by this share no longer falls."""
+_LEFT = 1e-3
+"""Standard deviations of the residuals that a search may leave to be gained where it ends."""
 _ADVICE: dict[str, str] = {
     "converged": "",
     "max_iterations": "still moving: allow more iterations, or start from a better nominal geometry",
@@ -134,7 +142,7 @@ def calibrate(
     loads : what the joints hold; gravity on the links of the description by default.
     validation : measurements kept out of the fit, for the errors only.
     folds : parts of the cross-validation, drawn with ``seed``; 0 for none.
-    max_iterations : of Gauss-Newton.
+    max_iterations : steps that the search (Levenberg-Marquardt) may try.
 
     Directions that the measurements cannot see stay at their nominal values: those known no
     better, with the standard deviations given, than a typical error. The base frame
@@ -240,45 +248,48 @@ class _Problem:
         At a wrong geometry relative measurements seem to see what they do not, by as little as
         it is wrong.
         """
-        found = self._descend(np.zeros(len(self.scale)), self.max_iterations)
+        found = self._search(np.zeros(len(self.scale)), self.max_iterations)
         for _ in range(_LOOKS):
             left = self.max_iterations - found.iterations
             if found.status != "converged" or left < 1:
                 break
             before = self.rank
             self.look(found.theta)
-            kept = self.scale * (self.seen @ (self.seen.T @ (found.theta / self.scale)))
-            again = self._descend(kept, left)
+            again = self._search(found.theta, left)
             found = replace(again, iterations=found.iterations + again.iterations)
             if self.rank == before:
                 break
         return found
 
-    def _descend(self, theta: Array, iterations: int) -> _Found:
-        residual, jacobian = self.residual(theta)
+    def _search(self, theta: Array, iterations: int) -> _Found:
+        """Search over the directions seen, from what ``theta`` has of them."""
+        move = self.scale[:, None] * self.seen
+        both = last_value(lambda z: self.residual(move @ z))
+
+        def residual_at(z: Array) -> Array:
+            return both(z)[0]
+
+        def jacobian_at(z: Array) -> Array:
+            return np.asarray(both(z)[1] @ move)
+
+        ended = scipy.optimize.least_squares(
+            residual_at,
+            self.seen.T @ (theta / self.scale),
+            jacobian_at,
+            method="lm",
+            x_scale=1.0,
+            xtol=_STEP,
+            ftol=_FALL,
+            gtol=_FALL,
+            max_nfev=iterations + 1,
+        )
+        residual, jacobian = both(ended.x)
+        status: Status = "converged"
+        # Whatever ended the search: it is over where nothing is left to be gained.
+        if _promised(jacobian @ move, residual) > _LEFT:
+            status = "stalled" if ended.status > 0 else "max_iterations"
         loss = float(residual @ residual)
-        status: Status = "max_iterations"
-        count = 0
-        while count < iterations:
-            count += 1
-            reduced = (jacobian * self.scale) @ self.seen
-            step = np.linalg.lstsq(reduced, -residual, rcond=None)[0]
-            # Rounding of residuals of 1e3 standard deviations is below this.
-            small = np.abs(step).max() < 1e-9 * (1.0 + np.abs(theta / self.scale).max())
-            for _ in range(30):
-                trial = theta + self.scale * (self.seen @ step)
-                r, j = self.residual(trial)
-                if float(r @ r) <= loss * (1.0 + 1e-12) or small:
-                    break
-                step = 0.5 * step
-            else:
-                status = "stalled"
-                break
-            theta, residual, jacobian, loss = trial, r, j, float(r @ r)
-            if small:
-                status = "converged"
-                break
-        return _Found(theta, loss, jacobian, status, count)
+        return _Found(move @ ended.x, loss, jacobian, status, int(ended.nfev) - 1)
 
     def without(self, fold: NDArray[np.int64], k: int) -> tuple[_Problem, list[Checked]]:
         """The problem without fold ``k``, and what was left out."""
@@ -294,6 +305,13 @@ class _Problem:
                 if taken is not None and taken.rows:
                     part.append(taken)
         return _Problem(self.errors, inside, self.scale, self.max_iterations), outside
+
+
+def _promised(slope: Array, residual: Array) -> float:
+    """What a linear model says that is still to be gained, over the scatter of the residuals."""
+    fitted = slope @ np.linalg.lstsq(slope, residual, rcond=None)[0]
+    scatter = max(1.0, float(np.sqrt(np.mean(residual**2))))
+    return float(np.linalg.norm(fitted)) / scatter
 
 
 def _scales(errors: Errors, data: Sequence[Checked]) -> Array:

@@ -27,6 +27,7 @@ from axisight.frequency_fit.result import (
 from axisight.frequency_fit.trust import trust
 from axisight.identifiability import identifiability
 from axisight.robot import Robot
+from axisight.statistics.starts import StartRange, drawn_start
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -169,24 +170,27 @@ def _from_starts(
 ) -> list[_core.FrequencyFitResult]:
     """Search from all starting points; best first. A start where the model fails is passed."""
     found = [search(wanted)]
+    ranges = [_range(spec, options.start_spread) for spec in wanted]
     for number in range(1, options.starts):
-        draw = np.random.default_rng([options.seed, number]).uniform(-1, 1, len(wanted))
-        start = []
-        for spec, x in zip(wanted, draw, strict=True):
-            if spec.frozen:
-                start.append(spec)
-                continue
-            if spec.logarithmic:
-                moved = spec.initial * (1 + options.start_spread) ** x
-            else:
-                moved = spec.initial + options.start_spread * x * max(abs(spec.initial), 0.1)
-            start.append(replace(spec, initial=float(np.clip(moved, spec.lower, spec.upper))))
+        drawn = drawn_start([s.initial for s in wanted], ranges, options.seed, number)
+        start = [replace(s, initial=x) for s, x in zip(wanted, drawn, strict=True)]
         try:
             found.append(search(start))
         except InputError:
             # The first start has shown that the data is sound: the arm does not settle here.
             continue
     return sorted(found, key=lambda r: r.loss)
+
+
+def _range(spec: Spec, spread: float) -> StartRange | None:
+    """Return where starts of a parameter are drawn: about its initial value, None if frozen."""
+    if spec.frozen:
+        return None
+    bounds = (spec.lower, spec.upper)
+    if spec.logarithmic:
+        return StartRange(spec.initial / (1 + spread), spec.initial * (1 + spread), True, bounds)
+    reach = spread * max(abs(spec.initial), 0.1)
+    return StartRange(spec.initial - reach, spec.initial + reach, False, bounds)
 
 
 def _table(results: Sequence[_core.FrequencyFitResult]) -> pd.DataFrame:

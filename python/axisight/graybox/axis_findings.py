@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal, stats
+from scipy import signal, stats
 
 from axisight import _core
 from axisight.errors import InputError
 from axisight.graybox.axis_checks import label, motion, noise_std
 from axisight.graybox.axis_model import AxisData
 from axisight.graybox.axis_search import Point, Task, free_places, search
+from axisight.statistics.correlation import pooled_autocovariance
 
 Array = NDArray[np.float64]
 
@@ -114,14 +115,9 @@ def fit_findings(
     return [words] if low else []
 
 
-def _autocovariance(parts: Sequence[Array], lags: int) -> Array:
-    """Mean autocovariance of all parts about zero, normalized to one at lag zero."""
-    total = np.zeros(lags + 1)
-    for x in parts:
-        size = fft.next_fast_len(len(x) + lags, real=True)
-        power = np.abs(fft.rfft(x, size)) ** 2
-        kept = min(lags + 1, len(x))
-        total[:kept] += fft.irfft(power, size)[:kept]
+def _autocorrelation(parts: Sequence[Array], lags: int) -> Array:
+    """Mean autocorrelation of all parts about zero, one at lag zero."""
+    total = pooled_autocovariance(parts, lags)
     return np.asarray(total / total[0] if total[0] > 0 else total)
 
 
@@ -137,7 +133,7 @@ def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
     window, as it is for errors that slow derivatives average.
     """
     lags = min(_lags(d) for d in data)
-    rho = _autocovariance(residuals, lags)
+    rho = _autocorrelation(residuals, lags)
     weights = 1 - np.arange(1, lags + 1) / (lags + 1)
     return float(1 + 2 * weights @ rho[1:])
 
@@ -185,7 +181,7 @@ def covariance_findings(
     blocks, freedom = counts
     differenced = ""
     if task.model.output == "velocity_difference":
-        first = _autocovariance(residuals, 1)[1]
+        first = _autocorrelation(residuals, 1)[1]
         if first < -1 / 3:
             differenced = (
                 ". They look like differences of position noise (correlation "
@@ -292,7 +288,7 @@ def weight_findings(task: Task, residuals: Sequence[Array]) -> list[str]:
     power, freedom = [], []
     for record, x in zip(task.data, residuals, strict=True):
         power.append(record.weight * float(np.mean(x**2)))
-        rho = _autocovariance([x], _lags(record))
+        rho = _autocorrelation([x], _lags(record))
         # Squares of correlated errors count less.
         freedom.append(max(len(x) / (1 + 2 * float(rho[1:] @ rho[1:])), 2.0))
     small, large = int(np.argmin(power)), int(np.argmax(power))

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 
 from axisight import _core
 from axisight.blackbox import fit_percent
@@ -31,6 +30,7 @@ from axisight.graybox.axis_search import (
     free_run,
 )
 from axisight.graybox.normal_matrix import inverse_normal
+from axisight.statistics.intervals import student_interval
 
 Array = NDArray[np.float64]
 
@@ -139,16 +139,14 @@ class AxisFit:
         """
         if name not in self.free:
             raise InputError(f"name: expected one of {', '.join(self.free)}, got {name!r}")
-        if not 0 < level < 1:
-            raise InputError(f"level: expected a number between 0 and 1, got {level}")
         if kind not in ("trusted", "white", "sandwich"):
             raise InputError(f"kind: expected trusted, white or sandwich, got {kind!r}")
         chosen = self.trusted if kind == "trusted" else kind
         freedom = np.inf if chosen == "white" else self.sandwich_freedom
         i = self.free.index(name)
         variance = self._covariance(chosen)[i, i]
-        half = float(stats.t.ppf(0.5 + level / 2, freedom) * np.sqrt(variance))
-        return float(self.values[i]) - half, float(self.values[i]) + half
+        low, high = student_interval(self.values[i], np.sqrt(variance), freedom, level)
+        return float(low), float(high)
 
     def simulate(self, data: AxisData) -> Array:
         """Simulate the output of a record from its torque, without feedback of errors, (n,)."""

@@ -9,14 +9,15 @@ import scipy
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.blackbox.rational import fit_rational
 from axisight.errors import InputError
+from axisight.frf.response import frequency_response
 from axisight.graybox.collocated import Collocated, collocated, standard_errors
 from axisight.graybox.spring_masses import SpringMassChain, reconstruct_chain
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_ITERATIONS = 25
 _MOST_PASSES = 20
 _SETTLED = 1e-4
 _START_DAMPING = 0.03
@@ -80,9 +81,9 @@ def fit_chain(
 ) -> ChainFit:
     """Fit a chain of ``n_masses`` to a collocated response.
 
-    A rational function with real coefficients and n - 1 pairs of zeros and poles is fitted by
-    iterated linear least squares with relative weights (Sanathanan and Koerner 1963, IEEE TAC
-    8(1)). Its frequencies give a chain by the inverse eigenvalue problem
+    A rational function with n - 1 pairs of zeros and poles, and a real one for the friction of
+    the motor, is fitted with relative weights (:func:`axisight.blackbox.fit_rational`). Its
+    frequencies give a chain by the inverse eigenvalue problem
     (:func:`axisight.graybox.reconstruct_chain`), from which masses, springs, dampers, viscous
     friction and delay are fitted to the logarithm of the response, (3.44), with exact gradients:
     poles and zeros then alternate whatever the noise. If those of the rational function
@@ -122,19 +123,31 @@ def fit_chain(
 
 def _start(data: Collocated, pairs: int, ratio: float, findings: list[str]) -> SpringMassChain:
     """Chain of the poles and zeros of a rational fit, or of peaks and notches."""
-    try:
-        zeros, poles, gain = _rational(data, pairs)
-        if poles[0][-1] <= _BEYOND * data.angular_rad_s[-1]:
-            return _reconstruct(poles, zeros, 1 / gain, ratio)
-        why = "has a resonance beyond the band"
-    except InputError:
-        why = "has poles and zeros that do not alternate"
+    why, found = "", []
+    # Friction of the motor is one real pole more; in noise the fit may do better without.
+    for real in (1, 0):
+        try:
+            zeros, poles, gain = _rational(data, pairs, real)
+            if poles[0][-1] <= _BEYOND * data.angular_rad_s[-1]:
+                found.append(_reconstruct(poles, zeros, 1 / gain, ratio))
+            else:
+                why = "has a resonance beyond the band"
+        except InputError:
+            why = "has poles and zeros that do not alternate"
+    if found:
+        return min(found, key=lambda chain: _distance(data, chain))
     findings.append(f"the rational fit {why}; started from peaks and notches")
     peaks, notches = _peaks(data, pairs)
     damping = np.full(pairs, _START_DAMPING)
     above = np.abs(data.acceleration)[data.angular_rad_s > peaks[-1]]
     gain = float(np.median(above)) if len(above) else float(np.median(np.abs(data.acceleration)))
     return _reconstruct((peaks, damping), (notches, damping), 1 / gain, ratio)
+
+
+def _distance(data: Collocated, chain: SpringMassChain) -> float:
+    """What half of the lines are within, as a logarithm."""
+    model = chain.acceleration_response(data.frequency_hz)
+    return float(np.median(np.abs(np.log(model / data.acceleration))))
 
 
 def _reconstruct(
@@ -150,44 +163,30 @@ def _reconstruct(
     )
 
 
-def _rational(data: Collocated, pairs: int) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
-    """Zeros and poles (frequencies, damping ratios) and gain of a rational fit."""
-    scale = float(np.sqrt(data.angular_rad_s[0] * data.angular_rad_s[-1]))
-    s = 1j * data.angular_rad_s / scale
-    order = 2 * pairs
-    powers = np.vander(s, order + 1, increasing=True)
-    value = data.acceleration
-    weight = 1 / np.abs(value)
-    for _ in range(_ITERATIONS):
-        # N - G D = 0 with the leading coefficient of D one.
-        left = np.hstack([powers, -value[:, None] * powers[:, :-1]]) * weight[:, None]
-        right = value * powers[:, -1] * weight
-        rows = np.vstack([left.real, left.imag])
-        size = np.linalg.norm(rows, axis=0)
-        solution, _, _, _ = np.linalg.lstsq(
-            rows / size, np.concatenate([right.real, right.imag]), rcond=None
-        )
-        solution = solution / size
-        denominator = powers @ np.concatenate([solution[order + 1 :], [1.0]])
-        weight = 1 / np.abs(value * denominator)
-    numerator = solution[: order + 1]
-    pairs_of = [
-        _pairs(coefficients, scale, name)
-        for coefficients, name in (
-            (numerator, "zeros"),
-            (np.concatenate([solution[order + 1 :], [1.0]]), "poles"),
-        )
-    ]
-    if numerator[-1] <= 0:
+def _rational(
+    data: Collocated, pairs: int, real: int
+) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
+    """Zeros and poles in pairs (frequencies, damping ratios) and gain of a rational fit.
+
+    ``real`` is how many real ones there are beside.
+    """
+    response = frequency_response(
+        data.frequency_hz,
+        data.acceleration[:, None, None],
+        estimator="collocated",
+        output_unit="rad/s^2",
+    )
+    model = fit_rational(response, 2 * pairs + real, direct=True, weighting="relative")
+    gain = float(model.direct[0, 0])
+    if gain <= 0:
         raise InputError("response: expected a positive high-frequency gain")
-    return pairs_of[0], pairs_of[1], float(numerator[-1])
+    return _upper(model.zeros(), pairs, "zeros"), _upper(model.poles, pairs, "poles"), gain
 
 
-def _pairs(coefficients: Real, scale: float, name: str) -> tuple[Real, Real]:
-    roots = np.roots(coefficients[::-1]) * scale
+def _upper(roots: Complex, pairs: int, name: str) -> tuple[Real, Real]:
     upper = roots[roots.imag > 0]
-    if 2 * len(upper) != len(roots):
-        raise InputError(f"response: expected complex pairs of {name}, got {roots}")
+    if len(upper) != pairs:
+        raise InputError(f"response: expected {pairs} complex pairs of {name}, got {roots}")
     upper = upper[np.argsort(np.abs(upper))]
     return np.abs(upper), np.clip(-upper.real / np.abs(upper), 0.0, 1.0)
 

@@ -13,7 +13,8 @@ from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import neighbours_for, pooled_variance
 from axisight.frf.quantity import ORDER, quantity_of
 from axisight.frf.response import Flag
-from axisight.graybox.normal_matrix import pseudo_inverse
+from axisight.graybox.normal_matrix import pseudo_inverse, pseudo_root
+from axisight.statistics.cluster_scatter import ClusterScatter
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,10 +22,6 @@ Complex = NDArray[np.complex128]
 _FEWEST_LINES = 8
 # Relative error of a response up to which simple models are not told from it.
 _MODEL_FLOOR = 0.05
-# Share of a residual that the fit leaves, below which one line decides.
-_DECIDED = 1e-8
-# Share of the variance of a parameter that may be hidden.
-_MOST_HIDDEN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +158,8 @@ def sandwich(slope: Real, residual: Real) -> Real:
     ``slope`` (2 n, p) and ``residual`` (2 n,) hold the real parts of all n lines, then the
     imaginary ones; a line's two belong together. Right whatever the weights, which here are a
     compromise between noise and the errors of simple models. Each line's residuals are enlarged
-    by what the fit has taken from them (the correction CR2 of Bell and McCaffrey 2002): the few
-    lines of a notch decide much and would show too little.
+    by what the fit has taken from them (`ClusterScatter`): the few lines of a notch decide much and
+    would show too little.
 
     Parameters that the lines do not show have an infinite variance. Where a line alone decides a
     direction, its residuals are zero there and show no scatter; parameters that owe such
@@ -170,19 +167,9 @@ def sandwich(slope: Real, residual: Real) -> Real:
     """
     lines = len(residual) // 2
     rows = slope.reshape(2, lines, -1).swapaxes(0, 1)
-    inverse, _, blind = pseudo_inverse(slope.T @ slope)
-    share, vectors = np.linalg.eigh(rows @ inverse @ rows.swapaxes(1, 2))
-    left = 1 - share
-    shows = left > _DECIDED
-    grow = np.where(shows, 1 / np.sqrt(np.maximum(left, _DECIDED)), 0.0)
-    parts = residual.reshape(2, lines).T
-    enlarged = np.einsum("nij,nj,nkj,nk->ni", vectors, grow, vectors, parts)
-    change = np.einsum("nip,ni->np", rows, enlarged) @ inverse
-    covariance = np.asarray(change.T @ change)
-    # The inverse is the sum of these squares over all lines and directions.
-    pull = np.einsum("nji,njp->nip", vectors, rows) @ inverse
-    hidden = (np.where(shows[..., None], 0.0, pull) ** 2).sum(axis=(0, 1))
-    unknown = blind | (hidden > _MOST_HIDDEN * np.diag(inverse))
-    covariance[unknown], covariance[:, unknown] = np.nan, np.nan
+    root, _, blind = pseudo_root(slope.T @ slope)
+    scatter = ClusterScatter(root, rows @ root, residual.reshape(2, lines).T)
+    covariance = scatter.covariance.copy()
+    covariance[blind], covariance[:, blind] = np.nan, np.nan
     covariance[blind, blind] = np.inf
     return covariance

@@ -18,6 +18,7 @@ from axisight.graybox.axis_model import AxisData, AxisModel, number
 from axisight.graybox.axis_result import AxisFit, NoiseModel, conclude
 from axisight.graybox.axis_search import FitSettings, Point, Task, first_point, search_rounds
 from axisight.graybox.prediction_error import prepare
+from axisight.statistics.starts import StartRange, drawn_start
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,16 @@ def multistart_axis(
         free_gear_ratio=False,
         settings=chosen,
     )
-    limits = _limits(task, values, spread, ranges or {})
+    limits = _ranges(task, values, spread, ranges or {})
     token = _core.CancelToken()
-    starts = [_draw(task, values, limits, seed, i) for i in range(n_starts)]
+    middle = [values[name] for name in task.free_names]
+    starts = [
+        {
+            **values,
+            **dict(zip(task.free_names, drawn_start(middle, limits, seed, i), strict=True)),
+        }
+        for i in range(n_starts)
+    ]
 
     def one(begin: Mapping[str, float]) -> Point:
         point = first_point(task, begin)
@@ -124,12 +132,13 @@ def multistart_axis(
     )
 
 
-def _limits(
+def _ranges(
     task: Task,
     values: Mapping[str, float],
     spread: float,
     ranges: Mapping[str, tuple[float, float]],
-) -> dict[str, tuple[float, float]]:
+) -> list[StartRange | None]:
+    """Return where the free parameters are drawn; None for those that start at zero."""
     unknown = sorted(set(ranges) - set(task.free_names))
     if unknown:
         raise InputError(
@@ -143,26 +152,10 @@ def _limits(
                 f"ranges: {name}: expected two ascending numbers of one sign, got {low}, {high}"
             )
         out[name] = (float(low), float(high))
-    return out
-
-
-def _draw(
-    task: Task,
-    values: Mapping[str, float],
-    limits: Mapping[str, tuple[float, float]],
-    seed: int,
-    run: int,
-) -> dict[str, float]:
-    """Return all parameters of one start."""
-    random = np.random.default_rng([seed, run])
-    out = dict(values)
-    for name in task.free_names:
-        share = random.random()
-        if name in limits:
-            low, high = limits[name]
-            drawn = low * (high / low) ** share
-            out[name] = float(np.clip(drawn, *task.bounds[name]))
-    return out
+    return [
+        StartRange(*out[name], True, task.bounds[name]) if name in out else None
+        for name in task.free_names
+    ]
 
 
 def _table(task: Task, starts: Sequence[Mapping[str, float]], ends: Sequence[Point]) -> xr.Dataset:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
+from axisight.statistics.correlation import pooled_autocovariance
+
 Array = NDArray[np.float64]
 
 
@@ -20,10 +22,7 @@ def estimate_filter(parts: Sequence[Array], order: int | None, most: int) -> Arr
     """
     count = sum(len(p) for p in parts)
     most = min(most if order is None else order, min(len(p) for p in parts) - 1, count // 10)
-    covariance = np.array(
-        [sum(float(p[: len(p) - lag] @ p[lag:]) for p in parts) for lag in range(most + 1)]
-    )
-    covariance /= count
+    covariance = pooled_autocovariance(parts, most) / count
     if covariance[0] <= 0 or most < 1:
         return np.zeros(0)
     # What the records cannot resolve must not decide: a floor of white noise at rounding.

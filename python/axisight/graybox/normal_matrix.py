@@ -24,6 +24,12 @@ def pseudo_inverse(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
     Directions count as not shown by the matrix scaled to unit diagonal; the condition is then
     infinite. A matrix that is not finite, where a model all but diverges, shows nothing.
     """
+    root, condition, blind = pseudo_root(matrix)
+    return root @ root.T, condition, blind
+
+
+def pseudo_root(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
+    """Return W with ``W W^T`` the pseudo-inverse, and the others as `pseudo_inverse` does."""
     if not np.isfinite(matrix).all():
         return np.full_like(matrix, np.inf), np.inf, np.ones(len(matrix), bool)
     size = np.sqrt(np.diag(matrix))
@@ -33,7 +39,6 @@ def pseudo_inverse(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
     seen = values > 1e-15 * len(values)
     condition = float(values[-1] / values[0]) if seen.all() else np.inf
     weights = np.where(seen, 1 / np.where(seen, values, 1.0), 0.0)
-    inverse = (vectors * weights) @ vectors.T / np.outer(size, size)
     # A direction without data has no finite variance.
     blind = np.abs(vectors[:, ~seen]).max(axis=1, initial=0.0) > 1e-3
-    return inverse, condition, blind
+    return vectors * np.sqrt(weights) / size[:, None], condition, blind

@@ -11,8 +11,10 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.arguments import series_pair
 from axisight.errors import InputError
 from axisight.logs.filters import lowpass
+from axisight.statistics.least_squares import condition, unit_columns
 
 Real = NDArray[np.float64]
 
@@ -98,7 +100,7 @@ def rigid_body_friction(
     speed that does not change (viscous and Coulomb friction are then one) and no acceleration.
 
     """
-    torque, position = _signals(torque_nm, position_rad)
+    torque, position = series_pair("torque_nm", torque_nm, "position_rad", position_rad)
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise InputError(f"sample_time_s: expected a positive time, got {sample_time_s}")
     nyquist = 0.5 / sample_time_s
@@ -138,25 +140,6 @@ def rigid_body_friction(
     return _regress(regressor, low_pass(torque)[kept], names, cutoff_hz, sample_time_s)
 
 
-def _signals(torque: ArrayLike, position: ArrayLike) -> tuple[Real, Real]:
-    found = []
-    for name, value in (("torque_nm", torque), ("position_rad", position)):
-        array = np.asarray(value)
-        if array.dtype.kind not in "biuf" or array.ndim != 1:
-            raise InputError(
-                f"{name}: expected real numbers of shape (n,), got {array.dtype} of {array.shape}"
-            )
-        if not np.isfinite(array).all():
-            at = int(np.argmax(~np.isfinite(array)))
-            raise InputError(f"{name}: expected finite numbers, got {array[at]} at sample {at + 1}")
-        found.append(array.astype(np.float64))
-    if len(found[0]) != len(found[1]):
-        raise InputError(
-            f"position_rad: expected {len(found[0])} samples as torque_nm, got {len(found[1])}"
-        )
-    return found[0], found[1]
-
-
 def _check_excitation(velocity: Real, regressor: Real) -> None:
     forward = float(np.mean(velocity > 0))
     if not _LEAST_SHARE < forward < 1 - _LEAST_SHARE:
@@ -166,10 +149,9 @@ def _check_excitation(velocity: Real, regressor: Real) -> None:
             "a constant torque without reversals: use a reference that changes sign, such as a "
             "triangle wave"
         )
-    size = np.sqrt(np.mean(regressor**2, axis=0))
-    if size[0] == 0 or size[1] == 0:
+    if not regressor[:, :2].any(axis=0).all():
         raise InputError("position_rad: expected motion, got a constant")
-    scaled = regressor / size
+    scaled, _ = unit_columns(regressor)
     _, values, directions = np.linalg.svd(scaled, full_matrices=False)
     if values[0] > _LARGEST_CONDITION * values[-1]:
         weak = np.abs(directions[-1])
@@ -184,8 +166,7 @@ def _check_excitation(velocity: Real, regressor: Real) -> None:
 def _regress(
     regressor: Real, torque: Real, names: list[str], cutoff_hz: float, sample_time_s: float
 ) -> RigidBodyFriction:
-    size = np.sqrt(np.mean(regressor**2, axis=0))
-    scaled = regressor / size
+    scaled, size = unit_columns(regressor)
     q, upper = np.linalg.qr(scaled)
     solution = np.linalg.solve(upper, q.T @ torque)
     left = torque - scaled @ solution
@@ -215,7 +196,7 @@ def _regress(
         residual_rms_nm=float(np.sqrt(np.mean(left**2))),
         fit_percent=100 * (1 - float(np.linalg.norm(left)) / variation) if variation else 0.0,
         cutoff_hz=float(cutoff_hz),
-        condition=float(np.linalg.cond(scaled)),
+        condition=condition(regressor),
         n_used=len(torque),
         findings=tuple(findings),
     )

@@ -15,7 +15,14 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import blackbox
+from axisight.arguments import series_pair
 from axisight.errors import InputError
+from axisight.statistics.correlation import (
+    covariance_spread,
+    covariances,
+    joint_p_value,
+    whiteness_p_value,
+)
 
 Real = NDArray[np.float64]
 D = TypeVar("D")
@@ -33,7 +40,7 @@ def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
     for worse. Raises InputError for other shapes, values that are not finite, and a measurement
     that does not vary.
     """
-    y, model = _pair("measured", measured, "simulated", simulated)
+    y, model = series_pair("measured", measured, "simulated", simulated)
     if np.ptp(y) == 0:
         raise InputError("measured: expected values that vary, got a constant")
     return float(blackbox.fit_percent(y, model)[0])
@@ -131,7 +138,7 @@ def residual_tests(
     Raises InputError for arrays that do not fit, too few samples, and lags out of range.
 
     """
-    e, u = _pair("residual", residual, "input_", input_)
+    e, u = series_pair("residual", residual, "input_", input_)
     for name, value in (("lags", lags), ("lag_step", lag_step)):
         if isinstance(value, bool) or value != int(value) or value < 1:
             raise InputError(f"{name}: expected a whole number of at least 1, got {value}")
@@ -143,17 +150,19 @@ def residual_tests(
     e, u = e - e.mean(), u - u.mean()
     if not (e.any() and u.any()):
         raise InputError("residual, input_: expected values that vary, got a constant")
-    auto, cross, power = _covariances(e, u)
+    window, count = max(n // _WINDOW_SHARE, last + 1), 2 * last + 1
+    auto, power = covariances(e, e, window), covariances(u, u, window)
+    cross = np.concatenate([covariances(u, e, last)[:0:-1], covariances(e, u, last)])
     at = lag_step * np.arange(-lags, lags + 1)
     r_auto = auto[np.abs(at)] / auto[0]
     scale = np.sqrt(auto[0] * power[0])
-    window = max(n // _WINDOW_SHARE, last + 1)
-    spread = _spread(auto, power, window, 2 * last + 1) / n
+    spread = _smoothed_spread(auto, power, count) / n
+    cross = cross[last + at]
     limit = scipy.stats.norm.ppf(0.5 + probability / 2)
     dataset = xr.Dataset(
         {
             "autocorrelation": ("lag", r_auto),
-            "cross_correlation": ("lag", cross[at] / scale),
+            "cross_correlation": ("lag", cross / scale),
             "autocorrelation_limit": limit / np.sqrt(n),
             "cross_correlation_limit": limit * np.sqrt(max(spread[0], 0.0)) / scale,
         },
@@ -163,49 +172,23 @@ def residual_tests(
     causal = at >= (1 if closed_loop else 0)
     return ResidualTests(
         dataset,
-        float(scipy.stats.chi2.sf(n * np.sum((auto[1 : lags + 1] / auto[0]) ** 2), lags)),
-        _joint(cross[at[causal]], at[causal], spread),
-        _joint(cross[at[~causal]], at[~causal], spread),
+        float(whiteness_p_value(auto[1 : lags + 1] / auto[0], n, short=False)),
+        joint_p_value(cross[causal], at[causal], spread, _RANK),
+        joint_p_value(cross[~causal], at[~causal], spread, _RANK),
         closed_loop,
     )
 
 
-def _covariances(e: Real, u: Real) -> tuple[Real, Real, Real]:
-    """R_e, R_eu and R_u by FFT, negative lags from the end."""
-    n = len(e)
-    size = scipy.fft.next_fast_len(2 * n, real=True)
-    fe, fu = np.fft.rfft(e, size), np.fft.rfft(u, size)
-    auto = np.fft.irfft(np.abs(fe) ** 2, size) / n
-    power = np.fft.irfft(np.abs(fu) ** 2, size) / n
-    # sum over t of e(t) u(t - lag)
-    cross = np.fft.irfft(fe * fu.conj(), size) / n
-    return auto, cross, power
-
-
-def _spread(auto: Real, power: Real, window: int, count: int) -> Real:
-    """Sum over k of R_e(k) R_u(k + lag) for lags 0 .. count - 1, with Parzen's window."""
-    k = np.arange(-window, window + 1)
+def _smoothed_spread(auto: Real, power: Real, count: int) -> Real:
+    """`covariance_spread` with Parzen's window, as wide as they are, on both autocovariances."""
     # On both: their spectra are then never negative, and power stays in its band.
-    weighted = auto[np.abs(k)] * _parzen(k, window)
-    reach = np.arange(-window - count, window + count + 1)
-    both = power[np.abs(reach)] * _parzen(reach, window)
-    return np.array([weighted @ both[count + lag : count + lag + len(k)] for lag in range(count)])
+    window = _parzen(np.arange(len(auto)), len(auto) - 1)
+    return covariance_spread(auto * window, np.pad(power * window, (0, count - 1)), count)
 
 
 def _parzen(lag: NDArray[np.int64], width: int) -> Real:
     x = np.minimum(np.abs(lag) / (width + 1), 1.0)
     return np.where(x < 0.5, 1 - 6 * x**2 * (1 - x), 2 * (1 - x) ** 3)
-
-
-def _joint(cross: Real, at: NDArray[np.int64], spread: Real) -> float:
-    """P-value of cross-covariances at these lags."""
-    covariance = spread[np.abs(at[:, None] - at)]
-    values, vectors = np.linalg.eigh(covariance)
-    kept = values > _RANK * values[-1]
-    if not kept.any():
-        return float("nan")
-    parts = vectors[:, kept].T @ cross
-    return float(scipy.stats.chi2.sf(np.sum(parts**2 / values[kept]), int(kept.sum())))
 
 
 def cross_validation(
@@ -270,22 +253,3 @@ def fit_table(
         attrs={"units": "%"},
         name="fit",
     )
-
-
-def _pair(first: str, a: ArrayLike, second: str, b: ArrayLike) -> tuple[Real, Real]:
-    found = []
-    for name, value in ((first, a), (second, b)):
-        array = np.asarray(value)
-        if array.dtype.kind not in "biuf" or array.ndim != 1 or not array.size:
-            raise InputError(
-                f"{name}: expected real numbers of shape (n,), got {array.dtype} of {array.shape}"
-            )
-        if not np.isfinite(array).all():
-            at = int(np.argmax(~np.isfinite(array)))
-            raise InputError(f"{name}: expected finite numbers, got {array[at]} at sample {at + 1}")
-        found.append(array.astype(np.float64))
-    if len(found[0]) != len(found[1]):
-        raise InputError(
-            f"{second}: expected {len(found[0])} samples as {first}, got {len(found[1])}"
-        )
-    return found[0], found[1]

@@ -14,6 +14,7 @@ from scipy.sparse import csgraph
 
 from axisight.errors import InputError
 from axisight.identifiability.information import Array, Information
+from axisight.statistics.least_squares import unit_columns
 
 Form = Literal["auto", "power", "linear"]
 
@@ -173,15 +174,14 @@ def decomposed(experiment: Information) -> tuple[Array, Array, int]:
     """Return singular values and right vectors of the scaled root, and its rank."""
     n = len(experiment.names)
     root = experiment.root
-    size = np.linalg.norm(root, axis=0)
-    unit = root / np.where(size > 0, size, 1.0)
+    unit, size = unit_columns(root)
     values = np.linalg.svd(unit, compute_uv=False) if len(root) else np.zeros(0)
     rank = int(np.sum(values > NUMERICAL_RANK * values[0])) if values.size and values[0] > 0 else 0
     scaled = root * experiment.scales
     padded = np.vstack([scaled, np.zeros((max(n - len(scaled), 0), n))])
     # The exact null space comes from the unit columns: scales must not decide what is rounding.
     _, _, unit_vt = np.linalg.svd(np.vstack([unit, np.zeros((max(n - len(unit), 0), n))]))
-    null = unit_vt[rank:].T / np.where(size > 0, size * experiment.scales, 1.0)[:, None]
+    null = unit_vt[rank:].T / np.where(root.any(axis=0), size * experiment.scales, 1.0)[:, None]
     q, _ = np.linalg.qr(null, mode="complete") if rank < n else (np.eye(n), None)
     known = q[:, n - rank :]
     _, s, vt = np.linalg.svd(padded @ known, full_matrices=False)

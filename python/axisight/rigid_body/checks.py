@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from axisight.rigid_body.findings import FindingKind, IdentificationFinding
 from axisight.rigid_body.least_squares import Factors
 from axisight.rigid_body.result import RigidBodyEstimate
+from axisight.statistics.least_squares import unit_columns
 
 Array = NDArray[np.float64]
 
@@ -118,9 +119,8 @@ def _axis_alone(factors: Factors, row: int, direction: Array) -> tuple[float, fl
     """Value and standard error of a combination, from one row only, of least norm."""
     k = factors.k
     r = factors.rows[row]
-    size = np.linalg.norm(r[:, :k], axis=0)
-    scale = np.where(size > 0, size, 1.0)
-    u, s, vt = np.linalg.svd(r[:, :k] / scale, full_matrices=False)
+    unit, scale = unit_columns(r[:, :k])
+    u, s, vt = np.linalg.svd(unit, full_matrices=False)
     good = s > 1e-6 * s.max(initial=0.0)
     weight = (vt[good] @ (direction / scale)) / s[good]
     value = float(weight @ (u[:, good].T @ r[:, k]))

@@ -32,7 +32,8 @@ from axisight.rigid_body.least_squares import (
     triangle,
 )
 from axisight.rigid_body.regressor import TorqueModel, rows
-from axisight.rigid_body.result import student_interval
+from axisight.statistics.intervals import student_interval
+from axisight.statistics.least_squares import condition
 
 Array = NDArray[np.float64]
 
@@ -152,7 +153,7 @@ def identify_by_energy(
         degrees_of_freedom=freedom,
         residual_rms_j=residual,
         relative_error=residual / size if size > 0 else float("nan"),
-        condition_number_scaled=float(np.linalg.cond(r / np.linalg.norm(r, axis=0))),
+        condition_number_scaled=condition(r),
         findings=tuple(findings),
     )
 

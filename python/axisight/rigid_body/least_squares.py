@@ -13,10 +13,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from axisight.statistics.cluster_scatter import ClusterScatter
 
-# Share of its variance that the scatter of a parameter must show to be called its variance.
-LEAST_SHOWN = 0.5
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,34 +192,22 @@ def white_covariance(factors: Factors, solution: Solution) -> Array:
 def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array]:
     """Covariance from the scatter of the blocks, and degrees of freedom per parameter.
 
-    The sandwich for residuals that are correlated in time within blocks and between rows,
-    each block's residuals enlarged by what the fit has taken from them, so that it is
-    unbiased where residuals are white; degrees of freedom by Satterthwaite's rule (Bell and
-    McCaffrey 2002, the correction called CR2). Parameters whose scatter does not show, for there
-    are as many equations as parameters or one block decides them alone, have NaN and none.
+    See :class:`axisight.statistics.cluster_scatter.ClusterScatter`: for residuals that are
+    correlated in time within blocks and between rows. Parameters whose scatter does not show, for
+    there are as many equations as parameters or one block decides them alone, have NaN and none.
     """
     k, weight = factors.k, solution.weight
     n_blocks = len(factors.blocks)
     stacked = (weight[:, None, None] * factors.blocks).reshape(n_blocks, -1, k + 1)
     r = triangle(stacked)
     residual = r[..., :k] @ solution.values - r[..., k]
-    lever = _right_divide(r[..., :k], solution.normal)
-    share = lever @ lever.swapaxes(-1, -2)
-    values, vectors = np.linalg.eigh(np.eye(k + 1) - share)
-    # A direction that one block alone decides shows no scatter.
-    grow = np.where(values > 1e-8, 1.0 / np.sqrt(np.maximum(values, 1e-8)), 0.0)
-    enlarge = (vectors * grow[:, None, :]) @ vectors.swapaxes(-1, -2)
-    score = np.einsum("bij,bi->bj", lever, (enlarge @ residual[..., None])[..., 0])
-    if solution.noise.any():
-        score -= _error_in_columns(solution, residual)
-    inverse = _back(solution.normal, np.eye(k))
-    change = score @ inverse.T
-    pull = enlarge @ lever
-    freedom = np.array([_freedom(pull, lever, row) for row in inverse])
-    covariance = np.asarray(change.T @ change, dtype=np.float64)
-    blind = freedom == 0
-    covariance[blind], covariance[:, blind] = np.nan, np.nan
-    return covariance, freedom
+    scatter = ClusterScatter(
+        root=_back(solution.normal, np.eye(k)),
+        lever=_right_divide(r[..., :k], solution.normal),
+        residual=residual,
+        score=-_error_in_columns(solution, residual) if solution.noise.any() else 0.0,
+    )
+    return scatter.covariance, scatter.degrees_of_freedom
 
 
 def _error_in_columns(solution: Solution, residual: Array) -> Array:
@@ -229,18 +216,6 @@ def _error_in_columns(solution: Solution, residual: Array) -> Array:
     loss = (residual**2).sum(axis=1)
     pull = solution.noise**2 * solution.values / spread
     return np.outer(loss, np.linalg.solve(solution.normal.T, pull))
-
-
-def _freedom(pull: Array, lever: Array, row: Array) -> float:
-    """Degrees of freedom of the scatter of one parameter, residuals taken as white; 0 if blind."""
-    u = pull @ row
-    s = np.einsum("bij,bi->bj", lever, u)
-    g = np.diag((u**2).sum(axis=1)) - s @ s.T
-    # What the scatter amounts to in the mean; the variance itself, unless directions are hidden.
-    mean = float(np.trace(g))
-    if mean < LEAST_SHOWN * float(row @ row):
-        return 0.0
-    return mean**2 / float((g**2).sum())
 
 
 def _back(r: Array, right: Array) -> Array:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,6 +14,8 @@ from axisight.rigid_body.base import BaseParameters
 from axisight.rigid_body.findings import IdentificationFinding
 from axisight.rigid_body.least_squares import Solution
 from axisight.rigid_body.regressor import TorqueModel, rows
+from axisight.statistics.intervals import student_interval
+from axisight.statistics.least_squares import condition
 
 Array = NDArray[np.float64]
 
@@ -113,7 +114,7 @@ class RigidBodyEstimate:
             residual_std_nm=solution.sigma,
             relative_error=np.divide(rms, size, out=np.full_like(rms, np.nan), where=size > 0),
             condition_number=float(np.linalg.cond(r)),
-            condition_number_scaled=float(np.linalg.cond(r / np.linalg.norm(r, axis=0))),
+            condition_number_scaled=condition(r),
             known=dict(known),
             eliminated=tuple(name for i, name in enumerate(base.names) if i not in keep),
             iterations=solution.iterations,
@@ -242,13 +243,3 @@ class RigidBodyEstimate:
             lines.append(f"{name}: residual {rms:.3g} Nm rms, {100 * relative:.2g} % of the torque")
         lines += [f"note: {finding}" for finding in self.findings]
         return "\n".join(lines)
-
-
-def student_interval(
-    values: Array, standard_error: Array, degrees_of_freedom: Array, level: float
-) -> tuple[Array, Array]:
-    """Return the bounds of the intervals of a ``level`` by Student's distribution, (n,) each."""
-    if not 0 < level < 1:
-        raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
-    half = scipy.stats.t.ppf(0.5 + 0.5 * level, degrees_of_freedom) * standard_error
-    return values - half, values + half

@@ -11,8 +11,6 @@ refuses keys it does not know. What is known besides:
 from __future__ import annotations
 
 import hashlib
-import math
-import re
 import tomllib
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -32,11 +30,10 @@ from axisight.robot_file.earlier import with_earlier_effects
 from axisight.robot_file.effect_tables import changed_numbers, stated, stated_effects
 from axisight.robot_file.identified import Identified, Provenance
 from axisight.robot_file.sidecar import Sidecar, read_sidecar, sidecar_path, text_hash
-from axisight.robot_file.toml_spans import value_spans
+from axisight.robot_file.text import Key, at, edited, same
 from axisight.storage import write_whole
 
 Array = NDArray[np.float64]
-Key = tuple[str | int, ...]
 
 INERTIA = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
 _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
@@ -128,21 +125,7 @@ def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
     document = tomllib.loads(text)
     changes, notes = _changes(robot, document, found)
     changes |= changed_numbers(document, effects)
-    spans = value_spans(text)
-    edits: list[tuple[int, int, str]] = []
-    comments: dict[int, list[str]] = {}
-    for key, value in changes.items():
-        span = spans[key]
-        if not _same(float(_at(document, key)), value):
-            edits.append((span.start, span.end, repr(value)))
-    for key, lines in notes.items():
-        comments.setdefault(spans[key].line, []).extend(lines)
-    for line, lines in comments.items():
-        indent = re.match(r"[ \t]*", text[line:])
-        lead = indent.group() if indent else ""
-        edits.append((line, line, "".join(f"{lead}{note}\n" for note in lines)))
-    for start, end, new in sorted(edits, reverse=True):
-        text = text[:start] + new + text[end:]
+    text = edited(text, changes, notes)
     text = _headed(_without_old(text, found), found, sidecar_name)
     _check(text, document, changes, effects)
     return text
@@ -190,7 +173,7 @@ def _changes(
                 )
             if value <= 0:
                 raise RobotError(f"{name}: expected a positive factor, got {value}")
-            for k, old in enumerate(_at(document, inertia)):
+            for k, old in enumerate(at(document, inertia)):
                 changes[(*inertia, k)] = float(old) * float(value)
             notes.setdefault(inertia, []).append(_note(name, value, error, "1", 1.0))
             continue
@@ -200,7 +183,7 @@ def _changes(
             raise InputError(f"{name}: expected either a scale or moments of one link, got both")
         if document["joint"][joint].get("motion") == "prismatic":
             unit = {"Nm/rad": "N/m", "Nm s/rad": "N s/m"}.get(unit, unit) if len(key) == 1 else unit
-        old = float(_at(document, full))
+        old = float(at(document, full))
         changes[full] = float(value)
         notes.setdefault(full, []).append(_note(name, value, error, unit, old))
         _refuse(name, quantity, float(value), rigid="stiffness" not in document["joint"][joint])
@@ -229,7 +212,7 @@ def _place(robot: Robot, document: dict[str, Any], name: str) -> tuple[int, str]
         joint = names.index(joint_name)
         key = _PLACES.get(quantity, (("link", "inertia"), ""))[0]
         try:
-            _at(document, ("joint", joint, *key))
+            at(document, ("joint", joint, *key))
             return joint, quantity
         except (KeyError, TypeError):
             pass
@@ -253,7 +236,7 @@ def _refuse_inertia(document: dict[str, Any], changes: dict[Key, float], joint: 
     if not any((*place, k) in changes for k in range(6)):
         return
     xx, yy, zz, xy, xz, yz = (
-        changes.get((*place, k), float(old)) for k, old in enumerate(_at(document, place))
+        changes.get((*place, k), float(old)) for k, old in enumerate(at(document, place))
     )
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     name = document["joint"][joint]["name"]
@@ -290,7 +273,7 @@ def _equal(a: Any, b: Any) -> bool:
     if isinstance(a, list) and isinstance(b, list):
         return len(a) == len(b) and all(map(_equal, a, b))
     if isinstance(a, float) or isinstance(b, float):
-        return _same(float(a), float(b))
+        return same(float(a), float(b))
     return bool(a == b)
 
 
@@ -300,16 +283,6 @@ def _replaced(node: Any, key: Key, value: float) -> Any:
     copy: Any = dict(node) if isinstance(node, dict) else list(node)
     copy[key[0]] = _replaced(node[key[0]], key[1:], value)
     return copy
-
-
-def _same(a: float, b: float) -> bool:
-    return a == b and math.copysign(1, a) == math.copysign(1, b)
-
-
-def _at(document: Any, key: Key) -> Any:
-    for part in key:
-        document = document[part]
-    return document
 
 
 def _note(name: str, value: float, error: float, unit: str, old: float | None) -> str:
