@@ -64,15 +64,14 @@ def stated(text: str, effects: Sequence[Effect]) -> str:
 
 def stated_effects(document: Mapping[str, Any]) -> list[Effect]:
     """Return the effects that the document of a robot file states."""
-    return [
-        Effect(
-            entry["name"],
-            entry.get("axis"),
-            {k: v for k, v in entry.items() if k not in ("name", "axis", "axes")},
-            entry.get("axes"),
-        )
-        for entry in document.get("effect", [])
-    ]
+    out = []
+    for entry in document.get("effect", []):
+        parameters = {k: v for k, v in entry.items() if k not in ("name", "axis", "axes")}
+        # Whole numbers may be written as 2.0.
+        axis = int(entry["axis"]) if "axis" in entry else None
+        axes = (int(entry["axes"][0]), int(entry["axes"][1])) if "axes" in entry else None
+        out.append(Effect(entry["name"], axis, parameters, axes))
+    return out
 
 
 def changed_numbers(
