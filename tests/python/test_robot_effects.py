@@ -108,7 +108,7 @@ def test_impossible_effects_are_refused_with_the_line(tables, line, words, tmp_p
 
 @pytest.mark.parametrize("text", ["springs = 0.1", "mass = 0.0", "mass = 'x'", "mass = nan"])
 def test_impossible_tolerances_are_refused(text: str) -> None:
-    with pytest.raises(RobotError, match=rf"line \d+: .*{text.split()[0]}"):
+    with pytest.raises(RobotError, match=rf"line \d+: .*{text.split(maxsplit=1)[0]}"):
         Robot.from_toml(with_tables(ARM.toml, "[tolerances]", text, ""))
 
 
@@ -304,7 +304,7 @@ def effects_of_arm() -> st.SearchStrategy[list[Effect]]:
 
     @st.composite
     def one(draw: st.DrawFn) -> Effect:
-        info = draw(st.sampled_from([e for e in effects.effect_table().values()]))
+        info = draw(st.sampled_from(list(effects.effect_table().values())))
         axis = None if info.scope == "arm" else draw(st.integers(1, 3))
         chosen = draw(st.lists(st.sampled_from(info.parameters), unique=True))
         values = {p.name: draw(st.floats(p.lower, p.upper)) for p in chosen}
@@ -422,9 +422,12 @@ def test_effects_that_are_no_tables_are_left_alone_or_refused(tmp_path: Path) ->
     inline = 'effect = [{ name = "backlash", axis = 1, half_width_rad = 1e-4 }]\n\n[[joint]]'
     robot = Robot.from_toml(with_tables(head + inline + tail))
     assert len(robot.effects) == 1
-    values = {"axis1.stiffness": 1.5e6}
+    values = {"axis1.stiffness": 1.5e6, "backlash@1.half_width_rad": 2e-4}
+    write_identified(robot, tmp_path / "r.toml", identified(values, SOURCE))
+    assert inline.replace("1e-4", "0.0002") in (tmp_path / "r.toml").read_text()
+    found = identified({}, SOURCE, effects=[PAYLOAD])
     with pytest.raises(RobotError, match=r"source: expected effects in tables \[\[effect\]\]"):
-        write_identified(robot, tmp_path / "r.toml", identified(values, SOURCE))
+        write_identified(robot, tmp_path / "x.toml", found)
 
 
 # Effects between axes.

@@ -25,15 +25,18 @@ def stated(text: str, effects: Sequence[Effect]) -> str:
 
     Tables that need no change keep their text and their order; values that differ are replaced by
     `changed_numbers`, parameters that are missing come below the others. New effects go behind
-    the last one. A text that states no effect and has none to state is returned as it is;
-    otherwise it becomes one of ``axisight.robot/2``.
+    the last one. A text with nothing to add or remove is returned as it is; another becomes one of
+    ``axisight.robot/2``.
 
-    Raises RobotError for a text in which effects stand otherwise than in tables ``[[effect]]``.
+    Raises RobotError where effects cannot be added or removed, because they stand otherwise than in
+    tables ``[[effect]]``.
     """
     present = stated_effects(tomllib.loads(text))
-    if not present and not effects:
-        return text
     wanted = {effect.label: effect for effect in effects}
+    new = [effect for effect in effects if effect.label not in {e.label for e in present}]
+    more = [_missing(e, wanted[e.label]) if e.label in wanted else None for e in present]
+    if not new and not any(lines is None or lines for lines in more):
+        return text
     lines = _SCHEMA.sub(r"\g<1>2\g<2>", text, count=1).splitlines(keepends=True)
     end = "\r\n" if "\r\n" in text else "\n"
     if lines and not lines[-1].endswith("\n"):
@@ -42,16 +45,15 @@ def stated(text: str, effects: Sequence[Effect]) -> str:
     if len(places) != len(present):
         raise RobotError("source: expected effects in tables [[effect]] with a line for each value")
     last = places[-1][1] if places else len(lines)
-    new = [effect for effect in effects if effect.label not in {e.label for e in present}]
     # From below, so that the places of those above stay.
     added = [line + end for effect in new for line in ("", *_table(effect))]
     lines[last:last] = added
-    for (first, after), effect in reversed(list(zip(places, present, strict=True))):
-        if effect.label in wanted:
-            lines[after:after] = [line + end for line in _missing(effect, wanted[effect.label])]
-        else:
+    for (first, after), below in reversed(list(zip(places, more, strict=True))):
+        if below is None:
             rest = (i for i in range(after, len(lines)) if lines[i].strip())
             del lines[first : next(rest, len(lines))]
+        else:
+            lines[after:after] = [line + end for line in below]
     out = "".join(lines)
     labels = [e.label for e in present if e.label in wanted] + [e.label for e in new]
     document = tomllib.loads(out)
