@@ -59,8 +59,9 @@ __version__: str
 
 _Array: TypeAlias = NDArray[np.float64]
 _Numbers: TypeAlias = Sequence[float] | NDArray[np.float64]
-# Name in the effect table, 1-based axis (None for the whole arm), parameters in table order.
-_Effect: TypeAlias = tuple[str, int | None, _Numbers]
+# Name in the effect table, 1-based axis or two of them (None for the whole arm), parameters in
+# table order.
+_Effect: TypeAlias = tuple[str, int | tuple[int, int] | None, _Numbers]
 _Effects: TypeAlias = Sequence[_Effect]
 # Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
 _Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
@@ -86,7 +87,7 @@ class EffectInfo(TypedDict):
     summary: str
     equation: str
     source: str
-    scope: Literal["axis", "arm"]
+    scope: Literal["axis", "axes", "arm"]
     acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "sensor"]
     parameters: list[ParameterInfo]
 
@@ -231,7 +232,7 @@ class Robot:
 
     @staticmethod
     def from_toml(text: str) -> Robot:
-        """Read a description in the format ``axisight.robot/1``; raises RobotError."""
+        """Read a description in the format ``axisight.robot/1`` or ``/2``; raises RobotError."""
     @property
     def toml(self) -> str:
         """The text the robot was read from."""
@@ -289,6 +290,17 @@ class Robot:
 
         Raises InputError for a name that `parameters` does not list.
         """
+    @property
+    def effects(self) -> list[tuple[str, int | tuple[int, int] | None, list[float]]]:
+        """Effects that its simulator has; they act wherever the robot does.
+
+        An effect given to a call takes the place of an own one of the same name and place.
+        """
+    def with_effects(self, effects: _Effects) -> Robot:
+        """Return the same robot with other effects of its own; raises InputError."""
+    @property
+    def tolerances(self) -> list[tuple[str, float]]:
+        """Relative standard deviation [1] of its own parameters by quantity, where stated."""
     def inertia_matrix(self, q: _Array) -> _Array:
         """M(q) [kg m^2], shape (n, n_joints, n_joints)."""
     def bias(self, q: _Array, v: _Array) -> _Array:

@@ -1,4 +1,4 @@
-"""Effects that identification put beside a robot file: which commands use them, and what they say."""
+"""Effects that a robot file states: which commands use them, and what they say."""
 
 import json
 import shutil
@@ -10,21 +10,23 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from axisight import Effect, Log, Robot, load_robot, montecarlo, simulate
+from axisight import Effect, Log, load_robot, montecarlo, simulate
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.gap.candidates import Situation, all_candidates
+from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.logs import read_log
-from axisight.robot_file import Provenance, identified, load_with_effects, write_identified
+from axisight.robot_file import Provenance, hash_file, identified, load_identified, write_identified
+from axisight.robot_file.effect_tables import stated
 from montecarlo_data import small_study
 from test_diagnose import bare_axis, logs_of
 
 COULOMB = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.05})
 SPRING = Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 3.7e10})
-# What identification writes for an effect that the fit stands in the place of: it does nothing.
+# One that does nothing.
 NEUTRAL = Effect("stribeck_friction", 1, {})
-TEXT = "coulomb_friction@1:coulomb_nm=0.5,smoothing_rad_s=0.05"
-LINE = "with the effects in {}: coulomb_friction@1, nonlinear_stiffness@1 (--no-identified-effects"
+LINE = "with the effects of {}: coulomb_friction@1, nonlinear_stiffness@1"
+CHIRP = ("--kind", "chirp", "--period-s", 0.5, "--band-hz", "4,20", "--peak-rad-s", 8)
 CASE = """
 schema = "axisight.case/1"
 name = "axis"
@@ -54,6 +56,21 @@ def write_robot(path: Path, *effects: Effect) -> Path:
     found = identified({"axis1.stiffness": stiffness}, Provenance("test"), effects=effects)
     write_identified(bare_axis(), path, found)
     return path
+
+
+def earlier_files(axis: Path) -> Path:
+    """The robot without its effects, as a file of version 1, and they in a sidecar of version 1."""
+    old = axis.with_name("old.toml")
+    robot = load_robot(axis)
+    old.write_text(stated(robot.toml, []).replace("axisight.robot/2", "axisight.robot/1"))
+    content = json.loads(axis.with_name("axis.identified.json").read_text())
+    content |= {"schema": "axisight.identified/1", "robot": old.name}
+    content["robot_sha256"] = hash_file(old)
+    content["effects"] = [
+        {"name": e.name, "axis": e.axis, "parameters": e.parameters} for e in robot.effects
+    ]
+    old.with_name("old.identified.json").write_text(json.dumps(content))
+    return old
 
 
 def write_log(path: Path, log: Log) -> Path:
@@ -88,65 +105,53 @@ def truth(log: Path, *effects: Effect) -> np.ndarray:
 def test_simulate_takes_them_and_says_so(axis: Path, log: Path) -> None:
     torque, text = simulated(axis, log)
     np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
-    assert LINE.format(axis.with_name("axis.identified.json")) in text
+    assert LINE.format(axis) in text
     assert "stribeck" not in text
 
 
-def test_simulate_does_without_when_told(axis: Path, log: Path) -> None:
-    torque, text = simulated(axis, log, "--no-identified-effects")
-    np.testing.assert_array_equal(torque, truth(log))
-    assert "identified" not in text
-
-
-def test_a_given_effect_goes_before_the_identified_one(axis: Path, log: Path) -> None:
+def test_a_given_effect_replaces_one_of_the_file(axis: Path, log: Path) -> None:
     torque, text = simulated(axis, log, "--effect", "coulomb_friction@1:coulomb_nm=0.2")
     other = Effect("coulomb_friction", 1, {"coulomb_nm": 0.2})
-    # The effects add up in another order: equal to rounding.
-    np.testing.assert_allclose(torque, truth(log, other, SPRING), rtol=0, atol=1e-9)
-    assert ": nonlinear_stiffness@1 (" in text
+    np.testing.assert_array_equal(torque, truth(log, SPRING, other))
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in text
 
 
-def test_a_robot_edited_since_goes_without_and_says_so(axis: Path, log: Path) -> None:
+def test_a_robot_edited_since_keeps_its_effects(axis: Path, log: Path) -> None:
     axis.write_text(axis.read_text() + "# looked at\n")
-    torque, text = simulated(axis, log)
-    np.testing.assert_array_equal(torque, truth(log))
-    sidecar = axis.with_name("axis.identified.json")
-    assert f"axis.toml was changed after {sidecar} was written: its effects are not used" in text
-    assert "coulomb_friction@1" in text
+    axis.with_name("axis.identified.json").write_text("spoilt")
+    torque, _ = simulated(axis, log)
+    np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
 
 
-def test_nothing_is_said_where_there_is_nothing(axis: Path, log: Path, tmp_path: Path) -> None:
+def test_nothing_is_said_where_there_is_nothing(log: Path, tmp_path: Path) -> None:
     _, text = simulated(write_robot(tmp_path / "bare.toml", NEUTRAL), log)
-    assert "identified" not in text
-    axis.with_name("axis.identified.json").unlink()
-    _, text = simulated(axis, log)
-    assert "identified" not in text
+    assert "with the effects" not in text
+    _, text = simulated(write_robot(tmp_path / "bare2.toml"), log)
+    assert "with the effects" not in text
 
 
-def test_a_spoilt_sidecar_is_refused_unless_left_out(axis: Path, log: Path) -> None:
-    sidecar = axis.with_name("axis.identified.json")
-    sidecar.write_text(sidecar.read_text().replace("axisight.identified/1", "other/1"))
-    out = axis.with_name("out.parquet")
-    assert "axis.identified.json: schema" in run("simulate", axis, log, "--out", out, code=2)
-    assert not out.exists()
-    run("simulate", axis, log, "--out", out, "--no-identified-effects")
-
-
-def test_the_function_behind_it(axis: Path, tmp_path: Path) -> None:
-    assert load_robot(axis).effects == ()  # the file is a contract
-    robot, line = load_with_effects(axis)
-    assert robot.effects == (COULOMB, SPRING, NEUTRAL)
-    assert line.endswith("axis.identified.json: coulomb_friction@1, nonlinear_stiffness@1")
-    preset, line = load_with_effects("two_mass_axis")
-    assert (preset.effects, line) == (load_robot("two_mass_axis").effects, "")
-    # Renamed together, both still belong together: the hash decides.
-    for name in ("axis.toml", "axis.identified.json"):
-        (tmp_path / name).rename(tmp_path / name.replace("axis", "arm"))
-    assert load_with_effects(tmp_path / "arm.toml")[0].effects == robot.effects
-    (tmp_path / "arm.toml").write_text((tmp_path / "arm.toml").read_text() + "\n")
-    assert load_with_effects(tmp_path / "arm.toml")[0].effects == ()
-    with pytest.raises(InputError, match="changed after it was written"):
-        load_with_effects(tmp_path / "arm.toml", check=True)
+def test_effects_beside_a_robot_file_are_refused_until_written_again(
+    axis: Path, log: Path, tmp_path: Path
+) -> None:
+    """As earlier versions left them: a robot of version 1, effects in its sidecar."""
+    old = earlier_files(axis)
+    for command in (
+        ("simulate", old, log, "--out", tmp_path / "x.parquet"),
+        ("diagnose", log, log, "--model", old),
+        ("montecarlo", study_file(tmp_path, old, "nonlinear"), "--out", tmp_path / "x"),
+        ("identify", "axis", log, log, "--robot", old),
+        ("excite", "--robot", old, *CHIRP, "--torque-limit", 0.1),
+    ):
+        text = run(*command, code=2)
+        assert "old.identified.json: expected effects in the robot file" in text
+        assert "got coulomb_friction@1, nonlinear_stiffness@1 beside it" in text
+    # As the message says.
+    found = load_identified(old)
+    assert found.robot.effects == found.effects == (COULOMB, SPRING, NEUTRAL)
+    write_identified(found.robot, old, found, overwrite=True)
+    assert load_robot(old).effects == load_identified(old).effects == found.effects
+    torque, _ = simulated(old, log)
+    np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
 
 
 # The diagnosis.
@@ -168,12 +173,12 @@ def diagnosed(axis: Path, friction_nm: float, *more: object) -> tuple[dict, str]
 
 def test_diagnose_knows_what_was_identified(axis: Path) -> None:
     found, text = diagnosed(axis, 0.5)
-    assert LINE.format(axis.with_name("axis.identified.json")) in text
+    assert LINE.format(axis) in text
     assert found["verdict"] == "none"
     assert found["provenance"]["robot_effects"] == ["coulomb_friction@1", "nonlinear_stiffness@1"]
 
 
-def test_diagnose_does_without_when_told(axis: Path, log: Path, monkeypatch) -> None:
+def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypatch) -> None:
     seen = []
 
     def stop(**inputs) -> None:
@@ -182,19 +187,17 @@ def test_diagnose_does_without_when_told(axis: Path, log: Path, monkeypatch) -> 
 
     monkeypatch.setattr("axisight.cli.application.diagnose", stop)
     command = ["diagnose", log, log, "--model", axis]
-    assert "with the effects in" in run(*command, code=2)
-    assert "identified" not in run(*command, "--no-identified-effects", code=2)
-    # A case brings its own robot, which may have a sidecar too.
+    assert "with the effects of" in run(*command, code=2)
     case = axis.parent / "case.toml"
     case.write_text(CASE)
     shutil.copy(log, log.with_name("log2.parquet"))
-    assert "with the effects in" in run("diagnose", axis.parent, code=2)
-    assert seen == [(COULOMB, SPRING, NEUTRAL), (), (COULOMB, SPRING, NEUTRAL)]
+    assert "with the effects of" in run("diagnose", axis.parent, code=2)
+    assert seen == [(COULOMB, SPRING, NEUTRAL), (COULOMB, SPRING, NEUTRAL)]
 
 
 def test_candidates_begin_where_the_simulator_is(axis: Path, log: Path) -> None:
     ripple = Effect("torque_ripple", 1, {"order_2": 6.0, "cosine_2_nm": 0.3, "sine_2_nm": 0.1})
-    robot = Robot(load_robot(axis).core, [COULOMB, NEUTRAL, ripple])
+    robot = load_robot(axis).with_effects([COULOMB, NEUTRAL, ripple])
     data = read_log(log)
     rng = np.random.default_rng(0)
     speed = np.gradient(data.position_rad[:, 0], data.sample_time_s)
@@ -246,21 +249,25 @@ def study_file(folder: Path, robot: Path, model: str) -> Path:
     return path
 
 
-def test_montecarlo_puts_them_into_the_study(axis: Path, tmp_path: Path) -> None:
+def test_montecarlo_takes_them(axis: Path, tmp_path: Path) -> None:
     study = study_file(tmp_path, axis, "nonlinear")
     text = run("montecarlo", study, "--out", tmp_path / "with", "--threads", 1)
-    assert "with the effects in" in text
-    read = montecarlo.read_study(study)
+    assert LINE.format(axis) in text
+    bare = write_robot(tmp_path / "bare.toml")
+    given = montecarlo.read_study(study).model_copy(update={"robot": str(bare)})
     entries = [
         montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=e.parameters)
-        for e in (COULOMB, SPRING)
+        for e in (COULOMB, SPRING, NEUTRAL)
     ]
-    wanted = montecarlo.run(read.model_copy(update={"effect": entries}), threads=1)
-    with_them = montecarlo.run(study, out=tmp_path / "bare", threads=1)
-    stored = [mean_of(tmp_path / name) for name in ("with", "bare")]
-    np.testing.assert_array_equal(stored[0], wanted["arithmetic_mean"].values)
-    np.testing.assert_array_equal(stored[1], with_them["arithmetic_mean"].values)
-    assert np.abs(stored[0] - stored[1]).max() > 0.01 * np.abs(stored[1]).max()
+    wanted = montecarlo.run(given.model_copy(update={"effect": entries}), threads=1)
+    without = montecarlo.run(given, threads=1)
+    stored = mean_of(tmp_path / "with")
+    np.testing.assert_array_equal(stored, wanted["arithmetic_mean"].values)
+    off = np.abs(stored - without["arithmetic_mean"].values).max()
+    assert off > 0.01 * np.abs(stored).max()
+    # In Python too, without the command line.
+    python = montecarlo.run(study, threads=1)
+    np.testing.assert_array_equal(stored, python["arithmetic_mean"].values)
 
 
 def mean_of(folder: Path) -> np.ndarray:
@@ -268,19 +275,52 @@ def mean_of(folder: Path) -> np.ndarray:
     return store["arithmetic_mean"].values
 
 
-def test_a_linear_study_needs_to_do_without_friction(axis: Path, tmp_path: Path) -> None:
+def test_a_study_may_replace_and_spread_them(axis: Path, tmp_path: Path) -> None:
+    study = montecarlo.read_study(study_file(tmp_path, axis, "nonlinear"))
+    half = montecarlo.EffectEntry(
+        name="coulomb_friction", axis=1, parameters={**COULOMB.parameters, "coulomb_nm": 0.25}
+    )
+    other = write_robot(tmp_path / "half.toml", Effect(half.name, 1, half.parameters), SPRING)
+    one = montecarlo.run(study.model_copy(update={"effect": [half]}), threads=1)
+    two = montecarlo.run(study.model_copy(update={"robot": str(other)}), threads=1)
+    # The effects add up in another order: equal to rounding.
+    np.testing.assert_allclose(one["arithmetic_mean"], two["arithmetic_mean"], rtol=1e-6)
+    spread = montecarlo.Spread(parameter="coulomb_friction@1.coulomb_nm", relative=0.5)
+    varied = montecarlo.run(study.model_copy(update={"spread": [spread]}), threads=1)
+    plain = montecarlo.run(study, threads=1)
+    assert np.abs(varied["arithmetic_mean"] - plain["arithmetic_mean"]).max() > 0
+
+
+def test_a_linear_study_refuses_friction(axis: Path, tmp_path: Path) -> None:
     study = study_file(tmp_path, axis, "linear")
-    out = tmp_path / "results"
-    text = run("montecarlo", study, "--out", out, "--threads", 1, code=2)
-    assert "--no-identified-effects" in text
+    text = run("montecarlo", study, "--out", tmp_path / "results", "--threads", 1, code=2)
     assert "coulomb_friction" in text
-    run("montecarlo", study, "--out", out, "--threads", 1, "--no-identified-effects")
 
 
 def test_excite_checks_limits_with_them(axis: Path, tmp_path: Path) -> None:
-    options = ["--robot", axis, "--kind", "chirp", "--period-s", 0.5, "--band-hz", "4,20"]
-    options += ["--peak-rad-s", 8, "--out", tmp_path / "refs.parquet", "--force"]
-    assert "identified" not in run("excite", *options)
-    limits = ["--torque-limit", 0.1]
-    assert "with the effects in" in run("excite", *options, *limits)
-    assert "identified" not in run("excite", *options, *limits, "--no-identified-effects")
+    options = ["--robot", axis, *CHIRP, "--out", tmp_path / "refs.parquet", "--force"]
+    assert "with the effects" not in run("excite", *options)
+    assert LINE.format(axis) in run("excite", *options, "--torque-limit", 0.1)
+
+
+# Tolerances of the file.
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ((), {"stiffness": 0.2, "damping": 0.5}),
+        (("--tolerance", "stiffness=0.07"), {"stiffness": 0.07, "damping": 0.5}),
+    ],
+)
+def test_diagnose_takes_tolerances_of_the_file(axis, log, monkeypatch, options, wanted) -> None:
+    seen = []
+
+    def stop(**inputs) -> None:
+        seen.append(inputs["settings"].tolerances)
+        raise InputError("seen")
+
+    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
+    axis.write_text(axis.read_text() + "[tolerances]\nstiffness = 0.2\ndamping = 0.5\n")
+    run("diagnose", log, log, "--model", axis, *options, code=2)
+    assert seen == [{**DEFAULT_TOLERANCES, **wanted}]

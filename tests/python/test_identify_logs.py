@@ -227,18 +227,16 @@ def test_effects_that_the_regression_took_up_are_neutral(logs, tmp_path: Path) -
         Effect("torque_ripple", 1, {"cosine_1_nm": 0.1}),
         Effect("load_dependent_friction", 2, {}),
     ]
-    robot = Robot(bare.core, [*old, *kept])
+    robot = bare.with_effects([*old, *kept])
     found = identify_logs(robot, logs[:2], consistent=True)
     values = found.identified(SOURCE)
     write_identified(robot, tmp_path / "r.toml", values)
     back = {e.label: e for e in load_identified(tmp_path / "r.toml").effects}
-    for effect in old[:-1]:
-        neutral = Effect(effect.name, effect.axis).values()
-        assert effect.values() != neutral and back[effect.label].values() == neutral, effect.label
-    assert back["torque_ripple@1"].values() == kept[0].values()
+    assert not {effect.label for effect in old[:-1]} & back.keys()
+    assert all(back[effect.label] == effect for effect in kept)
     coulomb = back["coulomb_friction@3"].parameters["coulomb_nm"]
     assert coulomb == pytest.approx(0.4, rel=0.05)
-    (note,) = (x for x in values.provenance.notes.splitlines() if "set to neutral" in x)
+    (note,) = (x for x in values.provenance.notes.splitlines() if "removed, what" in x)
     for effect in old[:-1]:
         assert effect.label in note
     assert "load_dependent" not in note and "coulomb_friction@3" not in note
@@ -249,7 +247,7 @@ def test_effects_that_the_regression_took_up_are_neutral(logs, tmp_path: Path) -
             robot, logs[:2], terms=DriveTerms(inertia="motor", viscous="motor"), consistent=True
         )
     assert "no term for motor inertias" not in viscous.identified(SOURCE).provenance.notes
-    labels = [e.label for e in viscous.identified(SOURCE).effects]
+    labels = [e.label for e in viscous.identified(SOURCE).removed]
     assert "stribeck_friction@1" not in labels and "quadratic_drag@2" in labels
 
 
@@ -317,7 +315,7 @@ def test_values_written_give_the_torques_of_the_fit(robot, logs, tmp_path: Path)
         for effect in back.effects:
             label = model.names[i].rpartition(".")[0]
             if effect.axis == robot.joint_names.index(label) + 1 and effect.name in name:
-                (again[i],) = effect.parameters.values()
+                again[i] = effect.values()[0]
     q, v, a = smooth_motion(robot, 50, 0.1, 9)
     matrix = model.matrix(q, v, a)
     want = matrix @ found.consistent.theta

@@ -77,7 +77,6 @@ def test_unchanged_values_keep_every_character(name: str, tmp_path: Path) -> Non
     write_identified(name, target, identified(everything, SOURCE))
     assert without_comments(target.read_text()) == robot.toml
     assert parameters(load_robot(target)) == parameters(robot)
-    # Effects its simulator models go along.
     assert load_identified(target).robot.effects == robot.effects
 
 
@@ -253,7 +252,8 @@ def test_sidecar_gives_back_everything(tmp_path: Path) -> None:
         assert back.names == found.names and back.values.tobytes() == found.values.tobytes()
         np.testing.assert_array_equal(back.covariance, covariance)
         np.testing.assert_array_equal(back.standard_errors, [2000.0, 0.1])
-        assert back.effects == tuple(effects) and back.robot.effects == back.effects
+        assert set(back.effects) == set(effects) and back.robot.effects == back.effects
+        assert load_robot(target).effects == back.effects
         given_, kept = SOURCE, back.provenance
         assert (kept.method, kept.data, kept.settings) == (
             given_.method,
@@ -292,7 +292,8 @@ def test_a_fit_is_written_as_it_is(tmp_path: Path) -> None:
     found = identified_by_fit(fitted, SOURCE, effects=[effect])
     write_identified("two_mass_axis", tmp_path / "r.toml", found)
     back = load_identified(tmp_path / "r.toml")
-    assert dict(back.effects[0].parameters) == {"coulomb_nm": 0.7, "smoothing_rad_s": 0.01}
+    spring, friction = load_robot("two_mass_axis").effects
+    assert back.effects == (spring, friction.with_values({"coulomb_nm": 0.7}))
     np.testing.assert_array_equal(back.standard_errors, [1e3, 1e-2])
     with pytest.raises(InputError, match="effects: expected the effect"):
         identified_by_fit(fitted, SOURCE)
@@ -450,24 +451,12 @@ def test_changed_robots_and_spoilt_sidecars_are_told(tmp_path: Path) -> None:
     assert hash_file(target) == json.loads(sidecar.read_text())["robot_sha256"]
     good = sidecar.read_text()
     for old, new, words in (
-        ("axisight.identified/1", "axisight.identified/2", "schema"),
+        ("axisight.identified/2", "axisight.identified/3", "schema"),
         ('"robot"', '"robots"', "robot"),
         ('"robot.toml"', '"../robot.toml"', "a file beside it"),
         ('"value": 1500000.0', '"value": "much"', "parameters"),
         ("2024-05-06T", "once", "ISO date"),
         ("{", "", "Invalid JSON"),
-    ):
-        assert old in good
-        sidecar.write_text(good.replace(old, new, 1))
-        with pytest.raises(InputError, match=words):
-            load_identified(target)
-    for old, new, words in (
-        (
-            '"coulomb_nm": 0.644',
-            '"coulomb_nm": -0.644',
-            "coulomb_friction@1.coulomb_nm: expected 0",
-        ),
-        ('"axis": 1', '"axis": 3', "expected an axis from 1 to 1, got 3"),
     ):
         assert old in good
         sidecar.write_text(good.replace(old, new, 1))

@@ -23,6 +23,7 @@ from axisight.calibration.geometry import errors_about, nominal_geometry
 from axisight.frequency_fit import FrequencyFitOptions, fit_responses, identified_responses
 from axisight.graybox import AxisModel, FitSettings, fit_axis, identified_axis
 from axisight.robot_file import Provenance, identified, load_identified, write_identified
+from axisight.robot_file.effect_tables import stated
 from calibration_data import LOADS, arm, configurations, nominal
 from frequency_fit_data import ROBOT, responses
 
@@ -237,7 +238,7 @@ def test_a_longer_chain_and_what_has_no_place() -> None:
     assert ripple.parameters["order_3"] == 3 and "torque_ripple@1.sine_3_nm" in found.names
 
 
-def test_effects_in_the_way_are_set_to_neutral(tmp_path: Path) -> None:
+def test_effects_in_the_way_are_removed(tmp_path: Path) -> None:
     model = AxisModel(gear_ratio=RATIO, cubic=(False,))
     truth = {n: v for n, v in TRUTH.items() if n != "k3"}
     preset = load_robot("two_mass_axis")
@@ -248,21 +249,21 @@ def test_effects_in_the_way_are_set_to_neutral(tmp_path: Path) -> None:
         Effect("backlash", 1, {"half_width_rad": 1e-4}),
     ]
     ripple = Effect("resolver_ripple", 1, {"cosine_1_rad": 1e-3})
-    robot = Robot(preset.core, [*preset.effects, *others, ripple])
+    robot = preset.with_effects([*preset.effects, *others, ripple])
     found = identified_axis(axis_fit(model, truth), robot, SOURCE)
     write_identified(robot, tmp_path / "r.toml", found)
-    back = {e.label: e.parameters for e in load_identified(tmp_path / "r.toml").robot.effects}
-    assert back["nonlinear_stiffness@1"] == {}
-    assert all(back[effect.label] == {} for effect in others)
-    assert back["coulomb_friction@1"]["coulomb_nm"] != 0.644
-    assert back["resolver_ripple@1"] == {"cosine_1_rad": 1e-3}
-    assert "set to neutral" in found.provenance.notes
+    friction, kept = load_robot(tmp_path / "r.toml").effects
+    assert friction.label == "coulomb_friction@1" and friction.parameters["coulomb_nm"] != 0.644
+    assert kept == ripple
+    labels = ", ".join(["nonlinear_stiffness@1", *(effect.label for effect in others)])
+    note = f"removed, what was identified stands in their place: {labels}"
+    assert note in found.provenance.notes.splitlines()
 
 
 def test_axis_fits_of_other_things_are_refused() -> None:
     fit = axis_fit(AxisModel(gear_ratio=RATIO), TRUTH)
     robot = load_robot("two_mass_axis")
-    text = robot.toml.replace("stiffness = 1.46e6\ndamping = 2.63e3\n", "")
+    text = stated(robot.toml, []).replace("stiffness = 1.46e6\ndamping = 2.63e3\n", "")
     rigid = Robot(_core.Robot.from_toml(text))
     for call, words in (
         (lambda: identified_axis(fit.parameters, robot, SOURCE), "fit: expected an AxisFit"),

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -22,12 +21,13 @@ from axisight.cli.excite import excite_command
 from axisight.cli.identify import identify_app
 from axisight.cli.montecarlo import montecarlo_command
 from axisight.cli.reproduce import reproduce_command
-from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.cli.robot import load_simulator
 from axisight.cli.simulate import simulate_command
 from axisight.effects import effect_table
 from axisight.errors import InputError
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import read_inputs
+from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.logs import check_log, render
 from axisight.report import save_report
 
@@ -66,22 +66,22 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
         yield report
 
 
-def _tolerances(given: list[str]) -> Settings:
-    settings = Settings()
-    changed = dict(settings.tolerances)
+def _tolerances(given: list[str]) -> dict[str, float]:
+    """Return the tolerances given by quantity; raises InputError naming the option."""
+    changed = {}
     for item in given:
         name, _, value = item.partition("=")
         try:
             changed[name] = float(value)
         except ValueError:
             raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
-        if name not in settings.tolerances:
+        if name not in DEFAULT_TOLERANCES:
             raise InputError(
-                f"--tolerance: expected one of {', '.join(settings.tolerances)}, got {name!r}"
+                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, got {name!r}"
             )
         if not 0 < changed[name] < 1:
             raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
-    return replace(settings, tolerances=changed)
+    return changed
 
 
 @app.command("diagnose")
@@ -97,20 +97,23 @@ def diagnose_command(
         typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
     ] = None,
     columns: Columns = None,
-    identified_effects: IdentifiedEffects = True,
     json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(help="Relative tolerance of a simulator parameter, e.g. mass=0.02."),
+        typer.Option(
+            help="Relative tolerance of a simulator parameter, e.g. mass=0.02, instead of that of "
+            "the robot file or the default."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     with _errors():
-        settings = replace(_tolerances(tolerance or []), seed=seed)
-        load = partial(load_simulator, identified=identified_effects)
-        inputs = read_inputs(case_or_logs, model, validation or [], columns, load)
+        given = _tolerances(tolerance or [])
+        inputs = read_inputs(case_or_logs, model, validation or [], columns, load_simulator)
+        settings = Settings(seed=seed)
+        settings = replace(settings, tolerances={**settings.tolerances_of(inputs.robot), **given})
         with _progress() as progress:
             found = diagnose(
                 name=inputs.name,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli.common import OUT, errors, numbers
-from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.cli.robot import say_effects
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.plots import plot_references, plot_signal
@@ -62,7 +62,6 @@ def excite_command(
             help="Also draw the signal here, and the references in NAME-references (.png, .pdf)."
         ),
     ] = None,
-    identified_effects: IdentifiedEffects = True,
     force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
@@ -90,7 +89,7 @@ def excite_command(
         machine = load_robot(checked.robot)
         # Without limits or a controller nothing is simulated.
         if checked.limits is not None and machine.controller_kind != "none":
-            machine = load_simulator(checked.robot, identified=identified_effects)
+            say_effects(machine, checked.robot)
         made = excite(checked, machine)
         _show(made)
         if made.report is not None and not made.report.ok and not force:

@@ -12,12 +12,12 @@ import typer
 from axisight.cli.common import OUT, numbers
 from axisight.errors import InputError
 from axisight.logs import Log, check_log, read_log
-from axisight.robot import Robot
+from axisight.robot import Robot, load_robot
 from axisight.robot_file import (
     Identified,
     Provenance,
     hash_file,
-    load_with_effects,
+    refuse_effects_beside,
     sidecar_path,
     write_identified,
 )
@@ -40,8 +40,13 @@ Force = Annotated[bool, typer.Option("--force", help="Replace files that exist."
 
 
 def load_source(robot: str) -> Robot:
-    """Return a preset or the robot of a file, with the effects that an earlier command found."""
-    return load_with_effects(robot, check=True)[0]
+    """Return a preset or the robot of a file, with the effects that an earlier command found.
+
+    Raises InputError as `refuse_effects_beside`.
+    """
+    machine = load_robot(robot)
+    refuse_effects_beside(robot)
+    return machine
 
 
 def read_logs(

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from axisight import montecarlo
 from axisight.cli.common import ERR, OUT, errors
-from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.cli.robot import say_effects
 from axisight.effects import Effect
 from axisight.montecarlo.progress import Progress, Report
 from axisight.robot import load_robot
@@ -37,11 +37,12 @@ def montecarlo_command(
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads here. Default: all processors.")
     ] = None,
-    identified_effects: IdentifiedEffects = True,
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
-        design = _with_effects(montecarlo.read_study(study), identified=identified_effects)
+        design = montecarlo.read_study(study)
+        given = [Effect(**entry.model_dump()) for entry in design.effect]
+        say_effects(load_robot(design.robot), design.robot, given)
         with _bar() as progress:
             result = montecarlo.run(
                 design,
@@ -65,19 +66,6 @@ def montecarlo_command(
         OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
         if counted == 0:
             raise typer.Exit(1)
-
-
-def _with_effects(study: montecarlo.Study, *, identified: bool) -> montecarlo.Study:
-    """Return the study with the effects in the sidecar of its robot among its own."""
-    given = [Effect(e.name, e.axis, e.parameters) for e in study.effect]
-    robot = load_simulator(study.robot, given, identified=identified)
-    own = {effect.label for effect in load_robot(study.robot).effects}
-    added = [
-        montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=dict(e.parameters or {}))
-        for e in robot.effects
-        if e.label not in own
-    ]
-    return study.model_copy(update={"effect": [*study.effect, *added]})
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.cli.common import OUT, errors, numbers
-from axisight.cli.robot import IdentifiedEffects, load_simulator
+from axisight.cli.robot import load_simulator
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.logs import Log, read_log
@@ -41,11 +41,10 @@ def simulate_command(
         typer.Option(
             metavar="NAME@AXIS:PARAM=VALUE,...",
             help="Further effect (repeatable), e.g. coulomb_friction@2:coulomb_nm=0.5; the whole "
-            "arm without @AXIS, neutral values for parameters left out. It takes the place of an "
-            "identified one of that name and axis.",
+            "arm without @AXIS, two axes as @5,6, neutral values for parameters left out. It takes "
+            "the place of one of the robot of that name and axis.",
         ),
     ] = None,
-    identified_effects: IdentifiedEffects = True,
     start: Annotated[
         str | None,
         typer.Option(
@@ -75,7 +74,7 @@ def simulate_command(
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
         added = [parse_effect(text) for text in effect or []]
-        machine = load_simulator(robot, added, identified=identified_effects)
+        machine = load_simulator(robot, added)
         inputs = _inputs(read_log(log, columns, n_axes=machine.n_axes), machine, torque=torque)
         result = simulate(
             machine,
@@ -129,9 +128,11 @@ def parse_effect(text: str) -> Effect:
     Axis and parameters may be left out. Raises InputError quoting ``text``.
     """
     head, _, tail = text.partition(":")
-    name, at, axis = head.partition("@")
-    if at and not axis.isdecimal():
-        raise InputError(f"--effect {text!r}: expected an axis number after @, got {axis!r}")
+    name, at, place = head.partition("@")
+    axes = place.split(",") if at else []
+    if not all(axis.isdecimal() for axis in axes) or len(axes) > 2:
+        raise InputError(f"--effect {text!r}: expected an axis number after @, got {place!r}")
+    numbered = [int(axis) for axis in axes]
     parameters: dict[str, float] = {}
     for item in tail.split(",") if tail else []:
         key, equals, value = item.partition("=")
@@ -141,6 +142,8 @@ def parse_effect(text: str) -> Effect:
             raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
         (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
     try:
-        return Effect(name, int(axis) if at else None, parameters)
+        if len(numbered) == 2:
+            return Effect(name, None, parameters, (numbered[0], numbered[1]))
+        return Effect(name, numbered[0] if numbered else None, parameters)
     except InputError as error:
         raise InputError(f"--effect {text!r}: {error}") from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -227,29 +227,24 @@ def fit(
     The simulated commanded torque is compared with the logged one when the
     logs have velocity references and the robot a controller; otherwise the
     simulation is driven by the logged torque and positions are compared.
-    Effect parameters refer to positions in ``effects`` (the robot's own
-    effects come before them in the model but are not counted).
+    Effect parameters refer to positions in ``effects``. The robot's own effects
+    act too, but for those that one in ``effects`` replaces: same name, same axis.
     Raises InputError for misuse; non-convergence is a status.
     """
     chosen = options or FitOptions()
-    extra = list(effects)
-    model = [*robot.effects, *extra]
-    shifted = [
-        replace(p, effect=p.effect + len(robot.effects)) if p.effect is not None else p
-        for p in parameters
-    ]
+    added = list(effects)
     closed = is_closed_loop(robot, logs)
     result = _core.fit_simulation(
         robot.core,
-        core_effects(model),
-        [core_spec(p, model) for p in shifted],
+        core_effects(added),
+        [core_spec(p, added) for p in parameters],
         records(logs, closed=closed),
         (weighting or Weighting.flat(robot.n_axes)).core(),
         chosen,
         input="reference" if closed else "torque",
         output="torque" if closed else "position",
     )
-    return fitted(result, shifted, model)
+    return fitted(result, parameters, added)
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:

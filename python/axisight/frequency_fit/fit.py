@@ -62,7 +62,7 @@ def fit_responses(
         logarithms, within a factor of 100 unless bounds are given.
     effects
         Of those that leave the robot linear: payload, joint_stiffness, joint_damping,
-        motor_inertia; the robot's own come before them.
+        motor_inertia. The robot's own act too, but for those of the same name and axis.
     options
         See :class:`FrequencyFitOptions`.
 
@@ -90,7 +90,6 @@ def fit_responses(
             f"neighbours: expected responses with degrees_of_freedom to pool the variance of "
             f"{chosen.neighbours} lines, got none that tells"
         )
-    model = [*robot.effects, *effects]
     chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
     nothing: list[Complex | None] = [None] * len(data)
     weighing = _weighing(data, chosen, nothing)
@@ -100,7 +99,7 @@ def fit_responses(
     ) -> _core.FrequencyFitResult:
         return _core.fit_frequency_responses(
             robot.core,
-            core_effects(model),
+            core_effects(effects),
             list(start),
             [one.core(g, w) for one, g, w in zip(data, reference, weighing, strict=True)],
             core_options(chosen),

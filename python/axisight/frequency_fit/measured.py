@@ -252,7 +252,7 @@ def model_response(
     at = robot.operating_point if joint_angle_rad is None else joint_angle_rad
     pairs = _core.frequency_response(
         robot.core,
-        core_effects([*robot.effects, *effects]),
+        core_effects(effects),
         [float(x) for x in at],
         f.tolist(),
         sampling == "zero_order_hold",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects, without
+from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import core_spec
@@ -31,7 +31,7 @@ class ClosedLoopView(View):
         floor = closed_loop_floor(robot, logs, settings)
         data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
         fitter = ClosedLoopFitter(
-            robot, data, floor.weighting, settings.tolerances, settings.block_s
+            robot, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
@@ -101,9 +101,7 @@ def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
     """
     if log.velocity_ref_rad_s is None:
         raise InputError(f"log {log.name!r}: expected velocity references")
-    changed = robot.with_parameters(variant.robot_values).with_effects(
-        without(robot.effects, variant.effects)
-    )
+    changed = robot.with_parameters(variant.robot_values)
     out = simulate(changed, log.velocity_ref_rad_s, effects=variant.effects, method="rk4")
     torque = np.full(log.torque_nm.shape, np.nan)
     values = out["torque_cmd_nm"].values

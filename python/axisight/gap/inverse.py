@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects, without
+from axisight.effects import Effect, core_effects
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import core_spec
 from axisight.gap.model import ModelFitter
@@ -39,7 +39,7 @@ class InverseView(View):
             robot,
             [motion(log, cutoff) for log in logs],
             floor.weighting,
-            settings.tolerances,
+            settings.tolerances_of(robot),
             settings.block_s,
         )
         super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
@@ -111,7 +111,7 @@ def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     changed = robot.with_parameters(variant.robot_values)
     result = _core.fit_inverse_dynamics(
         changed.core,
-        core_effects([*without(robot.effects, variant.effects), *variant.effects]),
+        core_effects(variant.effects),
         [],
         [at],
         Weighting.flat(robot.n_axes).core(),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, without
+from axisight.effects import Effect
 from axisight.fitting import (
     FitOptions,
     Parameter,
@@ -40,9 +40,7 @@ class FreeEffect:
 
     def at(self, values: Mapping[str, float]) -> FreeEffect:
         """Return the same with other start values."""
-        effect = self.effect
-        merged = {**(effect.parameters or {}), **values}
-        return replace(self, effect=Effect(effect.name, effect.axis, merged))
+        return replace(self, effect=self.effect.with_values(values))
 
 
 @dataclass(frozen=True)
@@ -149,11 +147,8 @@ class ModelFitter(ABC):
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
+        # One that the simulator has itself is tried with other values: it takes its place.
         tried = [f.effect for f in free]
-        # One that the simulator has itself is tried with other values, not a second time.
-        own_effects = without(self.robot.effects, tried)
-        effects = [*own_effects, *tried]
-        first = len(own_effects)
         same = {_same_quantity(self.robot, f.effect) for f in free}
         own = [
             replace(p, frozen=True)
@@ -165,11 +160,7 @@ class ModelFitter(ABC):
             )
             for p in self.own
         ]
-        added = [
-            _trial_parameter(effects, first + i, f, name)
-            for i, f in enumerate(free)
-            for name in f.free
-        ]
+        added = [_trial_parameter(tried, i, f, name) for i, f in enumerate(free) for name in f.free]
         parameters = own + added
         warm = []
         if lazy and start is not None:
@@ -182,8 +173,8 @@ class ModelFitter(ABC):
             nuisance_refreshes=0,
             block_s=self.block_s,
         )
-        result = self.solve(effects, parameters, options, warm)
-        return _evidence(result, parameters, own, effects, list(free), first)
+        result = self.solve(tried, parameters, options, warm)
+        return _evidence(result, parameters, own, list(free))
 
 
 def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: str) -> Parameter:
@@ -219,11 +210,9 @@ def _evidence(
     result: _core.FitResult,
     parameters: Sequence[Parameter],
     own: Sequence[Parameter],
-    effects: Sequence[Effect],
     free: Sequence[FreeEffect],
-    first: int,
 ) -> Evidence:
-    every = [(None if p.effect is None else p.effect - first, p.name) for p in parameters]
+    every = [(p.effect, p.name) for p in parameters]
     values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
     for (place, name), value in zip(every, result.theta, strict=True):
         if place is not None:
@@ -233,9 +222,7 @@ def _evidence(
     theta = result.theta[columns]
     names = tuple(every[i] for i in columns)
     used = [parameters[i] for i in columns]
-    fitted = tuple(
-        Effect(f.effect.name, f.effect.axis, v) for f, v in zip(free, values, strict=True)
-    )
+    fitted = tuple(f.effect.with_values(v) for f, v in zip(free, values, strict=True))
     precision = np.array([0.0 if p.prior is None else p.prior[1] ** -2 for p in used])
     mean = np.array([0.0 if p.prior is None else p.prior[0] for p in used])
     blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)

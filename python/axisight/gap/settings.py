@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
+
+from axisight.robot import Robot
 
 # Standard deviation of a simulator's own parameters, relative [1]. About one
 # per cent in masses, stiffness and motor inertia, two in viscous friction, five
@@ -27,7 +29,8 @@ class Settings:
     """Settings of a diagnosis.
 
     ``tolerances``: relative standard deviation of the simulator's parameters by
-    quantity; quantities left out are taken as exact. ``model_error``: error of
+    quantity; quantities left out are taken as exact. None: those that the robot
+    file states, ``DEFAULT_TOLERANCES`` for others. ``model_error``: error of
     a perfect diagnosis relative to the torque spectrum (formulas differ from
     nature), part of the weight of residuals. ``bandwidth_hz``: residuals above
     are not used. ``block_s``: length of data blocks for cross-validation and
@@ -42,7 +45,7 @@ class Settings:
     ``seed`` rules every random choice.
     """
 
-    tolerances: Mapping[str, float] = field(default_factory=lambda: DEFAULT_TOLERANCES)
+    tolerances: Mapping[str, float] | None = None
     model_error: float = 0.01
     bandwidth_hz: float = 125.0
     block_s: float = 1.0
@@ -57,3 +60,9 @@ class Settings:
     bootstrap: int = 1000
     seed: int = 0
     threads: int = 2
+
+    def tolerances_of(self, robot: Robot) -> Mapping[str, float]:
+        """Return the tolerances of a robot's parameters by quantity."""
+        if self.tolerances is not None:
+            return self.tolerances
+        return {**DEFAULT_TOLERANCES, **robot.tolerances}

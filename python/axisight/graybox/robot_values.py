@@ -81,7 +81,7 @@ def identified_axis(
         the motor moves alike.
     robot
         Where they will be written. Effects of friction and gear of the axis that it has already
-        and the fit has not are set to neutral: the fit stands in their place.
+        and the fit has not are removed: the fit stands in their place.
     provenance
         Where they come from.
     axis
@@ -119,7 +119,8 @@ def identified_axis(
         np.array([slopes[name] for name in names]).reshape(len(names), len(fit.free)),
         spread,
         noted(provenance, [*notes, f"search: {fit.status}", *fit.warnings], unplaced),
-        effects=[*effects, *replaced],
+        effects=effects,
+        removed=replaced,
     )
 
 

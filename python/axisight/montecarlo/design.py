@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
@@ -26,7 +27,7 @@ Task = tuple[int, int]
 
 
 def freeze(study: Study) -> str:
-    """Return the design as canonical JSON, self-contained: the robot's text is inside.
+    """Return the design as canonical JSON, self-contained: the robot's text, which states its effects, is inside.
 
     The seed, the number of runs and what is only read off the result (name, quantiles) are
     not part of it.
@@ -34,10 +35,7 @@ def freeze(study: Study) -> str:
     robot = load_robot(study.robot)
     design = study.model_dump(by_alias=True, mode="json", exclude={"seed", "runs", "name", "robot"})
     design["statistics"].pop("quantiles")
-    design["robot"] = {
-        "toml": robot.toml,
-        "effects": [[e.name, e.axis, e.values()] for e in robot.effects],
-    }
+    design["robot"] = {"toml": robot.toml}
     design["axisight_version"] = version("axisight")
     return json.dumps(design, sort_keys=True)
 
@@ -57,11 +55,9 @@ def core_study(design: str) -> _core.MonteCarloStudy:
     plant, measurement = d["plant"], d["measurement"]
     try:
         robot = Robot.from_toml(d["robot"]["toml"]).with_parameters(d["robot_parameters"])
-        effects = [(name, axis, values) for name, axis, values in d["robot"]["effects"]]
-        effects += core_effects(Effect(**e) for e in d["effect"])
         return _core.MonteCarloStudy(
             robot.core,
-            effects,
+            core_effects(_effects(d, robot)),
             model=plant["model"],
             integrator=Integrator(plant["method"], plant["tolerance"], plant["substeps"]),
             start=plant["start_rad"],
@@ -90,6 +86,15 @@ def core_study(design: str) -> _core.MonteCarloStudy:
         raise
     except InputError as error:
         raise StudyError(str(error)) from None
+
+
+def _effects(design: Mapping[str, Any], robot: Robot) -> list[Effect]:
+    """Return the effects of a study, and those of the robot itself that it spreads."""
+    given = [Effect(**entry) for entry in design["effect"]]
+    labels = {effect.label for effect in given}
+    spread = {entry["parameter"].rpartition(".")[0] for entry in design["spread"]}
+    own = [e for e in robot.effects if e.label in spread - labels]
+    return [*own, *given]
 
 
 def compute_block(

@@ -101,6 +101,7 @@ class EffectEntry(_Model):
 
     name: str
     axis: AtLeastOne | None = None
+    axes: tuple[AtLeastOne, AtLeastOne] | None = None
     parameters: dict[str, float] = {}
 
 
@@ -108,7 +109,7 @@ class Spread(_Model):
     """A parameter that varies from run to run: ``value (1 + relative z) + absolute z``.
 
     ``parameter``: ``axis2.stiffness`` of the robot, ``payload.mass_kg`` or
-    ``torque_ripple@1.cosine_1_nm`` of an effect of the study. ``z`` is standard normal, or
+    ``torque_ripple@1.cosine_1_nm`` of an effect of the study or of the robot. ``z`` is standard normal, or
     uniform between -1 and 1. A run whose draw is impossible (a negative stiffness) is
     recorded as failed.
     """
@@ -136,13 +137,14 @@ class Study(_Model):
 
     Parameters
     ----------
-    robot : file in the format ``axisight.robot/1``, or preset.
+    robot : file in the format ``axisight.robot/1`` or ``/2``, or preset.
     robot_parameters : values that replace those of the robot, e.g. ``{"axis1.damping": 2e3}``.
     seed : rules phases, noise and spread, together with the number of the run.
     runs : number of realizations.
     block_runs : runs accumulated together; part of the design, because the order of
         additions follows from it. A resumed study loses at most what was in progress.
-    effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``.
+    effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``; an effect takes the place of
+        one of the robot with its name and axis.
 
     Raises StudyError naming the field; unknown keys are refused.
 

@@ -71,9 +71,9 @@ class LogIdentification:
         noted. Motor-side parameters that stand for themselves have standard errors (not with
         ``consistent``, which mixes in a prior), values that were given have zero and are noted; of
         links only combinations have: the table of base parameters is in the settings of
-        ``provenance``, torque errors with it, findings in the notes. Effects that the values have taken up are set to
-        neutral (:func:`identified_bodies`). Raises RobotError for masses no body has, which the
-        estimate alone may lead to.
+        ``provenance``, torque errors with it, findings in the notes. Effects that the values have
+        taken up are removed (:func:`identified_bodies`). Raises RobotError for masses no body has,
+        which the estimate alone may lead to.
         """
         model = self.estimate.model
         theta = self.estimate.standard() if self.consistent is None else self.consistent.theta
@@ -115,6 +115,7 @@ class LogIdentification:
             found.provenance,
             standard_errors={name: error for name, _, error in kept if np.isfinite(error)},
             effects=found.effects,
+            removed=found.removed,
         )
 
     def _lone_errors(self) -> Array:

@@ -16,7 +16,7 @@ from axisight.robot_file.values import noted
 Array = NDArray[np.float64]
 
 LINK = 10
-# Terms the robot format has no place for: effect and parameter of the effect.
+# Terms that are effects: effect and parameter of the effect.
 EFFECTS = {
     "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
     "torque_offset": ("torque_offset", "offset_nm"),
@@ -43,8 +43,8 @@ def identified_bodies(
     First moments become centres of mass and inertias about the link frame those about the
     centre of mass: I_c = I - (|h|^2 1 - h h^T) / m with h = m c. Coulomb friction and torque
     offsets become effects. Effects of the robot whose torque the regression has taken up (see
-    `axisight.robot_file.absorbed`) are set to neutral, and a note says so: a payload and balancers, which the
-    links now hold; errors of torque constants, in which all is measured; friction, offset and
+    `axisight.robot_file.absorbed`) are removed, and a note says so: a payload and balancers, which
+    the links now hold; errors of torque constants, in which all is measured; friction, offset and
     rotor inertia of an axis by the terms of its drive.
 
     model
@@ -104,12 +104,13 @@ def identified_bodies(
         dict(zip(names, out.tolist(), strict=True)),
         noted(provenance, absorbed_note(replaced)),
         covariance=spread,
-        effects=[*effects, *replaced],
+        effects=effects,
+        removed=replaced,
     )
 
 
 def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
-    """Effects of the robot that links and drive terms of the model stand for now, neutral."""
+    """Effects of the robot that links and drive terms of the model stand for now."""
     own = model.robot.effects
     out = absorbed_effects(own, ["links", "torque"], axis=None)
     for name in model.names:

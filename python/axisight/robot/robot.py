@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects
+from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
@@ -22,24 +22,24 @@ ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "none"]
 
 
 class Robot:
-    """A robot in the format ``axisight.robot/1``, with the effects its simulator already models.
+    """A robot in the format ``axisight.robot/1`` or ``/2``, effects of its simulator included.
 
     Joint arrays run over all joints, driven and elastic, base to tip; axis
     arrays over driven joints only. ``q`` [rad or m], ``v``, ``a`` and forces
     [Nm or N] may have shape (n_joints,) or (n, n_joints).
 
     ``core`` hands the robot to functions of the compiled core; everything that can be known of
-    it is an attribute or a method here.
+    it is an attribute or a method here. Wherever the robot is simulated, linearized or fitted, its
+    own `effects` act; an effect given to a call takes the place of its own of that name and axis.
     """
 
-    def __init__(self, core: _core.Robot, effects: Sequence[Effect] = ()) -> None:
+    def __init__(self, core: _core.Robot) -> None:
         self.core = core
-        self.effects = tuple(effects)
 
     @classmethod
-    def from_toml(cls, text: str, effects: Sequence[Effect] = ()) -> Robot:
+    def from_toml(cls, text: str) -> Robot:
         """Return the robot of a description; raises RobotError naming line, key and expectation."""
-        return cls(_core.Robot.from_toml(text), effects)
+        return cls(_core.Robot.from_toml(text))
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -72,8 +72,22 @@ class Robot:
 
     @property
     def toml(self) -> str:
-        """The description it was read from; parameters replaced since do not show in it."""
+        """The description it was read from; parameters and effects replaced since do not show."""
         return self.core.toml
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects that its simulator models: those of its description, unless replaced since."""
+        return tuple(effect_of_core(effect) for effect in self.core.effects)
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Relative standard deviation [1] of its own parameters, for quantities that state one.
+
+        Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia``
+        and ``viscous_friction``.
+        """
+        return dict(self.core.tolerances)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -143,11 +157,15 @@ class Robot:
 
         Raises InputError for a name that `parameters` does not have.
         """
-        return Robot(self.core.with_parameters(list(values.items())), self.effects)
+        return Robot(self.core.with_parameters(list(values.items())))
 
     def with_effects(self, effects: Iterable[Effect]) -> Robot:
-        """Return the same robot with ``effects`` in place of its own."""
-        return Robot(self.core, tuple(effects))
+        """Return the same robot with ``effects`` in place of all its own; none switch them off.
+
+        Raises InputError for an effect that the robot cannot have: an axis that is not there, a
+        spring in a rigid transmission, parameters outside their bounds.
+        """
+        return Robot(self.core.with_effects(core_effects(effects)))
 
     def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
         out = []
@@ -233,7 +251,7 @@ class Robot:
         if the elastic joints do not settle.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        out = self.core.equilibrium(self._effects(effects), at)
+        out = self.core.equilibrium(core_effects(effects), at)
         return xr.Dataset(
             {
                 "joint_angle_rad": ("joint", out["joint_angle"], {"units": "rad"}),
@@ -252,7 +270,7 @@ class Robot:
         angles [rad]; derivatives are exact (dual numbers).
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        return self.core.linearize(self._effects(effects), at)
+        return self.core.linearize(core_effects(effects), at)
 
     def modes(
         self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
@@ -263,7 +281,7 @@ class Robot:
         (mode) and ``shape`` (mode, state; largest element one).
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        values, frequency, damping, shapes = self.core.modes(self._effects(effects), at)
+        values, frequency, damping, shapes = self.core.modes(core_effects(effects), at)
         return xr.Dataset(
             {
                 "eigenvalue_rad_s": ("mode", values[:, 0] + 1j * values[:, 1]),
@@ -286,7 +304,7 @@ class Robot:
         """
         f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        pairs = self.core.zoh_response(f.tolist(), self._effects(effects), at)
+        pairs = self.core.zoh_response(f.tolist(), core_effects(effects), at)
         return xr.DataArray(
             pairs[..., 0::2] + 1j * pairs[..., 1::2],
             dims=("frequency_hz", "output", "input"),
@@ -302,9 +320,6 @@ class Robot:
         """Return the axis numbers, from 1."""
         return list(range(1, self.n_axes + 1))
 
-    def _effects(self, extra: Iterable[Effect]) -> list[tuple[str, int | None, list[float]]]:
-        return core_effects([*self.effects, *extra])
-
 
 def load_robot(source: Path | str) -> Robot:
     """Return the robot in a TOML file, or the preset of that name.
@@ -315,7 +330,7 @@ def load_robot(source: Path | str) -> Robot:
     """
     if isinstance(source, str) and source in PRESETS:
         text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
-        return Robot.from_toml(text, PRESETS[source])
+        return Robot.from_toml(text)
     path = Path(source)
     try:
         text = path.read_text("utf-8")

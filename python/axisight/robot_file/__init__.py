@@ -7,11 +7,11 @@ they find is written here.
 from axisight.robot_file.document import (
     hash_file,
     load_identified,
-    load_with_effects,
-    sidecar_path,
     write_identified,
 )
+from axisight.robot_file.earlier import refuse_effects_beside
 from axisight.robot_file.identified import Identified, Provenance, identified, identified_by_fit
+from axisight.robot_file.sidecar import sidecar_path
 
 __all__ = [
     "Identified",
@@ -20,7 +20,7 @@ __all__ = [
     "identified",
     "identified_by_fit",
     "load_identified",
-    "load_with_effects",
+    "refuse_effects_beside",
     "sidecar_path",
     "write_identified",
 ]

@@ -37,25 +37,25 @@ def absorbed_effects(
     axis: int | None,
     found: Iterable[Effect] = (),
 ) -> list[Effect]:
-    """Return the ``effects`` that identified ``quantities`` have taken up, set to neutral.
+    """Return those of the ``effects`` that identified ``quantities`` have taken up.
 
     ``quantities`` are keys of :data:`ABSORBED`, identified for ``axis`` (from 1), None for the whole
-    arm: its links take up effects of every axis. Effects in ``found`` stand for themselves and those
-    that are neutral already are left as they are.
+    arm: its links take up effects of every axis. Effects in ``found`` stand for themselves, and those
+    that are neutral stay.
     """
     names = {name for quantity in quantities for name in ABSORBED[quantity]}
     labels = {effect.label for effect in found}
     return [
-        Effect(effect.name, effect.axis, {})
+        effect
         for effect in effects
         if effect.name in names
         and axis in (None, effect.axis)
         and effect.label not in labels
-        and effect.values() != Effect(effect.name, effect.axis).values()
+        and effect.acts
     ]
 
 
 def absorbed_note(effects: Iterable[Effect]) -> list[str]:
-    """Return the note that says which effects were set to neutral, none if there are none."""
+    """Return the note that says which effects were removed, none if there are none."""
     what = ", ".join(effect.label for effect in effects)
-    return [f"set to neutral, what was identified stands in their place: {what}"] if what else []
+    return [f"removed, what was identified stands in their place: {what}"] if what else []

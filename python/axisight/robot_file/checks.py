@@ -21,7 +21,7 @@ ROUNDING = 1e-6
 def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
     """Check that a robot of ``n_axes`` axes can have these effects.
 
-    Raises InputError for an axis that the robot does not have or an effect that has none,
+    Raises InputError for axes that the robot does not have or an effect that has none,
     RobotError for parameters outside the bounds of the table of effects (negative Coulomb
     friction).
     """
@@ -36,6 +36,11 @@ def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
             got = "none" if effect.axis is None else str(effect.axis)
             raise InputError(
                 f"effects: {effect.label}: expected an axis from 1 to {n_axes}, got {got}"
+            )
+        if info.scope == "axes" and max(effect.axes or (n_axes + 1,)) > n_axes:
+            got = "none" if effect.axes is None else str(effect.axes)
+            raise InputError(
+                f"effects: {effect.label}: expected two axes from 1 to {n_axes}, got {got}"
             )
         given = effect.parameters or {}
         for p in info.parameters:

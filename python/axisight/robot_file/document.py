@@ -1,18 +1,17 @@
 """Robots written back with what was identified, and read again.
 
-The format ``axisight.robot/1`` is a contract that refuses keys it does not know, so a robot file
-says what a robot is and no more. What stands beside it:
+The robot file says what a robot is, effects included, and no more: its format is a contract that
+refuses keys it does not know. What is known besides:
 
 - comments in the robot file, ``# identified: ...``, above the line of each value: for people;
-- a JSON file ``<name>.identified.json``, schema ``axisight.identified/1``: values, standard
-  errors, covariance, effects, and where they come from: for programs.
+- a JSON file ``<name>.identified.json`` beside it, schema ``axisight.identified/2``: values,
+  standard errors, covariance, and where they come from: for programs.
 """
 
 from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -21,16 +20,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 from pydantic_core import PydanticSerializationError
 
-from axisight.effects import Effect, without
+from axisight.effects import Effect, effect_info
 from axisight.errors import InputError, RobotError
 from axisight.robot import Robot, load_robot
-from axisight.robot.presets import PRESETS
 from axisight.robot_file.checks import check_agreement, check_effects, checked_covariance
+from axisight.robot_file.earlier import with_earlier_effects
+from axisight.robot_file.effect_tables import changed_numbers, stated, stated_effects
 from axisight.robot_file.identified import Identified, Provenance
-from axisight.robot_file.sidecar import Sidecar, first_fault, text_hash
+from axisight.robot_file.sidecar import Sidecar, read_sidecar, sidecar_path, text_hash
 from axisight.robot_file.text import Key, at, edited, same
 from axisight.storage import write_whole
 
@@ -72,7 +71,9 @@ def write_identified(
     source
         The robot the values belong to: a file, the name of a preset, or a Robot. Text that no value
         replaces stays as it is, comments and number formats included; a value equal to
-        the old one keeps its text too.
+        the old one keeps its text too. Effects become tables ``[[effect]]``, and the file one of
+        ``axisight.robot/2``, if there are any: those that the robot has and those found, which
+        take the place of its own of the same name and axis; ``found.removed`` are left out.
     target
         File to write; the sidecar is ``<stem>.identified.json`` in the same folder.
     found
@@ -88,7 +89,7 @@ def write_identified(
     contradicts, a covariance that is none, and files in the way.
     """
     robot = source if isinstance(source, Robot) else load_robot(source)
-    check_effects(found.effects, robot.n_axes)
+    check_effects(_all_effects(robot, found), robot.n_axes)
     check_agreement(found.names, found.values, found.effects)
     if found.covariance is not None:
         checked_covariance(found.covariance, len(found.names))
@@ -102,9 +103,7 @@ def write_identified(
         created=found.provenance.created or datetime.now(UTC),
         axisight_version=found.provenance.axisight_version or version("axisight"),
     )
-    # What the simulator models already has no place in the robot file either.
-    kept = without(robot.effects, found.effects)
-    found = replace(found, provenance=stamped, effects=(*found.effects, *kept))
+    found = replace(found, provenance=stamped)
     text = render(robot, found, sidecar.name)
     report = Sidecar.of(found, robot, text, path.name)
     try:
@@ -116,24 +115,34 @@ def write_identified(
     return sidecar
 
 
-def sidecar_path(robot_file: Path | str) -> Path:
-    """Return the path of the sidecar of ``robot_file``."""
-    path = Path(robot_file)
-    return path.with_name(f"{path.stem}.identified.json")
-
-
 def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
     """Return the text of ``robot`` with the values ``found`` in it, checked by reading it.
 
     ``sidecar_name`` is named in the head comment.
     """
-    text = robot.toml
+    effects = _all_effects(robot, found)
+    text = stated(robot.toml, effects)
     document = tomllib.loads(text)
     changes, notes = _changes(robot, document, found)
+    changes |= changed_numbers(document, effects)
     text = edited(text, changes, notes)
     text = _headed(_without_old(text, found), found, sidecar_name)
-    _check(text, document, changes)
+    _check(text, document, changes, effects)
     return text
+
+
+def _all_effects(robot: Robot, found: Identified) -> list[Effect]:
+    """Return the effects found, and those the robot keeps with what was found of them."""
+    gone = {effect.label for effect in (*found.effects, *found.removed)}
+    kept = []
+    for effect in robot.effects:
+        if effect.label not in gone:
+            own = f"{effect.label}."
+            pairs = zip(found.names, found.values.tolist(), strict=True)
+            kept.append(
+                effect.with_values({n.removeprefix(own): v for n, v in pairs if n.startswith(own)})
+            )
+    return [*found.effects, *kept]
 
 
 def _changes(
@@ -142,11 +151,17 @@ def _changes(
     """Return new values and comments by the place they belong to."""
     changes: dict[Key, float] = {}
     notes: dict[Key, list[str]] = {}
-    labels = {
-        f"{effect.label}.{name}" for effect in found.effects for name in effect.parameters or {}
+    stands = _effect_places(document)
+    before = {
+        f"{effect.label}.{name}": old
+        for effect in robot.effects
+        for name, old in (effect.parameters or {}).items()
     }
     for name, value, error in zip(found.names, found.values, found.standard_errors, strict=True):
-        if name in labels:
+        if name in stands:
+            effect_key, unit = stands[name]
+            text = _note(name, value, error, unit, before.get(name))
+            notes.setdefault(effect_key, []).append(text)
             continue
         joint, quantity = _place(robot, document, name)
         base: Key = ("joint", joint)
@@ -175,6 +190,19 @@ def _changes(
     for place in {int(key[1]) for key in changes}:
         _refuse_inertia(document, changes, place)
     return changes, notes
+
+
+def _effect_places(document: dict[str, Any]) -> dict[str, tuple[Key, str]]:
+    """Return place and unit of every parameter of an effect by its name in `Identified`.
+
+    A parameter that is left out, at its neutral value, stands where the name of the effect is.
+    """
+    out: dict[str, tuple[Key, str]] = {}
+    for i, effect in enumerate(stated_effects(document)):
+        for p in effect_info(effect.name).parameters:
+            key = p.name if p.name in (effect.parameters or {}) else "name"
+            out[f"{effect.label}.{p.name}"] = (("effect", i, key), p.unit)
+    return out
 
 
 def _place(robot: Robot, document: dict[str, Any], name: str) -> tuple[int, str]:
@@ -224,16 +252,19 @@ def _refuse_inertia(document: dict[str, Any], changes: dict[Key, float], joint: 
         )
 
 
-def _check(text: str, before: dict[str, Any], changes: dict[Key, float]) -> None:
+def _check(
+    text: str, before: dict[str, Any], changes: dict[Key, float], effects: list[Effect]
+) -> None:
     """Read the text back: it says what it should, bit for bit, and the robot loads."""
     wanted = before
     for key, value in changes.items():
         wanted = _replaced(wanted, key, value)
-    if not _equal(tomllib.loads(text), wanted):
+    own = Robot.from_toml(text).effects
+    same_effects = {e.label: e for e in own} == {e.label: e for e in effects}
+    if not same_effects or not _equal(tomllib.loads(text), wanted):
         raise RobotError(
             "source: its text cannot be edited faithfully; write it in plain TOML tables"
         )
-    Robot.from_toml(text)
 
 
 def _equal(a: Any, b: Any) -> bool:
@@ -254,12 +285,12 @@ def _replaced(node: Any, key: Key, value: float) -> Any:
     return copy
 
 
-def _note(name: str, value: float, error: float, unit: str, old: float) -> str:
+def _note(name: str, value: float, error: float, unit: str, old: float | None) -> str:
     text = f"{_MARK}{name} = {value:.6g} {unit}"
     if np.isfinite(error):
         share = f" ({100 * error / abs(value):.2g} %)" if value else ""
         text += f", standard error {error:.2g}{share}"
-    return f"{text}, before {old:.6g}"
+    return text if old is None else f"{text}, before {old:.6g}"
 
 
 def _without_old(text: str, found: Identified) -> str:
@@ -289,7 +320,7 @@ def _headed(text: str, found: Identified, sidecar_name: str) -> str:
 
 
 def load_identified(path: Path | str, *, check: bool = True) -> Identified:
-    """Return what `write_identified` wrote: values, uncertainty, effects, provenance, robot.
+    """Return what `write_identified` wrote: values, uncertainty, provenance, and the robot.
 
     path
         The robot file, or its sidecar.
@@ -297,19 +328,21 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         Raise if the robot file is not the one the sidecar was written with (edited since);
         False takes both as they are.
 
-    The result's ``robot`` has the effects that were found. Raises InputError for files that are missing, of
-    another schema, or do not belong together, RobotError for the robot and impossible effects.
+    ``effects`` are those of the ``robot``. A sidecar of version 1 holds effects that its robot file
+    cannot state: the robot has them too, and `write_identified` states them. Raises InputError for
+    files that are missing, of another schema, or do not belong together, RobotError for the robot and
+    impossible effects.
     """
     given = Path(path)
     sidecar = given if given.name.endswith(".identified.json") else sidecar_path(given)
-    report = _read_sidecar(sidecar)
+    report = read_sidecar(sidecar)
     if Path(report.robot).name != report.robot:
         raise InputError(f"{sidecar}: robot: expected a file beside it, got {report.robot!r}")
     robot = load_robot(sidecar.with_name(report.robot))
     if check and text_hash(robot.toml) != report.robot_sha256:
         raise InputError(_changed(sidecar, report.robot))
     source = report.provenance
-    effects = _effects(report, robot)
+    robot = with_earlier_effects(robot, report)
     names = tuple(p.name for p in report.parameters)
     values = np.array([p.value for p in report.parameters])
     errors = [np.nan if p.standard_error is None else p.standard_error for p in report.parameters]
@@ -320,8 +353,8 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
         covariance=None
         if report.covariance is None
         else checked_covariance(report.covariance, len(names)),
-        effects=effects,
-        robot=robot.with_effects(effects),
+        effects=robot.effects,
+        robot=robot,
         provenance=Provenance(
             source.method,
             source.data,
@@ -333,64 +366,11 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     )
 
 
-def load_with_effects(
-    source: Path | str, given: Iterable[Effect] = (), *, check: bool = False
-) -> tuple[Robot, str]:
-    """Return a robot with the effects that its sidecar knows of, and one line about them.
-
-    source
-        A robot file or the name of a preset, as for `load_robot`.
-    given
-        Effects that the caller adds himself: those of the sidecar on the same axis with the
-        same name are left out.
-    check
-        Raise InputError for a robot file that was edited since its sidecar was written.
-
-    The line names the effects and the sidecar. It is empty where a sidecar has nothing to add: for
-    presets, for files without one, and where no effect in it does anything. Effects of a sidecar
-    that was written with another text of the robot are not used, and the line says so. Raises
-    InputError for a sidecar of another schema, RobotError for the robot and impossible effects.
-    """
-    robot = load_robot(source)
-    sidecar = sidecar_path(source)
-    if (isinstance(source, str) and source in PRESETS) or not sidecar.is_file():
-        return robot, ""
-    report = _read_sidecar(sidecar)
-    if text_hash(robot.toml) != report.robot_sha256:
-        if check:
-            raise InputError(_changed(sidecar, Path(source).name))
-        unused = ", ".join(Effect(e.name, e.axis, e.parameters).label for e in report.effects)
-        text = f"{Path(source).name} was changed after {sidecar} was written: its effects are not"
-        return robot, f"{text} used ({unused})" if unused else ""
-    effects = without(_effects(report, robot), given)
-    named = ", ".join(effect.label for effect in effects if effect.acts)
-    line = f"with the effects in {sidecar}: {named}" if named else ""
-    return robot.with_effects(effects), line
-
-
-def _read_sidecar(sidecar: Path) -> Sidecar:
-    try:
-        text = sidecar.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"path: expected the sidecar {sidecar}: {error}") from error
-    try:
-        return Sidecar.model_validate_json(text)
-    except ValidationError as error:
-        raise InputError(f"{sidecar}: {first_fault(error)}") from None
-
-
 def _changed(sidecar: Path, robot: str) -> str:
     return (
         f"{sidecar}: the robot {robot} was changed after it was written: identify again, "
         "or pass check=False to take both as they are"
     )
-
-
-def _effects(report: Sidecar, robot: Robot) -> tuple[Effect, ...]:
-    """Return the effects in a sidecar, checked for its robot."""
-    effects = tuple(Effect(e.name, e.axis, e.parameters) for e in report.effects)
-    check_effects(effects, robot.n_axes)
-    return effects
 
 
 def _created(text: str, sidecar: Path) -> datetime:

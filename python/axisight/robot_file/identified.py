@@ -42,10 +42,11 @@ class Identified:
 
     ``names`` are those of `axisight.robot_parameters` (``axis1.stiffness``), with
     ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes,
-    ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are; and for
-    effects ``<effect label>.<parameter>``, which are uncertain too but stand in ``effects``.
+    ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are; and
+    ``<effect label>.<parameter>`` for effects, of those found or of those that the robot has.
     ``values`` in SI units; ``standard_errors`` NaN where unknown; ``covariance`` over ``names``
-    or None. ``effects`` are what was found that the robot format has no place for.
+    or None. ``effects`` are those found; they take the place of those of the robot with the same
+    name and axis. ``removed`` are those of the robot that the values stand in the place of.
     """
 
     names: tuple[str, ...]
@@ -55,6 +56,7 @@ class Identified:
     covariance: Array | None = None
     effects: tuple[Effect, ...] = ()
     robot: Robot | None = None
+    removed: tuple[Effect, ...] = ()
 
     def value(self, name: str) -> float:
         """Return one value; raises InputError for a name that was not identified."""
@@ -70,6 +72,7 @@ def identified(
     standard_errors: Mapping[str, float] | None = None,
     covariance: ArrayLike | None = None,
     effects: Sequence[Effect] = (),
+    removed: Sequence[Effect] = (),
 ) -> Identified:
     """Return identified values, checked.
 
@@ -83,6 +86,8 @@ def identified(
         (n, n) in the order of ``values``.
     effects
         Effects found, with their parameters.
+    removed
+        Effects of the robot that the values have taken up: they leave its file.
 
     Raises InputError for values that are not finite, negative standard errors, a covariance
     that is not symmetric and positive semidefinite, of another size, or at odds with the standard
@@ -108,7 +113,9 @@ def identified(
             )
         errors[place] = number
     check_agreement(names, numbers, effects)
-    return Identified(names, numbers, errors, provenance, matrix, tuple(effects))
+    return Identified(
+        names, numbers, errors, provenance, matrix, tuple(effects), removed=tuple(removed)
+    )
 
 
 def identified_by_fit(
@@ -125,7 +132,7 @@ def identified_by_fit(
     for effect in effects:
         own = f"{effect.label}."
         new = {n.removeprefix(own): v for n, v in values.items() if n.startswith(own)}
-        updated.append(Effect(effect.name, effect.axis, {**(effect.parameters or {}), **new}))
+        updated.append(effect.with_values(new))
     labels = [effect.label for effect in updated]
     for name in values:
         if "@" in name and name.rpartition(".")[0] not in labels:

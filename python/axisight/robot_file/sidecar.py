@@ -1,8 +1,10 @@
-"""The file beside a written robot, schema ``axisight.identified/1``."""
+"""The file beside a written robot, schema ``axisight.identified/2``; version 1 is read too."""
 
 from __future__ import annotations
 
 import hashlib
+import json
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -12,7 +14,7 @@ from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file.identified import Identified
 
-SCHEMA: Literal["axisight.identified/1"] = "axisight.identified/1"
+SCHEMA: Literal["axisight.identified/2"] = "axisight.identified/2"
 
 
 class Strict(BaseModel):
@@ -30,7 +32,7 @@ class ParameterEntry(Strict):
 
 
 class EffectEntry(Strict):
-    """One effect found."""
+    """One effect of a sidecar of version 1."""
 
     name: str
     axis: int | None
@@ -48,19 +50,31 @@ class SourceEntry(Strict):
     notes: str
 
 
-class Sidecar(Strict):
-    """The file."""
+class Content(Strict):
+    """What the file says in every version."""
 
     # The name `schema` is taken by pydantic itself; the file says "schema".
     model_config = ConfigDict(extra="forbid", strict=True, populate_by_name=True)
-    format: Literal["axisight.identified/1"] = Field(alias="schema")
+    format: str = Field(alias="schema")
     robot: str
     robot_sha256: str
     source_sha256: str
     parameters: list[ParameterEntry]
     covariance: list[list[float]] | None
-    effects: list[EffectEntry]
     provenance: SourceEntry
+
+
+class Earlier(Content):
+    """The file of version 1: it held effects, which robot files could not state."""
+
+    format: Literal["axisight.identified/1"] = Field(alias="schema")
+    effects: list[EffectEntry]
+
+
+class Sidecar(Content):
+    """The file."""
+
+    format: Literal["axisight.identified/2"] = Field(alias="schema")
 
     @classmethod
     def of(cls, found: Identified, robot: Robot, text: str, name: str) -> Sidecar:
@@ -80,10 +94,6 @@ class Sidecar(Strict):
                     )
                 ],
                 covariance=None if found.covariance is None else found.covariance.tolist(),
-                effects=[
-                    EffectEntry(name=e.name, axis=e.axis, parameters=dict(e.parameters or {}))
-                    for e in found.effects
-                ],
                 provenance=SourceEntry(
                     method=given.method,
                     data=dict(given.data),
@@ -95,6 +105,33 @@ class Sidecar(Strict):
             )
         except ValidationError as error:
             raise InputError(f"provenance: {first_fault(error)}") from None
+
+
+def sidecar_path(robot_file: Path | str) -> Path:
+    """Return the path of the sidecar of ``robot_file``."""
+    path = Path(robot_file)
+    return path.with_name(f"{path.stem}.identified.json")
+
+
+def read_sidecar(path: Path) -> Sidecar | Earlier:
+    """Return the content of a sidecar; raises InputError naming file and field."""
+    try:
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"path: expected the sidecar {path}: {error}") from error
+    kind = Earlier if _is_earlier(text) else Sidecar
+    try:
+        return kind.model_validate_json(text)
+    except ValidationError as error:
+        raise InputError(f"{path}: {first_fault(error)}") from None
+
+
+def _is_earlier(text: str) -> bool:
+    try:
+        content = json.loads(text)
+    except ValueError:
+        return False
+    return isinstance(content, dict) and content.get("schema") == "axisight.identified/1"
 
 
 def known(number: float) -> float | None:

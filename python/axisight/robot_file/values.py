@@ -26,6 +26,7 @@ def values_of(
     provenance: Provenance,
     *,
     effects: Iterable[Effect] = (),
+    removed: Iterable[Effect] = (),
 ) -> Identified:
     """Return ``values`` with the covariance of what they were made from.
 
@@ -50,6 +51,7 @@ def values_of(
         else {n: float(e) for n, e in zip(values, errors, strict=True) if np.isfinite(e)},
         covariance=spread if known else None,
         effects=tuple(effects),
+        removed=tuple(removed),
     )
 
 

@@ -44,10 +44,10 @@ def simulate(
 
     Parameters
     ----------
-    robot : the robot; effects its preset models take part.
+    robot : the robot; effects that its file states take part.
     velocity_ref_rad_s : (n, n_axes), motor-side references through the controller; or
     torque_nm : (n, n_axes), commanded motor torques without controller. Give exactly one.
-    effects : further effects.
+    effects : further effects; one of the same name and axis as one of the robot replaces it.
     noise_seed, run : position noise of the robot's sensor as a function of
         (seed, run); no noise without a seed.
     noise : (n, n_axes) position noise [rad] instead of a seeded one.
@@ -124,7 +124,7 @@ def simulate_batch(
 
     Parameters
     ----------
-    robot : the robot; effects its preset models take part.
+    robot : the robot; effects that its file states take part.
     velocity_ref_rad_s : (n_runs, n, n_axes), motor-side references; or
     torque_nm : (n_runs, n, n_axes), commanded motor torques. Give exactly one.
     noise_seed, first_run : the noise of run ``i`` is that of ``run=first_run + i``.
@@ -200,7 +200,7 @@ def _simulated(
         raise InputError(f"threads: expected 0 (all cores) or more, got {threads}")
     return _core.simulate_batch(
         robot.core,
-        core_effects([*robot.effects, *effects]),
+        core_effects(effects),
         data.reshape(shape),
         reference=reference,
         integrator=integrator,
