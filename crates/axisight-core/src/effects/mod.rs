@@ -2,8 +2,10 @@
 //!
 //! One file per effect states its parameters, the value at which it vanishes,
 //! where it acts, its equation and its source. A new effect is a new file and
-//! one line in the table below.
+//! one line in the table below. Equations that other models share are in
+//! [`formulas`].
 
+pub mod formulas;
 mod harmonics;
 mod kernel;
 

@@ -1,5 +1,6 @@
 //! Gear stiffness that changes with load.
 
+use super::formulas::spring_torque;
 use super::{Acts, EffectInfo, Kernel, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -29,6 +30,6 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Cubic<S> {
     fn gear_torque(&self, loaded: S) -> S {
-        self.0 * loaded.square() * loaded
+        spring_torque(S::zero(), self.0, loaded)
     }
 }
