@@ -2,7 +2,6 @@
 //! one vector register of doubles.
 
 use super::{Register, Scalar};
-use std::array::from_fn;
 use std::fmt::Debug;
 
 /// Partial derivatives over `R` along a fixed number of seeds; arithmetic is elementwise.
@@ -37,6 +36,20 @@ pub trait Partials<R>: Copy + Debug + Send + Sync + 'static {
     fn seeded(self, i: usize) -> Self;
 }
 
+/// `[expression; N]` with an index. A plain loop: of the closures of `from_fn`, which the compiler
+/// takes longer over, some stay calls.
+macro_rules! each {
+    ($i:ident, $expression:expr) => {{
+        let mut out = [R::zero(); N];
+        let mut $i = 0;
+        while $i < N {
+            out[$i] = $expression;
+            $i += 1;
+        }
+        out
+    }};
+}
+
 impl<R: Scalar, const N: usize> Partials<R> for [R; N] {
     const COUNT: usize = N;
 
@@ -46,27 +59,27 @@ impl<R: Scalar, const N: usize> Partials<R> for [R; N] {
     }
     #[inline(always)]
     fn plus(self, b: Self) -> Self {
-        from_fn(|i| self[i] + b[i])
+        each!(i, self[i] + b[i])
     }
     #[inline(always)]
     fn minus(self, b: Self) -> Self {
-        from_fn(|i| self[i] - b[i])
+        each!(i, self[i] - b[i])
     }
     #[inline(always)]
     fn negated(self) -> Self {
-        from_fn(|i| -self[i])
+        each!(i, -self[i])
     }
     #[inline(always)]
     fn times(self, factor: R) -> Self {
-        from_fn(|i| self[i] * factor)
+        each!(i, self[i] * factor)
     }
     #[inline(always)]
     fn times_plus(self, factor: R, onto: Self) -> Self {
-        from_fn(|i| self[i].fma(factor, onto[i]))
+        each!(i, self[i].fma(factor, onto[i]))
     }
     #[inline(always)]
     fn if_positive(condition: R, a: Self, b: Self) -> Self {
-        from_fn(|i| condition.if_positive(a[i], b[i]))
+        each!(i, condition.if_positive(a[i], b[i]))
     }
     #[inline(always)]
     fn along(&self, i: usize) -> Option<R> {

@@ -269,3 +269,110 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
         self.coulomb + self.excess
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::{Hold, Output};
+    use super::*;
+    use axisight_core::effects::{Kernel, Motor, build};
+
+    const ORDER: f64 = 3.0;
+    const SMOOTHING: f64 = 0.3;
+
+    /// A chain of two masses with nothing but what `set` gives.
+    fn chain(set: impl Fn(&mut Vec<f64>)) -> Chain<f64, 2> {
+        let model = AxisModel {
+            masses: 2,
+            output: Output::Velocity,
+            hold: Hold::Zero,
+            smoothing: SMOOTHING,
+            ripple_orders: vec![ORDER],
+            substeps: 1,
+        };
+        let mut theta = vec![0.0; model.layout().len(1)];
+        set(&mut theta);
+        Chain::new(&model, |i| theta[i])
+    }
+
+    fn layout() -> super::super::layout::Layout {
+        super::super::layout::Layout {
+            masses: 2,
+            orders: 1,
+        }
+    }
+
+    fn kernel(name: &str, parameters: &[f64]) -> Box<dyn Kernel<f64>> {
+        build(name, parameters).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn motor(angle: f64, speed: f64) -> Motor<'static, f64> {
+        Motor {
+            angle,
+            speed,
+            command: 0.0,
+            load: 0.0,
+            internal: &[],
+        }
+    }
+
+    fn assert_same(got: f64, want: f64) {
+        assert_eq!(got.to_bits(), want.to_bits(), "{got} {want}");
+    }
+
+    fn sweep() -> impl Iterator<Item = f64> {
+        (-40..=40).map(|i| 0.137 * f64::from(i) + 0.001)
+    }
+
+    #[test]
+    fn friction_is_that_of_the_effects() {
+        let chain = chain(|theta| {
+            theta[layout().coulomb()] = 0.64;
+            theta[layout().excess()] = 0.27;
+            theta[layout().stribeck_speed()] = 1.7;
+        });
+        let stribeck = kernel("stribeck_friction", &[0.64, 0.27, 1.7, SMOOTHING]);
+        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING]);
+        for speed in sweep() {
+            let own = chain.friction::<true>(speed, Regime::Smooth);
+            assert_same(own, -stribeck.motor_torque(&motor(0.0, speed)));
+            let own = chain.friction::<false>(speed, Regime::Smooth);
+            assert_same(own, -coulomb.motor_torque(&motor(0.0, speed)));
+        }
+    }
+
+    #[test]
+    fn the_gear_is_that_of_the_effects() {
+        let chain = chain(|theta| {
+            theta[layout().cubic(0)] = 5.0;
+            theta[layout().backlash()] = 0.8;
+        });
+        let (gap, spring) = (
+            kernel("backlash", &[0.8]),
+            kernel("nonlinear_stiffness", &[5.0]),
+        );
+        for deflection in sweep() {
+            let state = State::new(|i| if i == 1 { deflection } else { 0.0 });
+            let (_, torques) = chain.springs::<true>(&state);
+            let (loaded, _) = gap.deflection(deflection);
+            assert!((torques[1] - spring.gear_torque(loaded)).abs() <= 0.0);
+            let (_, torques) = chain.springs::<false>(&state);
+            assert!((torques[1] - spring.gear_torque(deflection)).abs() <= 0.0);
+        }
+    }
+
+    #[test]
+    fn ripple_is_that_of_the_effect() {
+        let chain = chain(|theta| {
+            theta[layout().ripple(0)] = 0.11;
+            theta[layout().ripple(0) + 1] = -0.06;
+        });
+        let mut parameters = [0.0; 12];
+        parameters[..3].copy_from_slice(&[ORDER, 0.11, -0.06]);
+        let ripple = kernel("torque_ripple", &parameters);
+        for angle in sweep() {
+            let state = State::new(|i| if i == 0 { angle } else { 0.0 });
+            let own = chain.drive::<true>(&state, 0.0);
+            assert_same(own, ripple.motor_torque(&motor(angle, 0.0)));
+        }
+    }
+}
