@@ -5,8 +5,9 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{AxisightError, RobotError, input_error};
 use axisight_core::robot::{
     Controller, Linearization, Parameter, Plant, RigidBody, RobotDescription, equilibrium,
-    linearize, modes, read_robot, zoh_frequency_response,
+    linearize, read_robot, zoh_frequency_response,
 };
+use axisight_fit::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

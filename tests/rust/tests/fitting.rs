@@ -3,8 +3,8 @@
 use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription, equilibrium};
 use axisight_core::simulation::{Drive, Method, measurement_noise};
 use axisight_fit::identification::{
-    Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
-    ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
+    Fit, FitOptions, FitParameter, InverseDynamics, Loss, MotionRecord, Problem, ProblemError,
+    Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
 use axisight_tests::{ARM, PRESET, effect, largest, plant, robot, sines, trace};
@@ -112,10 +112,7 @@ fn distance(fit: &Fit, theta: &[f64], from: &[f64]) -> f64 {
 }
 
 fn settled(fit: &Fit) -> bool {
-    matches!(
-        fit.status,
-        FitStatus::LossConverged | FitStatus::StepConverged
-    )
+    fit.status.converged()
 }
 
 /// 4 sigma fails once in 16,000 for a normal error; the loss is chi-square with as many

@@ -1,12 +1,13 @@
 //! Data sets and parameters as residuals, their derivatives and normal equations.
 
 use super::AxisError;
-use super::gram::{Normal, Rows};
+use super::gram::Rows;
 use super::jet::{Jet, Partials};
 use super::layout::{AxisModel, Layout};
 use super::predictor::{Predictor, Trajectory};
 #[cfg(target_arch = "x86_64")]
 use super::wide;
+use axisight_numerics::descent::Normal;
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;

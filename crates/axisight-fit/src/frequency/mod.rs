@@ -15,10 +15,10 @@ mod weighting;
 
 pub use design::{Design, DesignError, DesignOptions, design};
 pub use hold::Hold;
-pub use minimize::{FrequencyFit, SearchOptions, SearchStatus, minimize};
+pub use minimize::{FrequencyFit, SearchOptions, minimize};
 pub use modes::{Mode, ModesError, modes};
 pub use problem::{
-    FrequencyFitError, FrequencyOptions, FrequencyParameter, FrequencyProblem, Normal, Scatter,
+    FrequencyFitError, FrequencyOptions, FrequencyParameter, FrequencyProblem, Scatter,
 };
 pub use response::{Columns, evaluate};
 pub use second_order::{Linearizer, SecondOrder, SecondOrderDerivative, SecondOrderError};

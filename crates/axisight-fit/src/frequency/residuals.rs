@@ -1,7 +1,7 @@
 //! Residuals of one operating point, their weights and normal equations.
 
-use super::problem::Normal;
 use crate::identification::Loss;
+use axisight_numerics::descent::Normal;
 use nalgebra::{Complex, DMatrix, DVector};
 
 type C = Complex<f64>;
