@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _USUAL = ("*.stiffness", "*.damping")
 _LINEAR = ("payload", "joint_stiffness", "joint_damping", "motor_inertia")
-_CONVERGED = ("loss_converged", "step_converged")
+_CONVERGED = ("loss_converged", "step_converged", "exact")
 POSE = "joint_angle_rad"
 """Attribute of a response that holds its operating point."""
 

@@ -16,8 +16,6 @@ mod bounded;
 mod normal;
 mod search;
 mod status;
-#[cfg(test)]
-mod tests;
 
 pub use bounded::{Bounded, LeastSquares, Limits, Reach};
 pub use normal::Normal;

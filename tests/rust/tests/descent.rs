@@ -1,6 +1,8 @@
 //! Searches whose end is known in closed form.
 
-use super::*;
+use axisight_numerics::descent::{
+    Bounded, Damping, LeastSquares, Limits, Normal, Outcome, Progress, Reach, Rules, Status, search,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Residuals and the rows of their Jacobian; nothing where the model does not hold.
@@ -346,6 +348,17 @@ fn iterations_and_exact_residuals_end_the_search() {
         let mut model = Model::new(rosenbrock, &[1.0, 1.0]);
         let (outcome, _) = run(&mut model, &wide(2), rules, &[1.0, 1.0]);
         assert_eq!((outcome.status, model.trials), (Status::Exact, 0));
+    }
+}
+
+/// Nothing to search for is no error.
+#[test]
+fn no_parameters_are_at_rest() {
+    for rules in &RULES {
+        let mut model = Model::new(|_| Some((vec![2.0], vec![vec![]])), &[]);
+        let (outcome, _) = run(&mut model, &wide(0), rules, &[]);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert_eq!(model.trials, 0);
     }
 }
 
