@@ -363,6 +363,11 @@ class Robot:
         interleaved; NaN where a frequency hits a pole. ``frequency_hz`` is (n_freq,) [Hz].
         """
 
+_Status = Literal["loss_converged", "step_converged", "exact", "max_iterations", "stalled"]
+
+def status_advice() -> list[tuple[str, str]]:
+    """What to mind of every status that is no convergence: pairs of status and advice."""
+
 @final
 class FitResult:
     """Result of a fit. Arrays are copies.
@@ -373,7 +378,7 @@ class FitResult:
     """
 
     @property
-    def status(self) -> Literal["loss_converged", "step_converged", "max_iterations", "stalled"]:
+    def status(self) -> _Status:
         """How the search ended."""
     @property
     def theta(self) -> _Array:
@@ -411,6 +416,41 @@ class FitResult:
     @property
     def at_bound(self) -> list[int]:
         """Indices (from 0) of the free parameters that ended on a bound."""
+    @property
+    def residual(self) -> _Array:
+        """Whitened residuals, shape (n_residuals,)."""
+    @property
+    def jacobian(self) -> _Array:
+        """Derivatives of the residuals, shape (n_free, n_residuals): one row per parameter."""
+    @property
+    def blocks(self) -> list[tuple[int, int, int, int]]:
+        """Blocks of the residual vector: (log, axis, start, length), all from 0."""
+    @property
+    def block_matrix(self) -> _Array:
+        """J^T W J by block, shape (n_blocks, n_free, n_free)."""
+    @property
+    def block_gradient(self) -> _Array:
+        """J^T W r by block, shape (n_blocks, n_free)."""
+    @property
+    def block_loss(self) -> _Array:
+        """Loss by block, shape (n_blocks,)."""
+
+@final
+class Linearization:
+    """A model at given parameters. Arrays are copies; order and units as in `FitResult`."""
+
+    @property
+    def theta(self) -> _Array:
+        """All parameters, frozen ones included, in their units, shape (n_parameters,)."""
+    @property
+    def loss(self) -> float:
+        """Loss, prior excluded."""
+    @property
+    def free(self) -> list[int]:
+        """Indices (from 0) of the free parameters, the order of all matrices."""
+    @property
+    def at_bound(self) -> list[int]:
+        """Indices (from 0) of the free parameters that lie on a bound."""
     @property
     def residual(self) -> _Array:
         """Whitened residuals, shape (n_residuals,)."""
@@ -509,7 +549,7 @@ class FrequencyFitResult:
     """
 
     @property
-    def status(self) -> Literal["loss_converged", "step_converged", "max_iterations", "stalled"]:
+    def status(self) -> _Status:
         """How the search ended."""
     @property
     def values(self) -> _Array:
@@ -679,6 +719,39 @@ def fit_inverse_dynamics(
     ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm]) of
     shape (n_samples, n_axes), motor side, one per log. ``weighting`` has one entry per axis.
     ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
+    """
+
+def evaluate_simulation(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[ParameterSpec],
+    records: Sequence[tuple[_Array, _Array]],
+    weighting: Sequence[_Weighting],
+    options: OptionSpec,
+    *,
+    input: Literal["reference", "torque", "tracking"] = "reference",
+    output: Literal["torque", "position"] = "torque",
+    warm: Sequence[tuple[int, _Array]] = ...,
+    cancel: CancelToken | None = None,
+) -> Linearization:
+    """Compare a free-running simulation with logs at the initial values of the parameters.
+
+    Arguments as for `fit_simulation`; columns of parameters in ``warm`` are taken from there.
+    """
+
+def evaluate_inverse_dynamics(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[ParameterSpec],
+    records: Sequence[tuple[_Array, _Array, _Array, _Array]],
+    weighting: Sequence[_Weighting],
+    options: OptionSpec,
+    *,
+    cancel: CancelToken | None = None,
+) -> Linearization:
+    """Predict the torque of measured motions at the initial values of the parameters.
+
+    Arguments as for `fit_inverse_dynamics`; the residual is prediction minus measurement.
     """
 
 @type_check_only

@@ -1,5 +1,5 @@
 //! Numerics with concrete types: Fourier transforms, eigenvalues, small complex systems in
-//! batches, weighting of residuals over frequency.
+//! batches, weighting of residuals over frequency, and the search for least squares.
 //!
 //! A crate of its own because generic libraries are compiled where they are used with a type:
 //! rustfft and faer are used here and nowhere else, so that a change anywhere above builds
@@ -13,6 +13,7 @@ mod ahead;
 mod complex_batch;
 mod complex_solve;
 mod dense;
+pub mod descent;
 mod dft;
 mod lane_fft;
 mod line_dft;

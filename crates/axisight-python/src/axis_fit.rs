@@ -4,7 +4,7 @@ use crate::convert::{array1, array2};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use axisight_fit::axis::{
     AxisError, AxisModel, AxisProblem, AxisSet, Hold, Output, SearchOptions, SearchParameter,
-    SearchResult, SearchStatus, search,
+    SearchResult, search,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -83,16 +83,6 @@ fn parameters(tuples: &[ParameterTuple]) -> Vec<SearchParameter> {
     tuples.iter().map(one).collect()
 }
 
-fn status(status: SearchStatus) -> &'static str {
-    match status {
-        SearchStatus::LossConverged => "loss_converged",
-        SearchStatus::StepConverged => "step_converged",
-        SearchStatus::Exact => "exact",
-        SearchStatus::MaxIterations => "max_iterations",
-        SearchStatus::Stalled => "stalled",
-    }
-}
-
 fn fit_error(error: AxisError) -> PyErr {
     match error {
         AxisError::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
@@ -120,13 +110,13 @@ type VectorAndMatrix<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>
 fn outcome<'py>(py: Python<'py>, result: SearchResult) -> PyResult<Outcome<'py>> {
     let free = result.normal.gradient.len();
     Ok((
-        status(result.status),
+        result.status.name(),
         array1(py, result.theta),
         result.loss,
         result.initial_loss,
         result.iterations,
         result.evaluations,
-        array2(py, result.normal.matrix, free)?,
+        array2(py, result.normal.matrix.as_slice().to_vec(), free)?,
         array1(py, result.residual),
         array2(py, result.block_gradients, free)?,
     ))

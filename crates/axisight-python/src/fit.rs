@@ -7,12 +7,16 @@ use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_fit::identification::{
-    Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
-    ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
+    BlockGram, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
+    MotionRecord, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
+    SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
+use axisight_numerics::descent::Status;
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// One parameter to fit, as Python hands it over.
 #[derive(FromPyObject)]
@@ -45,6 +49,8 @@ pub struct OptionSpec {
 
 /// Frequencies [Hz], weights and decimation of one axis.
 type WeightingTuple = (Vec<f64>, Vec<f64>, usize);
+/// Log, axis, start and length of a block.
+type BlockTuple = (usize, usize, usize, usize);
 /// Number of a parameter and its Jacobian column.
 type WarmColumn<'py> = (usize, PyReadonlyArray1<'py, f64>);
 
@@ -58,12 +64,7 @@ pub struct FitResult {
 impl FitResult {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.fit.status {
-            FitStatus::LossConverged => "loss_converged",
-            FitStatus::StepConverged => "step_converged",
-            FitStatus::MaxIterations => "max_iterations",
-            FitStatus::Stalled => "stalled",
-        }
+        self.fit.status.name()
     }
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -118,46 +119,111 @@ impl FitResult {
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array2(py, self.fit.columns.concat(), self.fit.n_residuals)
     }
-    /// Blocks as rows (log, axis, start, length).
     #[getter]
-    fn blocks(&self) -> Vec<(usize, usize, usize, usize)> {
-        let blocks = self.fit.blocks.iter().map(|g| g.block);
-        blocks.map(|b| (b.record, b.axis, b.start, b.len)).collect()
+    fn blocks(&self) -> Vec<BlockTuple> {
+        places(&self.fit.blocks)
     }
-    /// `J^T W J` by block, `(n_blocks, n_free, n_free)`.
     #[getter]
     fn block_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let n = self.fit.free.len();
-        array3(
-            py,
-            self.fit
-                .blocks
-                .iter()
-                .flat_map(|g| g.matrix.clone())
-                .collect(),
-            n,
-            n,
-        )
+        matrices(py, &self.fit.blocks, self.fit.free.len())
     }
-    /// `J^T W r` by block, `(n_blocks, n_free)`.
     #[getter]
     fn block_gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let n = self.fit.free.len();
-        array2(
-            py,
-            self.fit
-                .blocks
-                .iter()
-                .flat_map(|g| g.gradient.clone())
-                .collect(),
-            n,
-        )
+        gradients(py, &self.fit.blocks, self.fit.free.len())
     }
-    /// Loss by block.
     #[getter]
     fn block_loss<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array1(py, self.fit.blocks.iter().map(|g| g.loss).collect())
+        losses(py, &self.fit.blocks)
     }
+}
+
+/// A problem at given parameters; arrays are copies.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Linearization {
+    at: Point,
+}
+
+#[pymethods]
+impl Linearization {
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.at.theta.clone())
+    }
+    #[getter]
+    fn loss(&self) -> f64 {
+        self.at.loss
+    }
+    #[getter]
+    fn free(&self) -> Vec<usize> {
+        self.at.free.clone()
+    }
+    #[getter]
+    fn at_bound(&self) -> Vec<usize> {
+        self.at.at_bound.clone()
+    }
+    #[getter]
+    fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.at.residual.clone())
+    }
+    /// Jacobian columns of the free parameters, `(n_free, n_residuals)`.
+    #[getter]
+    fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, self.at.columns.concat(), self.at.residual.len())
+    }
+    #[getter]
+    fn blocks(&self) -> Vec<BlockTuple> {
+        places(&self.at.blocks)
+    }
+    #[getter]
+    fn block_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        matrices(py, &self.at.blocks, self.at.free.len())
+    }
+    #[getter]
+    fn block_gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        gradients(py, &self.at.blocks, self.at.free.len())
+    }
+    #[getter]
+    fn block_loss<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        losses(py, &self.at.blocks)
+    }
+}
+
+/// Blocks as rows (log, axis, start, length).
+fn places(blocks: &[BlockGram]) -> Vec<BlockTuple> {
+    let blocks = blocks.iter().map(|g| g.block);
+    blocks.map(|b| (b.record, b.axis, b.start, b.len)).collect()
+}
+
+/// `J^T W J` by block, `(n_blocks, n_free, n_free)`.
+fn matrices<'py>(
+    py: Python<'py>,
+    blocks: &[BlockGram],
+    n: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat = blocks.iter().flat_map(|g| g.matrix.iter().copied());
+    array3(py, flat.collect(), n, n)
+}
+
+/// `J^T W r` by block, `(n_blocks, n_free)`.
+fn gradients<'py>(
+    py: Python<'py>,
+    blocks: &[BlockGram],
+    n: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat = blocks.iter().flat_map(|g| g.gradient.iter().copied());
+    array2(py, flat.collect(), n)
+}
+
+/// Loss by block.
+fn losses<'py>(py: Python<'py>, blocks: &[BlockGram]) -> Bound<'py, PyArray1<f64>> {
+    array1(py, blocks.iter().map(|g| g.loss).collect())
+}
+
+/// What to mind of every status that is no convergence: pairs of status and advice.
+#[pyfunction]
+pub fn status_advice() -> Vec<(&'static str, &'static str)> {
+    let all = Status::ALL.iter();
+    all.filter_map(|s| Some((s.name(), s.advice()?))).collect()
 }
 
 fn parameters(specs: Vec<ParameterSpec>, robot: &RobotDescription) -> PyResult<Vec<FitParameter>> {
@@ -189,21 +255,24 @@ fn parameters(specs: Vec<ParameterSpec>, robot: &RobotDescription) -> PyResult<V
         .collect()
 }
 
-fn options(spec: &OptionSpec) -> PyResult<FitOptions> {
-    let loss = match spec.loss.as_str() {
-        "squared" => Loss::Squared,
-        "huber" => Loss::Huber(spec.loss_scale),
-        "soft_l1" => Loss::SoftL1(spec.loss_scale),
+fn loss(spec: &OptionSpec) -> PyResult<Loss> {
+    match spec.loss.as_str() {
+        "squared" => Ok(Loss::Squared),
+        "huber" => Ok(Loss::Huber(spec.loss_scale)),
+        "soft_l1" => Ok(Loss::SoftL1(spec.loss_scale)),
         other => {
             let text = format!("loss: expected squared, huber or soft_l1, got {other}");
-            return Err(InputError::new_err(text));
+            Err(InputError::new_err(text))
         }
-    };
+    }
+}
+
+fn options(spec: &OptionSpec) -> PyResult<FitOptions> {
     Ok(FitOptions {
         max_iterations: spec.max_iterations,
         loss_tolerance: spec.loss_tolerance,
         step_tolerance: spec.step_tolerance,
-        loss,
+        loss: loss(spec)?,
         nuisance_refreshes: spec.nuisance_refreshes,
     })
 }
@@ -234,7 +303,7 @@ fn problem_error(e: ProblemError) -> PyErr {
 
 fn solve<P: Problem + Send>(
     py: Python<'_>,
-    cancel: &std::sync::atomic::AtomicBool,
+    cancel: &AtomicBool,
     problem: &P,
     parameters: &[FitParameter],
     options: FitOptions,
@@ -247,6 +316,78 @@ fn solve<P: Problem + Send>(
     })
 }
 
+fn linearize<P: Problem + Send>(
+    py: Python<'_>,
+    cancel: &AtomicBool,
+    problem: &P,
+    parameters: &[FitParameter],
+    loss: Loss,
+    warm: &[WarmColumn<'_>],
+) -> PyResult<Linearization> {
+    let warm = warm_columns(warm);
+    let at = detached(py, cancel, || Point::new(problem, parameters, loss, &warm))?;
+    Ok(Linearization {
+        at: at.map_err(problem_error)?,
+    })
+}
+
+/// Pairs (input, target) of arrays `(n, n_axes)`.
+type RecordTuple<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
+
+/// What an error of simulation is made of, as Python hands it over.
+struct SimulationSpec<'a, 'py> {
+    robot: &'a Robot,
+    effects: Vec<EffectTuple>,
+    parameters: Vec<ParameterSpec>,
+    records: Vec<RecordTuple<'py>>,
+    weighting: Vec<WeightingTuple>,
+    options: &'a OptionSpec,
+    input: &'a str,
+    output: &'a str,
+}
+
+impl SimulationSpec<'_, '_> {
+    fn problem(self, cancel: &Arc<AtomicBool>) -> PyResult<SimulationErrorProblem> {
+        let (robot, options) = (&self.robot.description, self.options);
+        let n_axes = robot.n_axes();
+        let record = |(i, t): &RecordTuple<'_>| {
+            Ok(Record {
+                input: rows(i, "input", n_axes)?,
+                target: rows(t, "target", n_axes)?,
+            })
+        };
+        let problem = SimulationErrorProblem {
+            robot: robot.clone(),
+            effects: settings(self.effects),
+            parameters: parameters(self.parameters, robot)?,
+            records: self.records.iter().map(record).collect::<PyResult<_>>()?,
+            input: match self.input {
+                "reference" => SimulationInput::Reference,
+                "torque" => SimulationInput::Torque,
+                "tracking" => SimulationInput::Tracking,
+                other => {
+                    let text = "expected reference, torque or tracking";
+                    return Err(input_error(format!("input: {text}, got {other}")));
+                }
+            },
+            output: match self.output {
+                "torque" => SimulationOutput::Torque,
+                "position" => SimulationOutput::Position,
+                other => {
+                    let text = format!("output: expected torque or position, got {other}");
+                    return Err(input_error(text));
+                }
+            },
+            weighting: weightings(self.weighting),
+            method: options.integrator.method()?,
+            block_s: options.block_s,
+            cancel: Some(Arc::clone(cancel)),
+        };
+        problem.validate().map_err(problem_error)?;
+        Ok(problem)
+    }
+}
+
 /// Fit the simulation of logs. `records` are pairs (input, target) of `(n, n_axes)` arrays.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), cancel=None))]
@@ -256,7 +397,7 @@ pub fn fit_simulation(
     robot: &Robot,
     effects: Vec<EffectTuple>,
     parameters: Vec<ParameterSpec>,
-    records: Vec<(PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, f64>)>,
+    records: Vec<RecordTuple<'_>>,
     weighting: Vec<WeightingTuple>,
     options: OptionSpec,
     input: &str,
@@ -264,55 +405,55 @@ pub fn fit_simulation(
     warm: Vec<WarmColumn<'_>>,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<FitResult> {
-    let n_axes = robot.description.n_axes();
     let cancel = flag(cancel);
-    let problem = SimulationErrorProblem {
-        robot: robot.description.clone(),
-        effects: settings(effects),
-        parameters: self::parameters(parameters, &robot.description)?,
-        records: records
-            .iter()
-            .map(|(i, t)| {
-                Ok(Record {
-                    input: rows(i, "input", n_axes)?,
-                    target: rows(t, "target", n_axes)?,
-                })
-            })
-            .collect::<PyResult<_>>()?,
-        input: match input {
-            "reference" => SimulationInput::Reference,
-            "torque" => SimulationInput::Torque,
-            "tracking" => SimulationInput::Tracking,
-            _ => {
-                return Err(input_error(format!(
-                    "input: expected reference, torque or tracking, got {input}"
-                )));
-            }
-        },
-        output: match output {
-            "torque" => SimulationOutput::Torque,
-            "position" => SimulationOutput::Position,
-            _ => {
-                return Err(input_error(format!(
-                    "output: expected torque or position, got {output}"
-                )));
-            }
-        },
-        weighting: weightings(weighting),
-        method: options.integrator.method()?,
-        block_s: options.block_s,
-        cancel: Some(cancel.clone()),
+    let spec = SimulationSpec {
+        robot,
+        effects,
+        parameters,
+        records,
+        weighting,
+        options: &options,
+        input,
+        output,
     };
-    problem.validate().map_err(problem_error)?;
-    let fit_options = self::options(&options)?;
-    solve(
-        py,
-        &cancel,
-        &problem,
-        &problem.parameters,
-        fit_options,
-        &warm,
-    )
+    let problem = spec.problem(&cancel)?;
+    let options = self::options(&options)?;
+    let parameters = &problem.parameters;
+    solve(py, &cancel, &problem, parameters, options, &warm)
+}
+
+/// The simulation of logs at the initial values of the parameters.
+#[pyfunction]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), cancel=None))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+pub fn evaluate_simulation(
+    py: Python<'_>,
+    robot: &Robot,
+    effects: Vec<EffectTuple>,
+    parameters: Vec<ParameterSpec>,
+    records: Vec<RecordTuple<'_>>,
+    weighting: Vec<WeightingTuple>,
+    options: OptionSpec,
+    input: &str,
+    output: &str,
+    warm: Vec<WarmColumn<'_>>,
+    cancel: Option<&Bound<'_, CancelToken>>,
+) -> PyResult<Linearization> {
+    let cancel = flag(cancel);
+    let spec = SimulationSpec {
+        robot,
+        effects,
+        parameters,
+        records,
+        weighting,
+        options: &options,
+        input,
+        output,
+    };
+    let problem = spec.problem(&cancel)?;
+    let loss = loss(&options)?;
+    let parameters = &problem.parameters;
+    linearize(py, &cancel, &problem, parameters, loss, &warm)
 }
 
 /// A motion as (position, velocity, acceleration, torque), each `(n, n_axes)`, motor side.
@@ -322,6 +463,35 @@ type MotionTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
 );
+
+fn inverse_dynamics(
+    robot: &RobotDescription,
+    effects: Vec<EffectTuple>,
+    specs: Vec<ParameterSpec>,
+    records: &[MotionTuple<'_>],
+    weighting: Vec<WeightingTuple>,
+    block_s: f64,
+) -> PyResult<InverseDynamics> {
+    let n_axes = robot.n_axes();
+    let record = |(q, v, a, t): &MotionTuple<'_>| {
+        Ok(MotionRecord {
+            position: rows(q, "position", n_axes)?,
+            velocity: rows(v, "velocity", n_axes)?,
+            acceleration: rows(a, "acceleration", n_axes)?,
+            torque: rows(t, "torque", n_axes)?,
+        })
+    };
+    let problem = InverseDynamics {
+        robot: robot.clone(),
+        effects: settings(effects),
+        parameters: parameters(specs, robot)?,
+        records: records.iter().map(record).collect::<PyResult<_>>()?,
+        weighting: weightings(weighting),
+        block_s,
+    };
+    problem.validate().map_err(problem_error)?;
+    Ok(problem)
+}
 
 /// Fit the torque predicted from measured motions.
 #[pyfunction]
@@ -337,33 +507,30 @@ pub fn fit_inverse_dynamics(
     options: OptionSpec,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<FitResult> {
-    let n_axes = robot.description.n_axes();
-    let problem = InverseDynamics {
-        robot: robot.description.clone(),
-        effects: settings(effects),
-        parameters: self::parameters(parameters, &robot.description)?,
-        records: records
-            .iter()
-            .map(|(q, v, a, t)| {
-                Ok(MotionRecord {
-                    position: rows(q, "position", n_axes)?,
-                    velocity: rows(v, "velocity", n_axes)?,
-                    acceleration: rows(a, "acceleration", n_axes)?,
-                    torque: rows(t, "torque", n_axes)?,
-                })
-            })
-            .collect::<PyResult<_>>()?,
-        weighting: weightings(weighting),
-        block_s: options.block_s,
-    };
-    problem.validate().map_err(problem_error)?;
-    let fit_options = self::options(&options)?;
-    solve(
-        py,
-        &flag(cancel),
-        &problem,
-        &problem.parameters,
-        fit_options,
-        &[],
-    )
+    let (robot, block_s) = (&robot.description, options.block_s);
+    let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
+    let options = self::options(&options)?;
+    let parameters = &problem.parameters;
+    solve(py, &flag(cancel), &problem, parameters, options, &[])
+}
+
+/// The torque predicted from measured motions at the initial values of the parameters.
+#[pyfunction]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, cancel=None))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+pub fn evaluate_inverse_dynamics(
+    py: Python<'_>,
+    robot: &Robot,
+    effects: Vec<EffectTuple>,
+    parameters: Vec<ParameterSpec>,
+    records: Vec<MotionTuple<'_>>,
+    weighting: Vec<WeightingTuple>,
+    options: OptionSpec,
+    cancel: Option<&Bound<'_, CancelToken>>,
+) -> PyResult<Linearization> {
+    let (robot, block_s) = (&robot.description, options.block_s);
+    let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
+    let loss = loss(&options)?;
+    let parameters = &problem.parameters;
+    linearize(py, &flag(cancel), &problem, parameters, loss, &[])
 }

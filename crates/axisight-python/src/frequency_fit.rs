@@ -7,8 +7,7 @@ use crate::robot::Robot;
 use axisight_core::robot::Parameter;
 use axisight_fit::frequency::{
     Criterion, DesignOptions, FrequencyFit, FrequencyFitError, FrequencyOptions,
-    FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, SearchStatus,
-    Uncertainty, minimize,
+    FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, Uncertainty, minimize,
 };
 use axisight_fit::identification::Loss;
 use numpy::{
@@ -159,12 +158,7 @@ pub struct FrequencyFitResult {
 impl FrequencyFitResult {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.fit.status {
-            SearchStatus::LossConverged => "loss_converged",
-            SearchStatus::StepConverged => "step_converged",
-            SearchStatus::MaxIterations => "max_iterations",
-            SearchStatus::Stalled => "stalled",
-        }
+        self.fit.status.name()
     }
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {

@@ -37,12 +37,16 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<robot::Robot>()?;
     module.add_class::<entry::CancelToken>()?;
     module.add_class::<fit::FitResult>()?;
+    module.add_class::<fit::Linearization>()?;
     module.add_function(wrap_pyfunction!(effects::effect_table, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::check_integrator, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::evaluate_simulation, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::evaluate_inverse_dynamics, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::status_advice, module)?)?;
     module.add_function(wrap_pyfunction!(excitation::random_phases, module)?)?;
     module.add_function(wrap_pyfunction!(excitation::multisine_peak, module)?)?;
     module.add_function(wrap_pyfunction!(excitation::square_period, module)?)?;

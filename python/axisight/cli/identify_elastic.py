@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from axisight.frequency_fit.options import Criterion
 
 _USUAL = ("*.stiffness", "*.damping")
-_CONVERGED = ("loss_converged", "step_converged")
+_CONVERGED = ("loss_converged", "step_converged", "exact")
 POSE = "joint_angle_rad"
 """Attribute of a response that holds its operating point."""
 

@@ -97,8 +97,8 @@ class FitOptions:
 class Fitted:
     """Result of a fit.
 
-    ``status``: ``loss_converged``, ``step_converged``, ``max_iterations`` or
-    ``stalled``; ``warnings`` say in words what to mind (status, parameters on a
+    ``status``: ``loss_converged``, ``step_converged``, ``exact`` (nothing is left),
+    ``max_iterations`` or ``stalled``; ``warnings`` say in words what to mind (status, parameters on a
     bound, poor conditioning). ``values``, ``std`` and the matrices run over
     ``names``, the free parameters; ``std`` is from the sandwich covariance of
     data blocks, which stays valid when the model is incomplete.
@@ -304,18 +304,18 @@ def _full_name(parameter: Parameter, effects: Sequence[Effect]) -> str:
     return f"{effects[parameter.effect].label}.{parameter.name}"
 
 
+# What to mind of a search that did not arrive, by status.
+STATUS_ADVICE = dict(_core.status_advice())
+
 # Beyond this, a parameter combination is known a thousand times worse than the best one.
 _POOR_CONDITION = 1e6
 
 
 def _warnings(result: _core.FitResult, at_bound: Sequence[str]) -> list[str]:
     out = []
-    if result.status == "max_iterations":
-        out.append("stopped at the iteration limit: start closer or allow more iterations")
-    if result.status == "stalled":
-        out.append(
-            "no step lowers the loss although the gradient is not zero: tighten the integrator"
-        )
+    if result.status in STATUS_ADVICE:
+        remedy = ": tighten the integrator" if result.status == "stalled" else ""
+        out.append(STATUS_ADVICE[result.status] + remedy)
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}")
     if result.condition > _POOR_CONDITION:

@@ -18,6 +18,7 @@ from axisight.robot import Robot
 Real = NDArray[np.float64]
 
 NORMAL_95 = 1.959963984540054
+STATUS_ADVICE = dict(_core.status_advice())
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class FrequencyFit:
     covariance, correlation
         (n_parameters, n_parameters), of the kind ``std_from`` says.
     status
-        ``loss_converged``, ``step_converged``, ``max_iterations`` or ``stalled``.
+        ``loss_converged``, ``step_converged``, ``exact`` (nothing is left), ``max_iterations`` or
+        ``stalled``.
     misfit
         Mean square of a whitened residual, degrees of freedom counted: 1 if model and
         uncertainty are right.
@@ -170,13 +172,9 @@ def warn(
 ) -> tuple[str, ...]:
     """Return what to mind; ``doubt`` is what speaks against the variance of the responses."""
     out = []
-    if result.status == "max_iterations":
-        out.append("stopped at the iteration limit: start closer or allow more iterations")
-    if result.status == "stalled":
-        out.append(
-            "no step lowers the loss although the gradient is not zero: start closer, or take "
-            "several starts"
-        )
+    if result.status in STATUS_ADVICE:
+        remedy = ": start closer, or take several starts" if result.status == "stalled" else ""
+        out.append(STATUS_ADVICE[result.status] + remedy)
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}: widen it, or freeze the parameter")
     source = "taken from the scatter of residuals" if sandwich else "too small: use the sandwich"

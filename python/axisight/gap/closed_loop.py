@@ -93,6 +93,27 @@ class ClosedLoopFitter(ModelFitter):
             cancel=self.cancel,
         )
 
+    def linearize(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.Linearization:
+        """Evaluate the model in the core."""
+        return _core.evaluate_simulation(
+            self.robot.core,
+            core_effects(effects),
+            [core_spec(p, effects) for p in parameters],
+            self.records,
+            self.weighting.core(),
+            options,
+            input="tracking",
+            output="torque",
+            warm=warm,
+            cancel=self.cancel,
+        )
+
 
 def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
     """Return the commanded torque (n, n_axes) [Nm] of a simulator along a log's references.

@@ -105,17 +105,36 @@ class InverseDynamicsFitter(ModelFitter):
             cancel=self.cancel,
         )
 
+    def linearize(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.Linearization:
+        """Evaluate the model in the core."""
+        del warm
+        return _core.evaluate_inverse_dynamics(
+            self.robot.core,
+            core_effects(effects),
+            [core_spec(p, effects) for p in parameters],
+            self.motions,
+            self.weighting.core(),
+            options,
+            cancel=self.cancel,
+        )
+
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
     changed = robot.with_parameters(variant.robot_values)
-    result = _core.fit_inverse_dynamics(
+    result = _core.evaluate_inverse_dynamics(
         changed.core,
         core_effects(variant.effects),
         [],
         [at],
         Weighting.flat(robot.n_axes).core(),
-        FitOptions(max_iterations=0),
+        FitOptions(),
     )
     # The residual is prediction minus measurement, axis by axis.
     residual = result.residual.reshape(robot.n_axes, -1).T

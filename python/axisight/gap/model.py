@@ -44,41 +44,59 @@ class FreeEffect:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Linearized:
+    """Normal equations of a model at given parameters.
+
+    By block (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
+    ``loss`` (n_blocks,); ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters``
+    names the p columns: (None, robot parameter) or (effect position, parameter).
+    """
+
+    parameters: tuple[tuple[int | None, str], ...]
+    at_bound: tuple[tuple[int | None, str], ...]
+    matrix: Array
+    gradient: Array
+    loss: Array
+    prior_matrix: Array
+    prior_gradient: Array
+
+    @property
+    def total(self) -> float:
+        """Loss of the estimation logs."""
+        return float(self.loss.sum())
+
+
+@dataclass(frozen=True)
+class Evidence(Linearized):
     """A fitted model and what the data say of it.
 
     ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
-    fitted values and ``std`` per effect parameter. Normal equations by block
-    (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
-    ``loss`` (n_blocks,); ``log``, ``axis``, ``size`` (n_blocks,);
-    ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters`` names the p
-    columns: (None, robot parameter) or (effect position, parameter).
+    fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
+    ``size`` (n_blocks,) of the blocks.
     """
 
     effects: tuple[Effect, ...]
     free: tuple[FreeEffect, ...]
     robot_values: dict[str, float]
     std: dict[tuple[int | None, str], float]
-    parameters: tuple[tuple[int | None, str], ...]
     status: str
     condition: float
-    at_bound: tuple[tuple[int | None, str], ...]
-    matrix: Array
-    gradient: Array
-    loss: Array
     log: NDArray[np.int64]
     axis: NDArray[np.int64]
     start: NDArray[np.int64]
     size: NDArray[np.int64]
-    prior_matrix: Array
-    prior_gradient: Array
     residual: Array
     nuisance_columns: dict[str, Array]
 
-    @property
-    def total(self) -> float:
-        """Loss of the estimation logs."""
-        return float(self.loss.sum())
+
+@dataclass(frozen=True)
+class _Setup:
+    """What one fit is made of."""
+
+    effects: list[Effect]
+    parameters: list[Parameter]
+    own: list[Parameter]
+    warm: list[tuple[int, Array]]
 
 
 class ModelFitter(ABC):
@@ -128,6 +146,16 @@ class ModelFitter(ABC):
     ) -> _core.FitResult:
         """Run the fit in the core."""
 
+    @abstractmethod
+    def linearize(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, Array]],
+    ) -> _core.Linearization:
+        """Evaluate the model in the core, at the initial values."""
+
     def fit(
         self,
         free: Sequence[FreeEffect],
@@ -144,6 +172,40 @@ class ModelFitter(ABC):
         ``start`` ended, else at their nominal values; ``lazy`` takes their
         sensitivities from ``start`` instead of computing them.
         """
+        setup = self._setup(free, start, robot_values, lazy=lazy)
+        options = self._options(max_iterations)
+        result = self.solve(setup.effects, setup.parameters, options, setup.warm)
+        return _evidence(result, setup, list(free))
+
+    def evaluate(
+        self,
+        free: Sequence[FreeEffect],
+        start: Evidence | None = None,
+        *,
+        robot_values: Mapping[str, float] | None = None,
+    ) -> Linearized:
+        """Return the model where a lazy `fit` would begin."""
+        setup = self._setup(free, start, robot_values, lazy=True)
+        result = self.linearize(setup.effects, setup.parameters, self._options(), setup.warm)
+        return _linearized(result, setup)
+
+    def _options(self, max_iterations: int = 0) -> FitOptions:
+        return FitOptions(
+            max_iterations=max_iterations,
+            loss_tolerance=1e-4,
+            step_tolerance=1e-4,
+            nuisance_refreshes=0,
+            block_s=self.block_s,
+        )
+
+    def _setup(
+        self,
+        free: Sequence[FreeEffect],
+        start: Evidence | None,
+        robot_values: Mapping[str, float] | None,
+        *,
+        lazy: bool,
+    ) -> _Setup:
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
@@ -166,15 +228,7 @@ class ModelFitter(ABC):
         if lazy and start is not None:
             columns = start.nuisance_columns
             warm = [(i, columns[p.name]) for i, p in enumerate(own) if p.name in columns]
-        options = FitOptions(
-            max_iterations=max_iterations,
-            loss_tolerance=1e-4,
-            step_tolerance=1e-4,
-            nuisance_refreshes=0,
-            block_s=self.block_s,
-        )
-        result = self.solve(tried, parameters, options, warm)
-        return _evidence(result, parameters, own, list(free))
+        return _Setup(tried, parameters, own, warm)
 
 
 def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: str) -> Parameter:
@@ -199,46 +253,54 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
     return f"{robot.axis_names[effect.axis - 1]}.{stands_for[0]}"
 
 
-def _evidence(
-    result: _core.FitResult,
-    parameters: Sequence[Parameter],
-    own: Sequence[Parameter],
-    free: Sequence[FreeEffect],
-) -> Evidence:
-    every = [(p.effect, p.name) for p in parameters]
-    values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
-    for (place, name), value in zip(every, result.theta, strict=True):
-        if place is not None:
-            values[place][name] = float(value)
-    robot_values = {p.name: float(result.theta[i]) for i, p in enumerate(own)}
-    columns = result.free
-    theta = result.theta[columns]
-    names = tuple(every[i] for i in columns)
-    used = [parameters[i] for i in columns]
-    fitted = tuple(f.effect.with_values(v) for f, v in zip(free, values, strict=True))
+def _names(setup: _Setup) -> list[tuple[int | None, str]]:
+    return [(p.effect, p.name) for p in setup.parameters]
+
+
+def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) -> Linearized:
+    every, columns = _names(setup), result.free
+    used = [setup.parameters[i] for i in columns]
     precision = np.array([0.0 if p.prior is None else p.prior[1] ** -2 for p in used])
     mean = np.array([0.0 if p.prior is None else p.prior[0] for p in used])
-    blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
-    jacobian = result.jacobian
-    std = np.sqrt(np.maximum(np.diag(result.sandwich), 0.0))
-    return Evidence(
-        effects=fitted,
-        free=tuple(replace(f, effect=e) for f, e in zip(free, fitted, strict=True)),
-        robot_values=robot_values,
-        std={n: float(s) for n, s in zip(names, std, strict=True)},
-        parameters=names,
-        status=result.status,
-        condition=result.condition,
+    return Linearized(
+        parameters=tuple(every[i] for i in columns),
         at_bound=tuple(every[i] for i in result.at_bound),
         matrix=result.block_matrix,
         gradient=result.block_gradient,
         loss=result.block_loss,
+        prior_matrix=np.diag(precision),
+        prior_gradient=precision * (result.theta[columns] - mean),
+    )
+
+
+def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]) -> Evidence:
+    at = _linearized(result, setup)
+    values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
+    for (place, name), value in zip(_names(setup), result.theta, strict=True):
+        if place is not None:
+            values[place][name] = float(value)
+    fitted = tuple(f.effect.with_values(v) for f, v in zip(free, values, strict=True))
+    blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
+    jacobian = result.jacobian
+    std = np.sqrt(np.maximum(np.diag(result.sandwich), 0.0))
+    return Evidence(
+        parameters=at.parameters,
+        at_bound=at.at_bound,
+        matrix=at.matrix,
+        gradient=at.gradient,
+        loss=at.loss,
+        prior_matrix=at.prior_matrix,
+        prior_gradient=at.prior_gradient,
+        effects=fitted,
+        free=tuple(replace(f, effect=e) for f, e in zip(free, fitted, strict=True)),
+        robot_values={p.name: float(result.theta[i]) for i, p in enumerate(setup.own)},
+        std={n: float(s) for n, s in zip(at.parameters, std, strict=True)},
+        status=result.status,
+        condition=result.condition,
         log=blocks[:, 0],
         axis=blocks[:, 1],
         start=blocks[:, 2],
         size=blocks[:, 3],
-        prior_matrix=np.diag(precision),
-        prior_gradient=precision * (theta - mean),
         residual=result.residual,
-        nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(names) if e is None},
+        nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(at.parameters) if e is None},
     )

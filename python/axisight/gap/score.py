@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.model import Evidence
+from axisight.gap.model import Evidence, Linearized
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def predicted_loss(evidence: Evidence, blocks: NDArray[np.bool_], step: Array) -
     return np.asarray(loss + np.einsum("bij,i,j->b", evidence.matrix[blocks], step, step))
 
 
-def linear_gain(evidence: Evidence) -> float:
+def linear_gain(evidence: Linearized) -> float:
     """Return how much loss one undamped step from here promises."""
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient

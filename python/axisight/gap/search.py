@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -130,21 +131,19 @@ def _round(
     model = state.model
 
     def attempt(
-        option: FreeEffect, iterations: int, start: _Start | None = None
-    ) -> Evidence | None:
+        solve: Callable[..., A], option: FreeEffect, start: _Start | None = None
+    ) -> A | None:
         effects = [*model.free, option if start is None else start.option]
         values = None if start is None else start.robot_values
         try:
-            return fitter.fit(
-                effects, model, robot_values=values, lazy=True, max_iterations=iterations
-            )
+            return solve(effects, model, robot_values=values)
         except InputError as error:
             # A candidate that cannot be simulated is out, and the result says so.
             state.skipped[option.effect.label] = str(error)
             return None
 
     def screened(option: FreeEffect) -> _Start:
-        evidence = attempt(option, 0)
+        evidence = attempt(fitter.evaluate, option)
         best = _Start(option, model.robot_values, -np.inf)
         if evidence is not None:
             gain = model.total - evidence.total + linear_gain(evidence)
@@ -152,13 +151,13 @@ def _round(
         for values in option.starts:
             # A large effect bends the re-fitted simulator: its own starts begin without.
             start = _Start(option.at(values), {}, -np.inf)
-            evidence = attempt(option, 0, start)
+            evidence = attempt(fitter.evaluate, option, start)
             if evidence is not None and model.total - evidence.total > best.gain:
                 best = replace(start, gain=model.total - evidence.total)
         return best
 
     def fitted(start: _Start) -> Trial | None:
-        evidence = attempt(start.option, 15, start)
+        evidence = attempt(partial(fitter.fit, lazy=True), start.option, start)
         return None if evidence is None else trial(start.option, evidence)
 
     with ThreadPoolExecutor(settings.threads) as pool:
@@ -312,9 +311,7 @@ def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> boo
     """
     fitted = winner.trial.evidence
     others = [replace(f, free=()) for f in fitted.free[:-1]]
-    without = fitter.fit(
-        others, model, robot_values=fitted.robot_values, lazy=True, max_iterations=0
-    )
+    without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
     gain = model.total - fitted.total
     return without.total - fitted.total > 0.5 * gain and not fitter.within_tolerance(
         fitted.effects[-1]

@@ -37,10 +37,10 @@ Array = NDArray[np.float64]
 # Beyond this, a combination of parameters is known a thousand times worse than the best one.
 POOR_CONDITION = 1e6
 
-STATUS_ADVICE = {
-    "max_iterations": "stopped at the iteration limit: allow more iterations or start closer",
-    "stalled": "no step lowers the loss although its slope promises one: the model is not smooth "
-    "here; try more substeps, a friction smoothing, or another start",
+_SEARCH_ADVICE = dict(_core.status_advice())
+STATUS_ADVICE = _SEARCH_ADVICE | {
+    "stalled": f"{_SEARCH_ADVICE['stalled']}: the model is not smooth here; try more substeps, a "
+    "friction smoothing, or another start",
     "noise_rounds": "parameters and noise filter did not agree within FitSettings.ar_rounds: allow "
     "more rounds or fix the order (ar_order). The values are those of the last round",
 }

@@ -4,7 +4,7 @@ use axisight_core::plant::equilibrium;
 use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method, measurement_noise};
 use axisight_fit::identification::{
-    Fit, FitOptions, FitParameter, FitStatus, InverseDynamics, Loss, MotionRecord, Problem,
+    Fit, FitOptions, FitParameter, InverseDynamics, Linearization, Loss, MotionRecord, Problem,
     ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
@@ -113,10 +113,7 @@ fn distance(fit: &Fit, theta: &[f64], from: &[f64]) -> f64 {
 }
 
 fn settled(fit: &Fit) -> bool {
-    matches!(
-        fit.status,
-        FitStatus::LossConverged | FitStatus::StepConverged
-    )
+    fit.status.converged()
 }
 
 /// 4 sigma fails once in 16,000 for a normal error; the loss is chi-square with as many
@@ -378,6 +375,47 @@ fn warm_columns_are_used_and_checked() {
     let short = [(3, vec![0.0; 5])];
     let error =
         fit(&problem, &problem.parameters, FitOptions::default(), &short).expect_err("short");
+    assert!(matches!(error, ProblemError::Invalid { field, .. } if field == "warm"));
+}
+
+/// A fit that may take no step ends where the problem is linearized.
+#[test]
+fn linearization_is_the_fit_before_its_first_step() {
+    let mut problem = arm_problem(10, SIGMA);
+    problem.parameters[1].frozen = true;
+    problem.parameters[2].upper = problem.parameters[2].initial;
+    for loss in [Loss::Squared, Loss::Huber(1.5)] {
+        let options = FitOptions {
+            max_iterations: 0,
+            loss,
+            ..FitOptions::default()
+        };
+        let fit = solve_with(&problem, options);
+        let at = Linearization::new(&problem, &problem.parameters, loss, &[]).expect("holds");
+        assert_eq!((fit.status.name(), fit.evaluations), ("max_iterations", 1));
+        assert_eq!((at.theta, at.free), (fit.theta, fit.free));
+        assert_eq!((at.residual, at.columns), (fit.residual, fit.columns));
+        assert_eq!((at.at_bound, fit.at_bound), (vec![2], vec![2]));
+        assert_eq!(at.loss.to_bits(), fit.loss.to_bits());
+        for (a, b) in at.blocks.iter().zip(&fit.blocks) {
+            assert_eq!((&a.matrix, &a.gradient), (&b.matrix, &b.gradient));
+        }
+    }
+}
+
+/// A column that is handed over is neither computed nor changed.
+#[test]
+fn linearization_takes_warm_columns_over() {
+    let problem = arm_problem(10, SIGMA);
+    let parameters = &problem.parameters;
+    let cold = Linearization::new(&problem, parameters, Loss::Squared, &[]).expect("holds");
+    let other = vec![7.0; cold.residual.len()];
+    let warm = [(2, other.clone())];
+    let at = Linearization::new(&problem, parameters, Loss::Squared, &warm).expect("holds");
+    assert_eq!(at.columns[2], other);
+    assert_eq!(at.columns[3], cold.columns[3]);
+    let short = [(2, vec![7.0; 5])];
+    let error = Linearization::new(&problem, parameters, Loss::Squared, &short).expect_err("short");
     assert!(matches!(error, ProblemError::Invalid { field, .. } if field == "warm"));
 }
 

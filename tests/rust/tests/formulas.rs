@@ -4,8 +4,9 @@ use axisight_core::effects::formulas::{
     dead_zone, dead_zone_inverse, harmonic, harmonic_slope, smoothed_sign, spring_torque,
     stribeck_level,
 };
+use axisight_core::plant::Plant;
 use axisight_core::robot::Parameter;
-use axisight_core::robot::{EffectSetting, Plant};
+use axisight_core::robot::{EffectSetting, Place};
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
 use axisight_fit::axis::{AxisModel, AxisProblem, AxisSet, Hold, Output};
 use axisight_scalar::{Dual, Scalar};
@@ -120,7 +121,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
     ];
     let setting = |name: &str, parameters: &[S]| EffectSetting {
         name: name.to_owned(),
-        axis: Some(0),
+        place: Place::Axis(0),
         parameters: parameters.to_vec(),
     };
     let fixed = S::constant;

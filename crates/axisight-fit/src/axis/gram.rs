@@ -1,6 +1,7 @@
 //! Residuals with their derivatives, sample by sample, and the normal equations they sum to.
 
 use super::numbers::LANES;
+use axisight_numerics::descent::Normal;
 
 /// Residuals of one data set and their derivatives.
 pub(super) struct Rows {
@@ -9,41 +10,6 @@ pub(super) struct Rows {
     /// Derivatives, eight parameters at a time: all samples of the first pass, then the next.
     pub partials: Vec<[f64; LANES]>,
     slots: Vec<usize>,
-}
-
-/// Loss, half its gradient, and the Gauss-Newton matrix.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Normal {
-    /// `r^T r`.
-    pub loss: f64,
-    /// `J^T r`.
-    pub gradient: Vec<f64>,
-    /// `J^T J`, row by row.
-    pub matrix: Vec<f64>,
-    /// Number of residuals.
-    pub count: usize,
-}
-
-impl Normal {
-    pub(super) fn zero(n: usize) -> Self {
-        Self {
-            loss: 0.0,
-            gradient: vec![0.0; n],
-            matrix: vec![0.0; n * n],
-            count: 0,
-        }
-    }
-
-    pub(super) fn add(&mut self, other: &Self) {
-        self.loss += other.loss;
-        self.count += other.count;
-        for (a, b) in self.gradient.iter_mut().zip(&other.gradient) {
-            *a += b;
-        }
-        for (a, b) in self.matrix.iter_mut().zip(&other.matrix) {
-            *a += b;
-        }
-    }
 }
 
 impl Rows {
@@ -143,7 +109,6 @@ impl Rows {
     /// Normal equations of `n` free parameters.
     pub fn normal(&self, n: usize) -> Normal {
         let mut out = Normal::zero(n);
-        out.count = self.residual.len();
         out.loss = self.residual.iter().map(|r| r * r).sum();
         let passes = self.slots.len().div_ceil(LANES);
         for a in 0..passes {
@@ -155,8 +120,8 @@ impl Rows {
                 let products = products(self.pass(a), self.pass(b));
                 for (i, row) in self.slots.iter().skip(a * LANES).zip(products) {
                     for (j, x) in self.slots.iter().skip(b * LANES).zip(row) {
-                        out.matrix[i * n + j] = x;
-                        out.matrix[j * n + i] = x;
+                        out.matrix[(*i, *j)] = x;
+                        out.matrix[(*j, *i)] = x;
                     }
                 }
             }

@@ -3,7 +3,7 @@
 //! Bottom to top: [`Layout`] says where each parameter stands; `chain` holds the equations of
 //! motion over any scalar, `motion` steps them through a sample with the sign of the friction
 //! followed exactly; `predictor` runs a data set; [`AxisProblem`] turns data sets into
-//! residuals and normal equations; [`search`] and [`multistart`] minimize.
+//! residuals and normal equations, which [`search`] minimizes.
 
 mod chain;
 mod data;
@@ -18,8 +18,7 @@ mod search;
 
 pub use data::AxisSet;
 pub use error::AxisError;
-pub use gram::Normal;
 pub use layout::{AxisModel, Hold, Layout, Output};
 pub use predictor::Trajectory;
 pub use problem::{AxisProblem, Linearization};
-pub use search::{SearchOptions, SearchParameter, SearchResult, SearchStatus, search};
+pub use search::{SearchOptions, SearchParameter, SearchResult, search};

@@ -2,11 +2,12 @@
 
 use super::data::AxisSet;
 use super::error::AxisError;
-use super::gram::{Normal, Rows};
+use super::gram::Rows;
 use super::layout::{AxisModel, Layout};
 use super::numbers::{Jet, LANES, PlainLanes, stored};
 use super::predictor::{Predictor, Trajectory};
 #[cfg(target_arch = "x86_64")]
+use axisight_numerics::descent::Normal;
 use axisight_scalar::wide;
 use axisight_scalar::{Register, Scalar};
 use rayon::prelude::*;

@@ -1,13 +1,13 @@
-//! Levenberg-Marquardt over normal equations, with bounds and priors.
+//! The search for the parameters of a linearized robot, over logarithms where they are asked for.
 //!
-//! Moré (1978), *The Levenberg-Marquardt algorithm: implementation and theory*, with the
-//! damping rule of Nielsen (1999), *Damping parameter in Marquardt's method*. One evaluation
-//! per trial gives loss and normal equations: with all derivatives at the price of two or
-//! three responses, a trial that is accepted has nothing left to compute.
+//! One evaluation per trial gives loss and normal equations: with all derivatives at the price
+//! of two or three responses, a trial that is accepted has nothing left to compute.
 
 use super::error::FrequencyFitError;
 use super::problem::{FrequencyProblem, Scatter};
-use super::residuals::Normal;
+use axisight_numerics::descent::{
+    Bounded, Damping, LeastSquares, Limits, Normal, Progress, Reach, Rules, Status, search,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// When a search stops.
@@ -15,30 +15,17 @@ use nalgebra::{DMatrix, DVector};
 pub struct SearchOptions {
     /// Largest number of accepted steps.
     pub max_iterations: usize,
-    /// Stop when an undamped step promises to lower the loss by less than this share.
+    /// Stop when a step promises to lower the loss by less than this share.
     pub gain_tolerance: f64,
     /// Stop when no parameter moves by more than this (a share, where searched over logarithms).
     pub step_tolerance: f64,
-}
-
-/// How a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SearchStatus {
-    /// A step promises nothing more.
-    LossConverged,
-    /// The parameters no longer move.
-    StepConverged,
-    /// Out of iterations.
-    MaxIterations,
-    /// No damping gives a lower loss although the gradient is not zero.
-    Stalled,
 }
 
 /// Result of a search; matrices run over the free parameters as searched.
 #[derive(Debug, Clone)]
 pub struct FrequencyFit {
     /// How it ended.
-    pub status: SearchStatus,
+    pub status: Status,
     /// All parameters in their own units.
     pub values: Vec<f64>,
     /// Slope of the value over the searched number, for the free parameters.
@@ -63,8 +50,6 @@ pub struct FrequencyFit {
     pub at_bound: Vec<usize>,
 }
 
-/// Trial steps that fail in a row before the search gives up.
-const MAX_REJECTIONS: usize = 14;
 /// Longest step: a factor of e where searched over logarithms.
 const LONGEST_STEP: f64 = 1.0;
 
@@ -77,8 +62,8 @@ pub fn minimize(
     options: SearchOptions,
 ) -> Result<FrequencyFit, FrequencyFitError> {
     let mut search = Search::new(problem)?;
-    let initial_loss = search.point.loss;
-    let status = search.run(options)?;
+    let initial_loss = search.point.plain;
+    let (status, iterations) = search.run(options)?;
     let scatter = problem.scatter(&search.theta)?;
     let values = problem.values(&search.theta);
     let slope = |i: &usize| {
@@ -88,218 +73,147 @@ pub fn minimize(
             1.0
         }
     };
+    let at_bound = search.limits().at_bound(&search.free());
     Ok(FrequencyFit {
         status,
         slopes: problem.free.iter().map(slope).collect(),
         free: problem.free.clone(),
-        loss: search.point.loss,
+        loss: search.point.plain,
         initial_loss,
-        iterations: search.iterations,
+        iterations,
         evaluations: search.evaluations,
-        matrix: search.point.matrix,
-        gradient: search.point.gradient,
-        at_bound: search.limits.at_bound(&problem.free, &search.theta),
+        matrix: search.point.normal.matrix,
+        gradient: search.point.normal.gradient,
+        at_bound: at_bound.into_iter().map(|s| problem.free[s]).collect(),
         scatter,
         values,
     })
 }
 
-/// Bounds and priors as searched, of all parameters.
-struct Limits {
-    lower: Vec<f64>,
-    upper: Vec<f64>,
-    prior: Vec<Option<(f64, f64)>>,
-}
-
-impl Limits {
-    fn new(problem: &FrequencyProblem) -> Self {
-        let all = || problem.parameters.iter();
-        let searched = |log: bool, x: f64| if log { x.ln() } else { x };
-        Self {
-            lower: all().map(|p| searched(p.logarithmic, p.lower)).collect(),
-            upper: all().map(|p| searched(p.logarithmic, p.upper)).collect(),
-            prior: all()
-                .map(|p| {
-                    let (mean, std) = p.prior?;
-                    let share = if p.logarithmic { std / mean } else { std };
-                    Some((searched(p.logarithmic, mean), share))
-                })
-                .collect(),
-        }
-    }
-
-    fn at_bound(&self, free: &[usize], theta: &[f64]) -> Vec<usize> {
-        let near = |i: &usize| {
-            let small = 1e-9 * theta[*i].abs().max(1.0);
-            theta[*i] - self.lower[*i] <= small || self.upper[*i] - theta[*i] <= small
-        };
-        free.iter().copied().filter(near).collect()
-    }
-
-    fn prior_loss(&self, free: &[usize], theta: &[f64]) -> f64 {
-        let one = |i: &usize| {
-            self.prior[*i].map_or(0.0, |(mean, std)| ((theta[*i] - mean) / std).powi(2))
-        };
-        free.iter().map(one).sum()
-    }
+/// An evaluated point.
+struct Point {
+    /// Priors included.
+    normal: Normal,
+    /// Loss of the residuals.
+    plain: f64,
 }
 
 struct Search<'a> {
     problem: &'a FrequencyProblem,
-    limits: Limits,
+    /// All parameters, as searched.
     theta: Vec<f64>,
-    /// Normal equations at `theta`, prior included except in the loss.
-    point: Normal,
-    iterations: usize,
+    /// Mean and standard deviation of the free parameters, as searched.
+    priors: Vec<Option<(f64, f64)>>,
+    point: Point,
     evaluations: usize,
+}
+
+/// A parameter as it is searched.
+fn searched(logarithmic: bool, value: f64) -> f64 {
+    if logarithmic { value.ln() } else { value }
 }
 
 impl<'a> Search<'a> {
     fn new(problem: &'a FrequencyProblem) -> Result<Self, FrequencyFitError> {
         let start = problem.parameters.iter();
-        let theta: Vec<f64> = start
-            .map(|p| {
-                if p.logarithmic {
-                    p.initial.ln()
-                } else {
-                    p.initial
-                }
-            })
-            .collect();
-        let limits = Limits::new(problem);
-        let point = evaluate(problem, &limits, &theta)?;
+        let theta: Vec<f64> = start.map(|p| searched(p.logarithmic, p.initial)).collect();
+        let prior = |i: &usize| {
+            let p = &problem.parameters[*i];
+            let (mean, std) = p.prior?;
+            let share = if p.logarithmic { std / mean } else { std };
+            Some((searched(p.logarithmic, mean), share))
+        };
+        let priors: Vec<_> = problem.free.iter().map(prior).collect();
         Ok(Self {
+            point: evaluate(problem, &priors, &theta)?,
             problem,
-            limits,
             theta,
-            point,
-            iterations: 0,
+            priors,
             evaluations: 1,
         })
     }
 
-    fn total(&self, point: &Normal, theta: &[f64]) -> f64 {
-        point.loss + self.limits.prior_loss(&self.problem.free, theta)
+    fn free(&self) -> Vec<f64> {
+        self.problem.free.iter().map(|i| self.theta[*i]).collect()
     }
 
-    fn run(&mut self, options: SearchOptions) -> Result<SearchStatus, FrequencyFitError> {
-        let (mut damping, mut growth, mut rejected) = (1e-3, 2.0, 0);
-        loop {
-            let total = self.total(&self.point, &self.theta);
-            let (_, promised) = self.step(1e-13);
-            if promised <= options.gain_tolerance * total {
-                return Ok(SearchStatus::LossConverged);
-            }
-            if self.iterations >= options.max_iterations {
-                return Ok(SearchStatus::MaxIterations);
-            }
-            let (theta, promised) = self.step(damping);
-            let moved = theta.iter().zip(&self.theta).map(|(a, b)| (a - b).abs());
-            if moved.fold(0.0, f64::max) < options.step_tolerance {
-                return Ok(SearchStatus::StepConverged);
-            }
-            self.evaluations += 1;
-            let trial = match evaluate(self.problem, &self.limits, &theta) {
-                Err(FrequencyFitError::Cancelled) => return Err(FrequencyFitError::Cancelled),
-                other => other.ok(),
-            };
-            let gain = trial.as_ref().map(|p| total - self.total(p, &theta));
-            match (trial, gain) {
-                (Some(point), Some(gain)) if gain > 0.0 => {
-                    let quality = (2.0 * gain / promised.max(f64::MIN_POSITIVE) - 1.0).powi(3);
-                    damping = (damping * (1.0 - quality).max(0.1)).max(1e-12);
-                    (self.theta, self.point) = (theta, point);
-                    (growth, rejected) = (2.0, 0);
-                    self.iterations += 1;
-                }
-                _ => {
-                    damping *= growth;
-                    growth *= 2.0;
-                    rejected += 1;
-                    if rejected > MAX_REJECTIONS {
-                        return Ok(SearchStatus::Stalled);
-                    }
-                }
-            }
+    fn limits(&self) -> Limits {
+        let free = || {
+            self.problem
+                .free
+                .iter()
+                .map(|i| &self.problem.parameters[*i])
+        };
+        Limits {
+            lower: free().map(|p| searched(p.logarithmic, p.lower)).collect(),
+            upper: free().map(|p| searched(p.logarithmic, p.upper)).collect(),
+            scale: vec![1.0; self.problem.free.len()],
+            reach: Reach::Scales(LONGEST_STEP),
         }
     }
 
-    /// Damped step within the bounds, and the fall of the loss it promises.
-    fn step(&self, damping: f64) -> (Vec<f64>, f64) {
-        let (free, n) = (&self.problem.free, self.problem.free.len());
-        let mut held = vec![false; n];
-        for _ in 0..=n {
-            let step = damped(&self.point, damping, &held);
-            let longest = step.amax();
-            let shrink = if longest > LONGEST_STEP {
-                LONGEST_STEP / longest
-            } else {
-                1.0
-            };
-            let mut theta = self.theta.clone();
-            let mut hit = false;
-            for (slot, i) in free.iter().enumerate() {
-                let wanted = self.theta[*i] + shrink * step[slot];
-                let outward = (wanted < self.limits.lower[*i]
-                    && self.theta[*i] <= self.limits.lower[*i])
-                    || (wanted > self.limits.upper[*i] && self.theta[*i] >= self.limits.upper[*i]);
-                if outward && !held[slot] {
-                    held[slot] = true;
-                    hit = true;
-                }
-                theta[*i] = wanted.clamp(self.limits.lower[*i], self.limits.upper[*i]);
-            }
-            if !hit {
-                let taken = free.iter().map(|i| theta[*i] - self.theta[*i]);
-                let taken = DVector::from_iterator(n, taken);
-                let curved = taken.dot(&(&self.point.matrix * &taken));
-                let promised = -2.0 * self.point.gradient.dot(&taken) - curved;
-                return (theta, promised.max(0.0));
-            }
+    fn run(&mut self, options: SearchOptions) -> Result<(Status, usize), FrequencyFitError> {
+        let rules = Rules {
+            max_iterations: options.max_iterations,
+            loss_tolerance: options.gain_tolerance,
+            progress: Progress::Promised,
+            step_tolerance: options.step_tolerance,
+            rounding: 0.0,
+            settled: options.gain_tolerance,
+            damping: Damping::Kept,
+        };
+        let (limits, start) = (self.limits(), self.free());
+        let mut descent = Bounded::new(self, &limits, start);
+        let outcome = search(&mut descent, &rules)?;
+        let end = descent.into_theta();
+        self.place(&end);
+        Ok((outcome.status, outcome.iterations))
+    }
+
+    /// Put the free parameters in their places.
+    fn place(&mut self, free: &[f64]) {
+        for (i, x) in self.problem.free.iter().zip(free) {
+            self.theta[*i] = *x;
         }
-        (self.theta.clone(), 0.0)
     }
 }
 
-/// Normal equations with those of the prior.
+impl LeastSquares for Search<'_> {
+    type Trial = Point;
+    type Error = FrequencyFitError;
+
+    fn normal(&self) -> &Normal {
+        &self.point.normal
+    }
+
+    fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Point)>, FrequencyFitError> {
+        self.evaluations += 1;
+        self.place(theta);
+        match evaluate(self.problem, &self.priors, &self.theta) {
+            Ok(trial) => Ok(Some((trial.normal.loss, trial))),
+            Err(FrequencyFitError::Cancelled) => Err(FrequencyFitError::Cancelled),
+            Err(_) => Ok(None),
+        }
+    }
+
+    fn accept(&mut self, _: &[f64], trial: Point) -> Result<(), FrequencyFitError> {
+        self.point = trial;
+        Ok(())
+    }
+}
+
+/// Normal equations with those of the priors.
 fn evaluate(
     problem: &FrequencyProblem,
-    limits: &Limits,
+    priors: &[Option<(f64, f64)>],
     theta: &[f64],
-) -> Result<Normal, FrequencyFitError> {
-    let mut point = problem.evaluate(theta, true)?;
-    for (slot, i) in problem.free.iter().enumerate() {
-        if let Some((mean, std)) = limits.prior[*i] {
-            point.matrix[(slot, slot)] += 1.0 / (std * std);
-            point.gradient[slot] += (theta[*i] - mean) / (std * std);
+) -> Result<Point, FrequencyFitError> {
+    let mut normal = problem.evaluate(theta)?;
+    let plain = normal.loss;
+    for (slot, (i, prior)) in problem.free.iter().zip(priors).enumerate() {
+        if let Some((mean, std)) = prior {
+            normal.add_prior(slot, theta[*i] - mean, *std);
         }
     }
-    Ok(point)
-}
-
-/// `-(A + damping diag A)^-1 g`, nothing for the held parameters.
-fn damped(point: &Normal, damping: f64, held: &[bool]) -> DVector<f64> {
-    let mut matrix = point.matrix.clone();
-    let mut gradient = point.gradient.clone();
-    for (i, held) in held.iter().enumerate() {
-        let own = matrix[(i, i)];
-        matrix[(i, i)] += damping * own;
-        // A parameter without influence stays where it is.
-        if *held || own <= 0.0 {
-            matrix.row_mut(i).fill(0.0);
-            matrix.column_mut(i).fill(0.0);
-            matrix[(i, i)] = 1.0;
-            gradient[i] = 0.0;
-        }
-    }
-    // Scaled to unit diagonal, the matrix loses no digits to units.
-    let scale = matrix.diagonal().map(|x| 1.0 / x.sqrt());
-    let unit = DMatrix::from_fn(held.len(), held.len(), |i, j| {
-        matrix[(i, j)] * scale[i] * scale[j]
-    });
-    let right = gradient.component_mul(&scale);
-    unit.cholesky().map_or_else(
-        || DVector::zeros(held.len()),
-        |c| -(c.solve(&right).component_mul(&scale)),
-    )
+    Ok(Point { normal, plain })
 }

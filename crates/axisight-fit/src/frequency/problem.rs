@@ -4,14 +4,15 @@ use super::checks::{check_parameters, check_pose};
 use super::columns::Columns;
 use super::error::{FrequencyFitError, invalid};
 use super::hold::Hold;
-use super::residuals::{Normal, Residuals};
+use super::residuals::Residuals;
 use super::response::evaluate;
 use super::second_order::{Linearizer, SecondOrderError};
 use super::settings::{FrequencyOptions, FrequencyParameter};
 use super::weighting::{Criterion, PoseResponse, Whitening, whitening};
 use crate::identification::Loss;
 use axisight_core::robot::{EffectSetting, RobotDescription};
-use nalgebra::{Complex, DMatrix, DVector};
+use axisight_numerics::descent::Normal;
+use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,7 +40,7 @@ struct Prepared {
     expected: Option<Vec<f64>>,
 }
 
-/// What the end of a fit reports besides [`Normal`].
+/// What the end of a fit reports besides its normal equations.
 #[derive(Debug, Clone)]
 pub struct Scatter {
     /// Covariance of `J^T W r` by the response's uncertainty; `None` if unknown.
@@ -107,22 +108,15 @@ impl FrequencyProblem {
         self.parameters.iter().zip(theta).map(natural).collect()
     }
 
-    /// Loss at `theta`, with the normal equations if `derivatives`.
+    /// Loss and normal equations of the free parameters (logarithms where searched so) at
+    /// `theta`.
     ///
     /// # Errors
     /// [`FrequencyFitError`] where the model does not hold.
-    pub fn evaluate(&self, theta: &[f64], derivatives: bool) -> Result<Normal, FrequencyFitError> {
-        let parts = self.each_pose(theta, derivatives, |_, residuals| residuals.normal())?;
-        let n = if derivatives { self.free.len() } else { 0 };
-        let mut sum = Normal {
-            loss: 0.0,
-            matrix: DMatrix::zeros(n, n),
-            gradient: DVector::zeros(n),
-        };
-        for part in parts {
-            sum.loss += part.loss;
-            sum.matrix += part.matrix;
-            sum.gradient += part.gradient;
+    pub fn evaluate(&self, theta: &[f64]) -> Result<Normal, FrequencyFitError> {
+        let mut sum = Normal::zero(self.free.len());
+        for part in self.each_pose(theta, |_, residuals| residuals.normal())? {
+            sum.add(&part);
         }
         Ok(sum)
     }
@@ -132,7 +126,7 @@ impl FrequencyProblem {
     /// # Errors
     /// [`FrequencyFitError`] where the model does not hold.
     pub fn information(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, FrequencyFitError> {
-        self.each_pose(theta, true, |_, residuals| residuals.normal().matrix)
+        self.each_pose(theta, |_, residuals| residuals.normal().matrix)
     }
 
     /// What the residuals at `theta` say of the covariance.
@@ -140,7 +134,7 @@ impl FrequencyProblem {
     /// # Errors
     /// [`FrequencyFitError`] where the model does not hold.
     pub fn scatter(&self, theta: &[f64]) -> Result<Scatter, FrequencyFitError> {
-        let parts = self.each_pose(theta, true, |pose, residuals| {
+        let parts = self.each_pose(theta, |pose, residuals| {
             let lines = pose.data.frequency_hz.len();
             (
                 pose.expected.as_ref().map(|v| residuals.expected(v, lines)),
@@ -168,7 +162,6 @@ impl FrequencyProblem {
     fn each_pose<T: Send>(
         &self,
         theta: &[f64],
-        derivatives: bool,
         take: impl Fn(&Prepared, Residuals) -> T + Sync,
     ) -> Result<Vec<T>, FrequencyFitError> {
         if self.cancel.load(Ordering::Relaxed) {
@@ -177,8 +170,7 @@ impl FrequencyProblem {
         let values = self.values(theta);
         let parameters = self.parameters.iter().map(|p| p.parameter);
         let overrides: Vec<_> = parameters.zip(values.iter().copied()).collect();
-        let seeds: &[usize] = if derivatives { &self.free } else { &[] };
-        let linearizer = Linearizer::new(&self.robot, &self.settings, &overrides, seeds)
+        let linearizer = Linearizer::new(&self.robot, &self.settings, &overrides, &self.free)
             .map_err(|source| FrequencyFitError::Robot { pose: 1, source })?;
         let slope = |i: &usize| {
             if self.parameters[*i].logarithmic {
@@ -187,7 +179,7 @@ impl FrequencyProblem {
                 1.0
             }
         };
-        let slopes: Vec<f64> = seeds.iter().map(slope).collect();
+        let slopes: Vec<f64> = self.free.iter().map(slope).collect();
         let one = |(number, pose): (usize, &Prepared)| {
             let residuals = self.residuals(number, pose, &linearizer, &slopes)?;
             Ok(take(pose, residuals))

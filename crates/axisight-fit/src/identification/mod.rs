@@ -1,15 +1,17 @@
-//! Fitting: residuals of several logs, exact sensitivities, Levenberg-Marquardt.
+//! Fitting: residuals of several logs, exact sensitivities, the search for their least squares.
 
+mod fit;
 mod gram;
 mod inverse_dynamics;
-mod levenberg_marquardt;
+mod linearize;
 mod loss;
 mod problem;
 mod simulation_error;
 
+pub use fit::{Fit, FitOptions, fit};
 pub use gram::{Block, BlockGram};
 pub use inverse_dynamics::{InverseDynamics, MotionRecord};
-pub use levenberg_marquardt::{Fit, FitOptions, FitStatus, fit};
+pub use linearize::Linearization;
 pub use loss::Loss;
 pub use problem::{Evaluation, FitParameter, Problem, ProblemError, Target};
 pub use simulation_error::{Record, SimulationErrorProblem, SimulationInput, SimulationOutput};

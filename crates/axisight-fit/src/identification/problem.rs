@@ -44,6 +44,17 @@ pub struct Evaluation {
     pub columns: Vec<Vec<f64>>,
 }
 
+impl Evaluation {
+    /// Itself, if all residuals are finite.
+    pub(super) fn finite(self) -> Result<Self, ProblemError> {
+        if self.residual.iter().all(|r| r.is_finite()) {
+            Ok(self)
+        } else {
+            Err(ProblemError::Failed("a residual is not finite".into()))
+        }
+    }
+}
+
 /// Why a problem cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {

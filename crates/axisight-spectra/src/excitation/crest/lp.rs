@@ -10,11 +10,14 @@
 //!    = 1/2 Re(b_j b_k W(j+k) + b_j conj(b_k) W(j-k))`,  `W(m) = sum_n w_n e^(2 pi i m n/N)`,
 //!
 //! one transform instead of a product of matrices as long as the grid.
+//!
+//! The loop is that of all fits; the descent is its own: phases turn, amplitudes are set right
+//! after every step, and the matrix, some thousand rows, is damped by the mean of its diagonal.
 
 use super::{CrestProblem, check_oversampling};
 use crate::excitation::ExcitationError;
-use axisight_numerics::solve_positive;
-use axisight_numerics::{LineGrid, LineTransform};
+use axisight_numerics::descent::{Damping, Descent, Progress, Rules, Step, search};
+use axisight_numerics::{LineGrid, LineTransform, solve_positive};
 use nalgebra::{Complex, DMatrix};
 
 /// Settings of the refinement.
@@ -74,13 +77,32 @@ pub(super) struct Refiner<'a> {
     weights: LineTransform<f64>,
 }
 
-struct Work {
-    coefficient: Vec<Complex<f64>>,
+/// Steps at one exponent after the other: the present point in `coefficient` and `grid`, the
+/// trial in `next` and `spare`.
+struct Level<'a, 'b, F> {
+    refiner: &'a Refiner<'b>,
+    stop: F,
+    coefficient: &'a mut [Complex<f64>],
+    next: Vec<Complex<f64>>,
     grid: LineGrid<f64>,
     spare: LineGrid<f64>,
     gradient: Vec<Complex<f64>>,
     weight: Vec<Complex<f64>>,
+    /// Normal matrix at the present point, once it was asked for.
+    matrix: Option<DMatrix<f64>>,
+    p: u32,
+    /// Norm at the present point.
+    norm: f64,
+    /// Norm at the trial, where it is finite.
+    trial: Option<f64>,
+    /// Steps tried at this exponent.
+    tried: usize,
+    /// Damping last asked for.
+    damping: f64,
 }
+
+/// No more steps at this exponent, or none at all.
+struct Enough;
 
 impl<'a> Refiner<'a> {
     pub fn new(problem: &'a CrestProblem, settings: LpRefinement) -> Self {
@@ -102,59 +124,49 @@ impl<'a> Refiner<'a> {
 
     /// Improve `coefficient`; returns the number of steps tried.
     pub fn run(&self, coefficient: &mut [Complex<f64>], stop: impl Fn() -> bool) -> usize {
+        /// A step that gains less than this share of the norm ends the level.
+        const WORTHWHILE: f64 = 2e-5;
         let zero = Complex::default();
-        let mut work = Work {
-            coefficient: coefficient.to_vec(),
+        let mut level = Level {
+            refiner: self,
+            stop,
+            next: coefficient.to_vec(),
+            coefficient,
             grid: self.signal.grid(),
             spare: self.signal.grid(),
             gradient: vec![zero; self.problem.lines.len()],
             weight: vec![zero; self.weights.lines().len()],
+            matrix: None,
+            p: 0,
+            norm: 0.0,
+            trial: None,
+            tried: 0,
+            damping: 1e-2,
         };
         let mut exponent = self.settings.first_exponent;
-        let (mut tried, mut damping) = (0, 1e-2);
-        while exponent <= self.settings.last_exponent {
-            tried += self.level(coefficient, exponent / 2, &mut damping, &mut work, &stop);
-            exponent *= 2;
-        }
-        tried
-    }
-
-    /// Damped Gauss-Newton steps at one exponent 2p.
-    fn level(
-        &self,
-        coefficient: &mut [Complex<f64>],
-        p: u32,
-        damping: &mut f64,
-        work: &mut Work,
-        stop: impl Fn() -> bool,
-    ) -> usize {
-        /// A step that gains less than this share of the norm ends the level.
-        const WORTHWHILE: f64 = 2e-5;
-        self.signal.synthesize(coefficient, &mut work.grid);
-        let mut norm = lp_norm(&work.grid, p);
         let mut tried = 0;
-        let mut fresh = true;
-        let mut matrix = DMatrix::zeros(0, 0);
-        while tried < self.settings.iterations && !stop() {
-            if fresh {
-                matrix = self.normal_matrix(coefficient, p, work);
-            }
-            tried += 1;
-            let stepped = self.step(coefficient, &matrix, p, *damping, work);
-            let better = stepped.filter(|new| *new < norm);
-            fresh = better.is_some();
-            let Some(new) = better else {
-                *damping *= 6.0;
-                continue;
+        while exponent <= self.settings.last_exponent {
+            level.begin(exponent / 2);
+            let rules = Rules {
+                max_iterations: self.settings.iterations,
+                loss_tolerance: WORTHWHILE,
+                progress: Progress::Gained { always: true },
+                step_tolerance: 0.0,
+                rounding: 0.0,
+                settled: 0.0,
+                damping: Damping::Constant {
+                    start: level.damping,
+                    shrink: 0.3,
+                    grow: 6.0,
+                    least: 1e-9,
+                    failures: self.settings.iterations,
+                },
             };
-            coefficient.copy_from_slice(&work.coefficient);
-            std::mem::swap(&mut work.grid, &mut work.spare);
-            *damping = (*damping * 0.3).max(1e-9);
-            let gain = 1.0 - new / norm;
-            norm = new;
-            if gain < WORTHWHILE {
-                break;
+            if let Ok(outcome) = search(&mut level, &rules) {
+                level.damping = outcome.damping;
             }
+            tried += level.tried;
+            exponent *= 2;
         }
         tried
     }
@@ -171,28 +183,40 @@ impl<'a> Refiner<'a> {
             })
             .collect()
     }
+}
+impl<F: Fn() -> bool> Level<'_, '_, F> {
+    fn begin(&mut self, p: u32) {
+        self.p = p;
+        self.tried = 0;
+        self.matrix = None;
+        let signal = &self.refiner.signal;
+        signal.synthesize(self.coefficient, &mut self.grid);
+        self.norm = lp_norm(&self.grid, p);
+    }
 
-    /// Lower half of the normal matrix; leaves the gradient's transform in `work`.
-    fn normal_matrix(&self, coefficient: &[Complex<f64>], p: u32, work: &mut Work) -> DMatrix<f64> {
-        let scale = 1.0 / work.grid.peak();
-        work.spare
-            .map_from(&work.grid, |x| power(x * scale, p) * x * scale);
-        self.signal.analyze(&mut work.spare, &mut work.gradient);
-        work.spare.map_from(&work.grid, |x| power(x * scale, p));
-        self.weights.analyze(&mut work.spare, &mut work.weight);
-        let lines = &self.problem.lines;
-        let b = self.directions(coefficient);
+    /// Lower half of the normal matrix; leaves the gradient's transform behind.
+    fn normal_matrix(&mut self) -> DMatrix<f64> {
+        let p = self.p;
+        let scale = 1.0 / self.grid.peak();
+        self.spare
+            .map_from(&self.grid, |x| power(x * scale, p) * x * scale);
+        let refiner = self.refiner;
+        refiner.signal.analyze(&mut self.spare, &mut self.gradient);
+        self.spare.map_from(&self.grid, |x| power(x * scale, p));
+        refiner.weights.analyze(&mut self.spare, &mut self.weight);
+        let lines = &refiner.problem.lines;
+        let b = refiner.directions(self.coefficient);
         let mut matrix = DMatrix::zeros(b.len(), b.len());
         for (column, (at, second)) in b.iter().enumerate() {
             let k = lines[*at];
             for (row, (at, first)) in b.iter().enumerate().skip(column) {
                 let j = lines[*at];
                 // The transform of the weights holds conj(W).
-                let sum = work.weight[j + k].conj();
+                let sum = self.weight[j + k].conj();
                 let difference = if j >= k {
-                    work.weight[j - k].conj()
+                    self.weight[j - k].conj()
                 } else {
-                    work.weight[k - j]
+                    self.weight[k - j]
                 };
                 let value = first * (second * sum + second.conj() * difference);
                 matrix[(row, column)] = 0.5 * value.re;
@@ -201,38 +225,71 @@ impl<'a> Refiner<'a> {
         matrix
     }
 
-    /// Try a step into `work.coefficient` and `work.spare`; the norm there.
-    fn step(
-        &self,
-        coefficient: &[Complex<f64>],
-        matrix: &DMatrix<f64>,
-        p: u32,
-        damping: f64,
-        work: &mut Work,
-    ) -> Option<f64> {
-        let n = self.parts.len();
+    /// Changes of all parameters by the damped step.
+    fn change(&self, matrix: &DMatrix<f64>, damping: f64) -> Option<Vec<f64>> {
+        let n = matrix.nrows();
         let mean = (0..n).map(|i| matrix[(i, i)]).sum::<f64>() / n as f64;
         let mut damped = matrix.clone();
         for i in 0..n {
             damped[(i, i)] += damping * mean;
         }
-        let b = self.directions(coefficient);
-        let scale = work.grid.peak() / f64::from(p);
-        let pull = |(at, b): &(usize, Complex<f64>)| -scale * (b * work.gradient[*at].conj()).re;
+        let b = self.refiner.directions(self.coefficient);
+        let scale = self.grid.peak() / f64::from(self.p);
+        let pull = |(at, b): &(usize, Complex<f64>)| -scale * (b * self.gradient[*at].conj()).re;
         let right: Vec<f64> = b.iter().map(pull).collect();
-        let change = solve_positive(&damped, &right)?;
-        work.coefficient.copy_from_slice(coefficient);
-        for (i, part) in self.parts.iter().enumerate() {
-            let delta = change[i];
+        solve_positive(&damped, &right)
+    }
+}
+
+impl<F: Fn() -> bool> Descent for Level<'_, '_, F> {
+    type Error = Enough;
+
+    fn loss(&self) -> f64 {
+        self.norm
+    }
+
+    fn step(&mut self, damping: f64) -> Result<Option<Step>, Enough> {
+        self.damping = damping;
+        if self.tried == self.refiner.settings.iterations || (self.stop)() {
+            return Err(Enough);
+        }
+        self.tried += 1;
+        let matrix = match self.matrix.take() {
+            Some(matrix) => matrix,
+            None => self.normal_matrix(),
+        };
+        let change = self.change(&matrix, damping);
+        self.matrix = Some(matrix);
+        let Some(change) = change else {
+            return Ok(None);
+        };
+        self.next.copy_from_slice(self.coefficient);
+        for (part, delta) in self.refiner.parts.iter().zip(change) {
             match *part {
-                Part::Phase(at) => work.coefficient[at] *= Complex::from_polar(1.0, delta),
-                Part::Real(at) => work.coefficient[at].re += delta,
-                Part::Imaginary(at) => work.coefficient[at].im += delta,
+                Part::Phase(at) => self.next[at] *= Complex::from_polar(1.0, delta),
+                Part::Real(at) => self.next[at].re += delta,
+                Part::Imaginary(at) => self.next[at].im += delta,
             }
         }
-        self.problem.project(&mut work.coefficient);
-        self.signal.synthesize(&work.coefficient, &mut work.spare);
-        Some(lp_norm(&work.spare, p)).filter(|norm| norm.is_finite())
+        self.refiner.problem.project(&mut self.next);
+        Ok(Some(Step::UNKNOWN))
+    }
+
+    fn attempt(&mut self) -> Result<Option<f64>, Enough> {
+        let signal = &self.refiner.signal;
+        signal.synthesize(&self.next, &mut self.spare);
+        self.trial = Some(lp_norm(&self.spare, self.p)).filter(|norm| norm.is_finite());
+        Ok(self.trial)
+    }
+
+    fn accept(&mut self) -> Result<(), Enough> {
+        if let Some(norm) = self.trial.take() {
+            self.norm = norm;
+            self.coefficient.copy_from_slice(&self.next);
+            std::mem::swap(&mut self.grid, &mut self.spare);
+            self.matrix = None;
+        }
+        Ok(())
     }
 }
 

@@ -1,0 +1,346 @@
+//! Fits with bounds, priors, robust loss and lazy nuisance columns.
+//!
+//! A trial point costs a plain simulation; only an accepted one gets its derivatives. Those of
+//! nuisance parameters are kept from point to point, so that promises of the linear model are
+//! not relied on.
+
+use super::gram::BlockGram;
+use super::linearize::{Linearization, at_bound, grams, limits};
+use super::loss::Loss;
+use super::problem::{Evaluation, FitParameter, Problem, ProblemError};
+use axisight_numerics::descent::{
+    Bounded, Damping, LeastSquares, Normal, Progress, Rules, Status, search,
+};
+use nalgebra::{DMatrix, DVector};
+
+/// Settings of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitOptions {
+    /// Largest number of accepted steps.
+    pub max_iterations: usize,
+    /// Stop when the loss falls by less than this share.
+    pub loss_tolerance: f64,
+    /// Stop when no parameter moves by more than this share of its scale.
+    pub step_tolerance: f64,
+    /// Loss of whitened residuals.
+    pub loss: Loss,
+    /// How often nuisance columns are computed anew after the search has settled.
+    pub nuisance_refreshes: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            max_iterations: 50,
+            loss_tolerance: 1e-10,
+            step_tolerance: 1e-8,
+            loss: Loss::Squared,
+            nuisance_refreshes: 2,
+        }
+    }
+}
+
+impl FitOptions {
+    /// Rules of a search with `left` iterations left.
+    fn rules(&self, left: usize) -> Rules {
+        Rules {
+            max_iterations: left,
+            loss_tolerance: self.loss_tolerance,
+            progress: Progress::Gained { always: false },
+            step_tolerance: self.step_tolerance,
+            rounding: 0.0,
+            settled: WORTH_REFRESHING,
+            damping: Damping::Constant {
+                start: 1e-3,
+                shrink: 0.2,
+                grow: 8.0,
+                least: 1e-12,
+                failures: 8,
+            },
+        }
+    }
+}
+
+/// Result of a fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// How it ended.
+    pub status: Status,
+    /// Parameters, frozen ones included.
+    pub theta: Vec<f64>,
+    /// Loss of the residuals, prior excluded.
+    pub loss: f64,
+    /// Loss at the start, prior excluded.
+    pub initial_loss: f64,
+    /// Number of residuals.
+    pub n_residuals: usize,
+    /// Accepted steps.
+    pub iterations: usize,
+    /// Evaluations of the problem.
+    pub evaluations: usize,
+    /// Numbers of the free parameters, the order of the matrices below.
+    pub free: Vec<usize>,
+    /// Inverse of the normal matrix (prior included), row-major: covariance for unit white noise.
+    pub covariance: Vec<f64>,
+    /// Covariance from the scatter of block gradients, valid when the residuals are
+    /// correlated or the model is incomplete; row-major.
+    pub sandwich: Vec<f64>,
+    /// Condition number of the normal matrix scaled to unit diagonal.
+    pub condition: f64,
+    /// Free parameters that ended on a bound.
+    pub at_bound: Vec<usize>,
+    /// Normal equations by block.
+    pub blocks: Vec<BlockGram>,
+    /// Whitened residuals.
+    pub residual: Vec<f64>,
+    /// Jacobian columns of the free parameters.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Share of the loss that new nuisance columns, or another step, have to be worth.
+const WORTH_REFRESHING: f64 = 1e-4;
+
+/// The present point of a fit, with everything the next step needs.
+struct Search<'a, P: Problem> {
+    problem: &'a P,
+    parameters: &'a [FitParameter],
+    rho: Loss,
+    /// All parameters.
+    theta: Vec<f64>,
+    free: Vec<usize>,
+    /// Columns renewed at every step: positions in `free`.
+    fresh: Vec<usize>,
+    columns: Vec<Vec<f64>>,
+    residual: Vec<f64>,
+    blocks: Vec<BlockGram>,
+    /// Loss of the residuals.
+    plain: f64,
+    /// Priors included.
+    normal: Normal,
+    evaluations: usize,
+}
+
+/// Fit `parameters` of `problem`. `warm` may hold Jacobian columns from an earlier
+/// fit for nuisance parameters: pairs of parameter number and column.
+///
+/// # Errors
+/// [`ProblemError`] for misuse or when the starting point cannot be evaluated.
+pub fn fit<P: Problem>(
+    problem: &P,
+    parameters: &[FitParameter],
+    options: FitOptions,
+    warm: &[(usize, Vec<f64>)],
+) -> Result<Fit, ProblemError> {
+    let start = Linearization::new(problem, parameters, options.loss, warm)?;
+    let initial_loss = start.loss;
+    let mut search = Search::new(problem, parameters, options.loss, start);
+    let lazy = search.fresh.len() < search.free.len();
+    let (mut status, mut iterations) = search.descend(&options, 0)?;
+    for _ in 0..options.nuisance_refreshes {
+        if !lazy || matches!(status, Status::MaxIterations | Status::Exact) {
+            break;
+        }
+        let before = search.normal.loss;
+        search.refresh()?;
+        (status, iterations) = search.descend(&options, iterations)?;
+        if before - search.normal.loss <= WORTH_REFRESHING * before {
+            break;
+        }
+    }
+    Ok(search.finish(status, initial_loss, iterations))
+}
+
+impl<'a, P: Problem> Search<'a, P> {
+    fn new(
+        problem: &'a P,
+        parameters: &'a [FitParameter],
+        rho: Loss,
+        start: Linearization,
+    ) -> Self {
+        let free = start.free;
+        let changing = |slot: &usize| !parameters[free[*slot]].nuisance;
+        let mut search = Self {
+            problem,
+            parameters,
+            rho,
+            fresh: (0..free.len()).filter(changing).collect(),
+            normal: Normal::zero(free.len()),
+            theta: start.theta,
+            free,
+            columns: start.columns,
+            residual: start.residual,
+            blocks: start.blocks,
+            plain: start.loss,
+            evaluations: 1,
+        };
+        search.sum();
+        search
+    }
+
+    /// Steps from the present point, after `iterations` of them; how the search ended and how
+    /// many steps there are now.
+    fn descend(
+        &mut self,
+        options: &FitOptions,
+        iterations: usize,
+    ) -> Result<(Status, usize), ProblemError> {
+        let limits = limits(self.parameters, &self.free);
+        let rules = options.rules(options.max_iterations - iterations);
+        let theta = self.free.iter().map(|i| self.theta[*i]).collect();
+        let outcome = search(&mut Bounded::new(self, &limits, theta), &rules)?;
+        Ok((outcome.status, iterations + outcome.iterations))
+    }
+
+    /// All columns anew.
+    fn refresh(&mut self) -> Result<(), ProblemError> {
+        let all: Vec<usize> = (0..self.free.len()).collect();
+        let evaluation = self.evaluate(&self.theta.clone(), &all)?;
+        self.take(evaluation, &all);
+        Ok(())
+    }
+
+    fn evaluate(&mut self, theta: &[f64], slots: &[usize]) -> Result<Evaluation, ProblemError> {
+        self.evaluations += 1;
+        let wanted: Vec<usize> = slots.iter().map(|s| self.free[*s]).collect();
+        self.problem.evaluate(theta, &wanted)?.finite()
+    }
+
+    /// Residuals and columns `slots` at the present point.
+    fn take(&mut self, evaluation: Evaluation, slots: &[usize]) {
+        for (slot, column) in slots.iter().zip(evaluation.columns) {
+            self.columns[*slot] = column;
+        }
+        self.residual = evaluation.residual;
+        (self.plain, self.blocks) = grams(
+            self.problem,
+            self.parameters,
+            &self.free,
+            self.rho,
+            &self.residual,
+            &self.columns,
+        );
+        self.sum();
+    }
+
+    /// Normal equations of all blocks and the priors.
+    fn sum(&mut self) {
+        let n = self.free.len();
+        let mut normal = Normal::zero(n);
+        normal.loss = self.plain;
+        for gram in &self.blocks {
+            let (gradient, matrix) = (normal.gradient.iter_mut(), normal.matrix.iter_mut());
+            gradient.zip(&gram.gradient).for_each(|(sum, x)| *sum += x);
+            matrix.zip(&gram.matrix).for_each(|(sum, x)| *sum += x);
+        }
+        for (slot, i) in self.free.iter().enumerate() {
+            if let Some((mean, std)) = self.parameters[*i].prior {
+                normal.add_prior(slot, self.theta[*i] - mean, std);
+            }
+        }
+        self.normal = normal;
+    }
+
+    /// All parameters, where the free ones are `free`.
+    fn all(&self, free: &[f64]) -> Vec<f64> {
+        let mut theta = self.theta.clone();
+        for (i, x) in self.free.iter().zip(free) {
+            theta[*i] = *x;
+        }
+        theta
+    }
+
+    fn prior_loss(&self, theta: &[f64]) -> f64 {
+        let priors = self.free.iter().filter_map(|i| {
+            let (mean, std) = self.parameters[*i].prior?;
+            Some(((theta[*i] - mean) / std).powi(2))
+        });
+        priors.sum()
+    }
+
+    fn finish(self, status: Status, initial_loss: f64, iterations: usize) -> Fit {
+        let scale = limits(self.parameters, &self.free).scale;
+        let n = self.free.len();
+        let scaled = DMatrix::from_fn(n, n, |i, j| {
+            self.normal.matrix[(i, j)] * scale[i] * scale[j]
+        });
+        let inverse = scaled
+            .clone()
+            .try_inverse()
+            .unwrap_or_else(|| DMatrix::from_element(n, n, f64::NAN));
+        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let mut scatter = DMatrix::zeros(n, n);
+        for gram in &self.blocks {
+            let g = DVector::from_column_slice(&gram.gradient);
+            scatter += &g * g.transpose();
+        }
+        let sandwich = &covariance * scatter * &covariance;
+        Fit {
+            status,
+            loss: self.plain,
+            initial_loss,
+            n_residuals: self.residual.len(),
+            iterations,
+            evaluations: self.evaluations,
+            covariance: covariance.as_slice().to_vec(),
+            sandwich: sandwich.as_slice().to_vec(),
+            condition: condition(&scaled),
+            at_bound: at_bound(self.parameters, &self.free, &self.theta),
+            theta: self.theta,
+            free: self.free,
+            blocks: self.blocks,
+            residual: self.residual,
+            columns: self.columns,
+        }
+    }
+}
+
+impl<P: Problem> LeastSquares for Search<'_, P> {
+    type Trial = Evaluation;
+    type Error = ProblemError;
+
+    fn normal(&self) -> &Normal {
+        &self.normal
+    }
+
+    fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Evaluation)>, ProblemError> {
+        let theta = self.all(theta);
+        match self.evaluate(&theta, &[]) {
+            Ok(trial) => {
+                let losses = trial.residual.iter().map(|r| self.rho.evaluate(*r).0);
+                let loss: f64 = losses.sum();
+                Ok(Some((loss + self.prior_loss(&theta), trial)))
+            }
+            Err(ProblemError::Cancelled) => Err(ProblemError::Cancelled),
+            Err(_) => Ok(None),
+        }
+    }
+
+    fn accept(&mut self, theta: &[f64], trial: Evaluation) -> Result<(), ProblemError> {
+        self.theta = self.all(theta);
+        let fresh = std::mem::take(&mut self.fresh);
+        let evaluation = if fresh.is_empty() {
+            trial
+        } else {
+            self.evaluate(&self.theta.clone(), &fresh)?
+        };
+        self.take(evaluation, &fresh);
+        self.fresh = fresh;
+        Ok(())
+    }
+}
+
+fn condition(matrix: &DMatrix<f64>) -> f64 {
+    let n = matrix.nrows();
+    if n == 0 {
+        return 1.0;
+    }
+    let unit = DMatrix::from_fn(n, n, |i, j| {
+        matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt()
+    });
+    if unit.iter().any(|x| !x.is_finite()) {
+        return f64::INFINITY;
+    }
+    let values = unit.symmetric_eigenvalues();
+    let (low, high) = (values.min(), values.max());
+    if low > 0.0 { high / low } else { f64::INFINITY }
+}

@@ -1,0 +1,240 @@
+//! Damped Gauss-Newton steps within bounds.
+
+use super::{Descent, Normal, Step};
+use nalgebra::{DMatrix, DVector};
+
+/// A sum of squares with its derivatives at the present point.
+///
+/// Parameters are the free ones, in the order of [`Limits`].
+pub trait LeastSquares {
+    /// What an evaluation leaves for [`LeastSquares::accept`].
+    type Trial;
+    /// Why a search cannot go on.
+    type Error;
+    /// Normal equations at the present point.
+    fn normal(&self) -> &Normal;
+    /// Loss at `theta`, `None` where the model does not hold. Derivatives may wait until the
+    /// point is accepted.
+    ///
+    /// # Errors
+    /// Ends the search.
+    fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Self::Trial)>, Self::Error>;
+    /// `theta` becomes the present point.
+    ///
+    /// # Errors
+    /// Ends the search.
+    fn accept(&mut self, theta: &[f64], trial: Self::Trial) -> Result<(), Self::Error>;
+    /// A trial that is given up: its memory may serve again.
+    fn reject(&mut self, trial: Self::Trial) {
+        drop(trial);
+    }
+}
+
+/// How far parameters may go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Lower bounds.
+    pub lower: Vec<f64>,
+    /// Upper bounds.
+    pub upper: Vec<f64>,
+    /// Sizes of natural changes.
+    pub scale: Vec<f64>,
+    /// How far in one step.
+    pub reach: Reach,
+}
+
+/// How far one step goes: far from the minimum it may promise nonsense.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reach {
+    /// To the bounds.
+    Bounds,
+    /// As many scales; a longer step is shortened as a whole.
+    Scales(f64),
+    /// A parameter that cannot be negative changes by this factor at most; what is left near
+    /// zero may go there. Moves are shares of the parameter itself, not of its scale.
+    Factor(f64),
+}
+
+/// Share of its scale below which a parameter is near zero.
+const NEAR_ZERO: f64 = 1e-3;
+/// Share of its scale by which a parameter on a bound may be off it.
+const ON_BOUND: f64 = 1e-9;
+
+impl Limits {
+    /// Where a step of parameter `i` ends, bounds apart.
+    fn reached(&self, i: usize, from: f64, step: f64) -> f64 {
+        let to = from + step;
+        match self.reach {
+            Reach::Factor(f) if self.lower[i] >= 0.0 && from > NEAR_ZERO * self.scale[i] => {
+                to.clamp(from / f, from * f)
+            }
+            _ => to,
+        }
+    }
+
+    /// Factor by which the whole step is shortened.
+    fn shortening(&self, step: &DVector<f64>) -> f64 {
+        let Reach::Scales(longest) = self.reach else {
+            return 1.0;
+        };
+        let lengths = step.iter().zip(&self.scale).map(|(x, s)| x.abs() / s);
+        let length = lengths.fold(0.0, f64::max);
+        if length > longest {
+            longest / length
+        } else {
+            1.0
+        }
+    }
+
+    /// Move of parameter `i` as a share of its size.
+    fn share(&self, i: usize, from: f64, to: f64) -> f64 {
+        let size = match self.reach {
+            Reach::Factor(_) => from.abs().max(NEAR_ZERO * self.scale[i]),
+            Reach::Bounds | Reach::Scales(_) => self.scale[i],
+        };
+        (to - from).abs() / size
+    }
+
+    /// Parameters of `theta` that lie on a bound.
+    pub fn at_bound(&self, theta: &[f64]) -> Vec<usize> {
+        let near = |i: &usize| {
+            let small = ON_BOUND * self.scale[*i];
+            theta[*i] - self.lower[*i] <= small || self.upper[*i] - theta[*i] <= small
+        };
+        (0..theta.len()).filter(near).collect()
+    }
+}
+
+/// Damped Gauss-Newton steps of a problem within its limits.
+///
+/// Marquardt (1963) with his scaling by the diagonal, which makes the units of the parameters
+/// irrelevant; steps are projected on the bounds, and found anew without the parameters on a
+/// bound that they would push outwards: Kanzow, Yamashita, Fukushima (2004).
+pub struct Bounded<'a, P: LeastSquares> {
+    problem: &'a mut P,
+    limits: &'a Limits,
+    theta: Vec<f64>,
+    next: Vec<f64>,
+    change: Vec<f64>,
+    held: Vec<bool>,
+    trial: Option<P::Trial>,
+}
+
+impl<'a, P: LeastSquares> Bounded<'a, P> {
+    /// From the problem's present point `theta`, which lies within the limits.
+    pub fn new(problem: &'a mut P, limits: &'a Limits, theta: Vec<f64>) -> Self {
+        let n = theta.len();
+        Self {
+            problem,
+            limits,
+            next: theta.clone(),
+            theta,
+            change: vec![0.0; n],
+            held: vec![false; n],
+            trial: None,
+        }
+    }
+
+    /// The present point.
+    pub fn into_theta(self) -> Vec<f64> {
+        self.theta
+    }
+
+    /// Cut `step` to what the limits allow; whether a parameter on a bound is pushed outwards
+    /// that was not held before.
+    fn cut(&mut self, step: &DVector<f64>) -> bool {
+        let limits = self.limits;
+        let shortening = limits.shortening(step);
+        let mut hit = false;
+        for (i, from) in self.theta.iter().enumerate() {
+            let (lower, upper) = (limits.lower[i], limits.upper[i]);
+            let wanted = limits.reached(i, *from, shortening * step[i]);
+            self.next[i] = wanted.clamp(lower, upper);
+            self.change[i] = self.next[i] - from;
+            let outward = (wanted < lower && *from <= lower) || (wanted > upper && *from >= upper);
+            if outward && !self.held[i] {
+                self.held[i] = true;
+                hit = true;
+            }
+        }
+        hit
+    }
+}
+
+impl<P: LeastSquares> Descent for Bounded<'_, P> {
+    type Error = P::Error;
+
+    fn loss(&self) -> f64 {
+        self.problem.normal().loss
+    }
+
+    fn step(&mut self, damping: f64) -> Result<Option<Step>, P::Error> {
+        self.held.fill(false);
+        // Every round holds one more.
+        loop {
+            let Some(step) = damped(self.problem.normal(), damping, &self.held) else {
+                return Ok(None);
+            };
+            if self.cut(&step) {
+                continue;
+            }
+            let normal = self.problem.normal();
+            let moves = self.theta.iter().zip(&self.next).enumerate();
+            let shares = moves.map(|(i, (from, to))| self.limits.share(i, *from, *to));
+            return Ok(Some(Step {
+                worth: normal.promise(step.as_slice()),
+                promise: normal.promise(&self.change),
+                moved: shares.fold(0.0, f64::max),
+            }));
+        }
+    }
+
+    fn attempt(&mut self) -> Result<Option<f64>, P::Error> {
+        let found = self.problem.attempt(&self.next)?;
+        Ok(found.map(|(loss, trial)| {
+            self.trial = Some(trial);
+            loss
+        }))
+    }
+
+    fn accept(&mut self) -> Result<(), P::Error> {
+        if let Some(trial) = self.trial.take() {
+            self.problem.accept(&self.next, trial)?;
+            self.theta.copy_from_slice(&self.next);
+        }
+        Ok(())
+    }
+
+    fn reject(&mut self) {
+        if let Some(trial) = self.trial.take() {
+            self.problem.reject(trial);
+        }
+    }
+}
+
+/// `-(A + damping diag A)^-1 g`, nothing for held parameters and those without influence;
+/// `None` where that has no solution.
+fn damped(normal: &Normal, damping: f64, held: &[bool]) -> Option<DVector<f64>> {
+    let n = held.len();
+    // Scaled to unit diagonal, the matrix loses no digits to units.
+    let size = |i: usize| {
+        let own = normal.matrix[(i, i)].sqrt();
+        if own > 0.0 { own } else { 1.0 }
+    };
+    let sizes = DVector::from_fn(n, |i, _| size(i));
+    let mut a = DMatrix::from_fn(n, n, |i, j| normal.matrix[(i, j)] / (sizes[i] * sizes[j]));
+    let mut g = normal.gradient.component_div(&sizes);
+    for i in 0..n {
+        if held[i] || normal.matrix[(i, i)] <= 0.0 {
+            a.row_mut(i).fill(0.0);
+            a.column_mut(i).fill(0.0);
+            g[i] = 0.0;
+            a[(i, i)] = 1.0;
+        }
+        a[(i, i)] += damping;
+    }
+    let mut step = a.cholesky()?.solve(&g);
+    step.component_div_assign(&sizes);
+    step.neg_mut();
+    step.iter().all(|x| x.is_finite()).then_some(step)
+}

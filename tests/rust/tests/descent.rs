@@ -1,0 +1,417 @@
+//! Searches whose end is known in closed form.
+
+use axisight_numerics::descent::{
+    Bounded, Damping, LeastSquares, Limits, Normal, Outcome, Progress, Reach, Rules, Status, search,
+};
+use nalgebra::{DMatrix, DVector};
+
+/// Residuals and the rows of their Jacobian; nothing where the model does not hold.
+type Rows = Option<(Vec<f64>, Vec<Vec<f64>>)>;
+
+struct Model<F> {
+    rows: F,
+    normal: Normal,
+    trials: usize,
+    rejected: usize,
+    /// Trial at which another thread asks to stop.
+    cancel_at: usize,
+}
+
+impl<F: Fn(&[f64]) -> Rows> Model<F> {
+    fn new(rows: F, start: &[f64]) -> Self {
+        let normal = normal(rows(start).expect("holds at the start"), start.len());
+        Self {
+            rows,
+            normal,
+            trials: 0,
+            rejected: 0,
+            cancel_at: usize::MAX,
+        }
+    }
+}
+
+fn normal((residual, rows): (Vec<f64>, Vec<Vec<f64>>), n: usize) -> Normal {
+    let r = DVector::from_vec(residual);
+    let jacobian = DMatrix::from_fn(r.len(), n, |i, j| rows[i][j]);
+    Normal {
+        loss: r.dot(&r),
+        gradient: jacobian.transpose() * &r,
+        matrix: jacobian.transpose() * &jacobian,
+    }
+}
+
+impl<F: Fn(&[f64]) -> Rows> LeastSquares for Model<F> {
+    type Trial = Normal;
+    type Error = &'static str;
+
+    fn normal(&self) -> &Normal {
+        &self.normal
+    }
+
+    fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Normal)>, &'static str> {
+        self.trials += 1;
+        if self.trials == self.cancel_at {
+            return Err("cancelled");
+        }
+        let found = (self.rows)(theta).map(|rows| normal(rows, theta.len()));
+        Ok(found.map(|n| (n.loss, n)))
+    }
+
+    fn accept(&mut self, _: &[f64], trial: Normal) -> Result<(), &'static str> {
+        self.normal = trial;
+        Ok(())
+    }
+
+    fn reject(&mut self, _: Normal) {
+        self.rejected += 1;
+    }
+}
+
+const CONSTANT: Damping = Damping::Constant {
+    start: 1e-3,
+    shrink: 0.2,
+    grow: 8.0,
+    least: 1e-12,
+    failures: 8,
+};
+
+/// The rules of the axis fit, and those of the fit to logs.
+const RULES: [Rules; 2] = [
+    Rules {
+        max_iterations: 100,
+        loss_tolerance: 1e-14,
+        progress: Progress::Promised,
+        step_tolerance: 1e-10,
+        rounding: 1e-28,
+        settled: 1e-6,
+        damping: Damping::Kept,
+    },
+    Rules {
+        max_iterations: 100,
+        loss_tolerance: 1e-14,
+        progress: Progress::Gained { always: false },
+        step_tolerance: 1e-10,
+        rounding: 1e-28,
+        settled: 1e-6,
+        damping: CONSTANT,
+    },
+];
+
+fn wide(n: usize) -> Limits {
+    Limits {
+        lower: vec![f64::NEG_INFINITY; n],
+        upper: vec![f64::INFINITY; n],
+        scale: vec![1.0; n],
+        reach: Reach::Bounds,
+    }
+}
+
+fn run<F: Fn(&[f64]) -> Rows>(
+    model: &mut Model<F>,
+    limits: &Limits,
+    rules: &Rules,
+    start: &[f64],
+) -> (Outcome, Vec<f64>) {
+    let mut descent = Bounded::new(model, limits, start.to_vec());
+    let outcome = search(&mut descent, rules).expect("not cancelled");
+    (outcome, descent.into_theta())
+}
+
+// Residuals 10 (y - x^2) and 1 - x.
+#[allow(clippy::unnecessary_wraps)] // a model may not hold
+fn rosenbrock(t: &[f64]) -> Rows {
+    let residual = vec![10.0 * (t[1] - t[0] * t[0]), 1.0 - t[0]];
+    Some((residual, vec![vec![-20.0 * t[0], 10.0], vec![-1.0, 0.0]]))
+}
+
+/// Three points on a line that is none: closed form by Cramer's rule.
+#[allow(clippy::unnecessary_wraps)]
+fn line(t: &[f64]) -> Rows {
+    let points = [(0.0, 1.0), (1.0, 2.0), (2.0, 5.0)];
+    let residual = points.map(|(x, y)| t[0] + t[1] * x - y).to_vec();
+    Some((residual, points.map(|(x, _)| vec![1.0, x]).to_vec()))
+}
+
+#[test]
+fn rosenbrock_ends_in_its_valley() {
+    for rules in &RULES {
+        let start = [-1.2, 1.0];
+        let mut model = Model::new(rosenbrock, &start);
+        let (outcome, theta) = run(&mut model, &wide(2), rules, &start);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert!((theta[0] - 1.0).abs() < 1e-9 && (theta[1] - 1.0).abs() < 1e-9);
+        assert_eq!(outcome.iterations + model.rejected, model.trials);
+    }
+}
+
+/// With x held back at 1/2 the best y is 1/4; x presses on its bound and nothing else does.
+#[test]
+fn bound_holds_the_parameter_and_frees_the_others() {
+    for rules in &RULES {
+        let start = [-1.2, 1.0];
+        let mut model = Model::new(rosenbrock, &start);
+        let mut limits = wide(2);
+        limits.upper[0] = 0.5;
+        let (outcome, theta) = run(&mut model, &limits, rules, &start);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert_eq!((theta[0], limits.at_bound(&theta)), (0.5, vec![0]));
+        assert!((theta[1] - 0.25).abs() < 1e-9 && (model.normal.loss - 0.25).abs() < 1e-12);
+        let g = &model.normal.gradient;
+        assert!(g[0] < -0.1 && g[1].abs() < 1e-7, "{g}");
+    }
+}
+
+/// The line with its intercept kept at one and above: `slope = 9 / 5` by its own normal
+/// equation. Projecting the free minimum (2/3, 2) would keep the slope of 2.
+#[test]
+fn active_bound_satisfies_the_optimality_conditions() {
+    for rules in &RULES {
+        let start = [1.0, 0.0];
+        let mut model = Model::new(line, &start);
+        let mut limits = wide(2);
+        limits.lower[0] = 1.0;
+        let (outcome, theta) = run(&mut model, &limits, rules, &start);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert!(
+            theta[0] == 1.0 && (theta[1] - 1.8).abs() < 1e-7,
+            "{theta:?}"
+        );
+        let g = &model.normal.gradient;
+        assert!(g[0] > 0.1 && g[1].abs() < 1e-6, "{g}");
+    }
+}
+
+#[test]
+fn undamped_linear_problem_takes_one_step() {
+    let undamped = Damping::Constant {
+        start: 0.0,
+        shrink: 0.2,
+        grow: 8.0,
+        least: 0.0,
+        failures: 8,
+    };
+    let rules = Rules {
+        damping: undamped,
+        ..RULES[0]
+    };
+    let start = [-7.0, 11.0];
+    let mut model = Model::new(line, &start);
+    let (outcome, theta) = run(&mut model, &wide(2), &rules, &start);
+    assert_eq!((outcome.iterations, model.trials), (1, 1));
+    assert_eq!(outcome.status, Status::LossConverged);
+    assert!((theta[0] - 2.0 / 3.0).abs() < 1e-13 && (theta[1] - 2.0).abs() < 1e-13);
+}
+
+/// From 5 the step of ln x leads to 5 - 5 ln 5 = -3, where there is no logarithm.
+#[test]
+fn model_that_fails_at_a_trial_is_tried_closer() {
+    for rules in &RULES {
+        let start = [5.0];
+        let log = |t: &[f64]| (t[0] > 0.0).then(|| (vec![t[0].ln()], vec![vec![1.0 / t[0]]]));
+        let mut model = Model::new(log, &start);
+        let (outcome, theta) = run(&mut model, &wide(1), rules, &start);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert!((theta[0] - 1.0).abs() < 1e-9);
+        assert!(model.trials > outcome.iterations + model.rejected);
+    }
+}
+
+/// A residual that is not a number is no lower loss.
+#[test]
+fn chaotic_trial_is_not_accepted() {
+    for rules in &RULES {
+        let start = [5.0];
+        let mut model = Model::new(|t| Some((vec![t[0].ln()], vec![vec![1.0 / t[0]]])), &start);
+        let (_, theta) = run(&mut model, &wide(1), rules, &start);
+        assert!((theta[0] - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn cancelled_search_says_so_and_stays_where_it_was() {
+    for rules in &RULES {
+        let start = [-1.2, 1.0];
+        let mut model = Model::new(rosenbrock, &start);
+        model.cancel_at = 1;
+        let limits = wide(2);
+        let mut descent = Bounded::new(&mut model, &limits, start.to_vec());
+        assert_eq!(search(&mut descent, rules), Err("cancelled"));
+        assert_eq!(descent.into_theta(), start);
+    }
+}
+
+/// Every step of a wrong slope leads uphill: given up after the failures of the rule, with the
+/// memory of every trial handed back.
+#[test]
+fn wrong_slope_stalls() {
+    // The eleventh step of the rule that doubles its growth is lost in rounding.
+    for (rules, failures) in RULES.iter().zip([11, 9]) {
+        let rules = Rules {
+            step_tolerance: 0.0,
+            ..*rules
+        };
+        let start = [2.0];
+        let mut model = Model::new(|t| Some((vec![t[0]], vec![vec![-1.0]])), &start);
+        let (outcome, theta) = run(&mut model, &wide(1), &rules, &start);
+        assert_eq!((outcome.status, theta[0]), (Status::Stalled, 2.0));
+        assert_eq!((model.trials, model.rejected), (failures, failures));
+        assert_eq!(outcome.iterations, 0);
+    }
+}
+
+/// A step made short by damping is no minimum.
+#[test]
+fn short_steps_of_a_wrong_slope_are_not_taken_for_convergence() {
+    for rules in &RULES {
+        let rules = Rules {
+            step_tolerance: 1e-3,
+            ..*rules
+        };
+        let start = [2.0];
+        let mut model = Model::new(|t| Some((vec![t[0]], vec![vec![-1.0]])), &start);
+        let (outcome, _) = run(&mut model, &wide(1), &rules, &start);
+        assert_eq!(outcome.status, Status::Stalled);
+    }
+}
+
+/// A loss that rises by a kink wherever one goes, although its slope promises a little.
+#[test]
+fn little_promise_that_nothing_keeps_is_settled() {
+    for rules in &RULES {
+        let rules = Rules {
+            settled: 1e-3,
+            step_tolerance: 0.0,
+            ..*rules
+        };
+        let start = [1e-2];
+        let kinked = |t: &[f64]| {
+            let kink = if t[0] == 1e-2 { 0.0 } else { 1e-3 };
+            Some((vec![t[0], 1.0 + kink], vec![vec![1.0], vec![0.0]]))
+        };
+        let mut model = Model::new(kinked, &start);
+        let (outcome, _) = run(&mut model, &wide(1), &rules, &start);
+        assert_eq!(outcome.status, Status::LossConverged);
+    }
+}
+
+/// The second parameter does nothing; the first arrives.
+#[test]
+fn parameter_without_influence_stays() {
+    for rules in &RULES {
+        let start = [3.0, 0.7];
+        let cubic =
+            |t: &[f64]| Some((vec![t[0].powi(3) - 1.0], vec![vec![3.0 * t[0] * t[0], 0.0]]));
+        let mut model = Model::new(cubic, &start);
+        let (_, theta) = run(&mut model, &wide(2), rules, &start);
+        assert!((theta[0] - 1.0).abs() < 1e-9 && theta[1] == 0.7);
+    }
+}
+
+/// Two columns that are the same: without damping there is no step, so more is needed, and no
+/// trial is spent on finding out.
+#[test]
+fn singular_matrix_is_damped_until_it_can_be_solved() {
+    let rules = Rules {
+        damping: Damping::Constant {
+            start: 1e-17,
+            shrink: 0.2,
+            grow: 1e4,
+            least: 1e-17,
+            failures: 8,
+        },
+        ..RULES[1]
+    };
+    let start = [2.0, 3.0];
+    let sum = |t: &[f64]| Some((vec![t[0] + t[1] - 1.0], vec![vec![1.0, 1.0]]));
+    let mut model = Model::new(sum, &start);
+    let (outcome, theta) = run(&mut model, &wide(2), &rules, &start);
+    assert!(outcome.status.converged(), "{:?}", outcome.status);
+    assert!((theta[0] + theta[1] - 1.0).abs() < 1e-12);
+    assert!((theta[0] - theta[1] + 1.0).abs() < 1e-2, "shared alike");
+    assert_eq!(model.rejected, 0);
+}
+
+#[test]
+fn iterations_and_exact_residuals_end_the_search() {
+    for rules in &RULES {
+        for (most, status) in [(0, Status::MaxIterations), (1, Status::MaxIterations)] {
+            let rules = Rules {
+                max_iterations: most,
+                ..*rules
+            };
+            let start = [-1.2, 1.0];
+            let mut model = Model::new(rosenbrock, &start);
+            let (outcome, _) = run(&mut model, &wide(2), &rules, &start);
+            assert_eq!((outcome.status, outcome.iterations), (status, most));
+            assert!(most > 0 || model.trials == 0);
+        }
+        let mut model = Model::new(rosenbrock, &[1.0, 1.0]);
+        let (outcome, _) = run(&mut model, &wide(2), rules, &[1.0, 1.0]);
+        assert_eq!((outcome.status, model.trials), (Status::Exact, 0));
+    }
+}
+
+/// Nothing to search for is no error.
+#[test]
+fn no_parameters_are_at_rest() {
+    for rules in &RULES {
+        let mut model = Model::new(|_| Some((vec![2.0], vec![vec![]])), &[]);
+        let (outcome, _) = run(&mut model, &wide(0), rules, &[]);
+        assert!(outcome.status.converged(), "{:?}", outcome.status);
+        assert_eq!(model.trials, 0);
+    }
+}
+
+/// The step of 1 - exp(-x) from 4 is `1 - e^4`, 53 long.
+#[test]
+fn reach_shortens_a_step() {
+    let first = |reach: Reach, lower: f64| {
+        let rules = Rules {
+            max_iterations: 1,
+            ..RULES[0]
+        };
+        let flat = |t: &[f64]| Some((vec![1.0 - (-t[0]).exp()], vec![vec![(-t[0]).exp()]]));
+        let mut model = Model::new(flat, &[4.0]);
+        let limits = Limits {
+            lower: vec![lower],
+            scale: vec![0.5],
+            reach,
+            ..wide(1)
+        };
+        run(&mut model, &limits, &rules, &[4.0]).1[0]
+    };
+    assert_eq!(
+        first(Reach::Scales(1.0), -100.0).to_bits(),
+        3.5_f64.to_bits()
+    );
+    assert_eq!(first(Reach::Factor(5.0), 0.0).to_bits(), 0.8_f64.to_bits());
+    // A parameter that may be negative is not held back by a factor.
+    let free = first(Reach::Bounds, -100.0).to_bits();
+    assert_eq!(first(Reach::Factor(5.0), -100.0).to_bits(), free);
+}
+
+#[test]
+fn prior_counts_as_one_more_residual() {
+    let mut with = Normal::zero(1);
+    with.add_prior(0, 0.6, 0.5);
+    let prior = normal((vec![0.6 / 0.5], vec![vec![1.0 / 0.5]]), 1);
+    assert!((with.loss - prior.loss).abs() < 1e-15);
+    assert!((with.gradient[0] - prior.gradient[0]).abs() < 1e-15);
+    assert!((with.matrix[(0, 0)] - prior.matrix[(0, 0)]).abs() < 1e-15);
+    // To the mean, all of it.
+    assert!((with.promise(&[-0.6]) - prior.loss).abs() < 1e-15);
+    let sum = Normal {
+        loss: 2.0 * prior.loss,
+        gradient: &prior.gradient * 2.0,
+        matrix: &prior.matrix * 2.0,
+    };
+    with.add(&prior);
+    assert!((with.promise(&[0.3]) - sum.promise(&[0.3])).abs() < 1e-14);
+}
+
+#[test]
+fn advice_is_for_searches_that_did_not_arrive() {
+    let advised = Status::ALL.iter().filter(|s| !s.converged());
+    let names: Vec<&str> = advised.map(|s| s.name()).collect();
+    assert_eq!(names, ["max_iterations", "stalled"]);
+}
