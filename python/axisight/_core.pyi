@@ -88,7 +88,16 @@ class EffectInfo(TypedDict):
     equation: str
     source: str
     scope: Literal["axis", "axes", "arm"]
-    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "sensor"]
+    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "base", "sensor"]
+    family: str
+    contains: list[str]
+    parts: list[str]
+    stands_for: tuple[str, str] | None
+    linear: str
+    inverse_dynamics: bool
+    stiff: bool
+    absorbed_by: list[str]
+    shown_by: list[str]
     parameters: list[ParameterInfo]
 
 @type_check_only

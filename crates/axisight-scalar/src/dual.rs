@@ -1,62 +1,64 @@
-//! Forward-mode derivatives: a value and its partials along `N` seeds.
+//! Forward-mode derivatives: a value and its partials along some seeds.
 
-use super::Scalar;
-use std::array::from_fn;
+use super::{Partials, Scalar};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// `value + sum_i partials[i] eps_i` with `eps_i eps_j = 0`.
+/// `value + sum_i partials[i] eps_i` with `eps_i eps_j = 0`; `P` is where the partials are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dual<R, const N: usize> {
+pub struct DualNumber<R, P> {
     /// Primal value.
     pub value: R,
     /// First derivatives along the seeds.
-    pub partials: [R; N],
+    pub partials: P,
 }
 
-impl<R: Scalar, const N: usize> Dual<R, N> {
+/// A dual number with `N` partials in an array.
+pub type Dual<R, const N: usize> = DualNumber<R, [R; N]>;
+
+impl<R: Scalar, P: Partials<R>> DualNumber<R, P> {
     /// `f(self)` given the value and the slope of `f` at `self.value`.
     #[inline(always)]
     fn chain(self, value: R, slope: R) -> Self {
         Self {
             value,
-            partials: from_fn(|i| self.partials[i] * slope),
+            partials: self.partials.times(slope),
         }
     }
 }
 
-impl<R: Scalar, const N: usize> Add for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Add for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         Self {
             value: self.value + other.value,
-            partials: from_fn(|i| self.partials[i] + other.partials[i]),
+            partials: self.partials.plus(other.partials),
         }
     }
 }
-impl<R: Scalar, const N: usize> Sub for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Sub for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self {
             value: self.value - other.value,
-            partials: from_fn(|i| self.partials[i] - other.partials[i]),
+            partials: self.partials.minus(other.partials),
         }
     }
 }
-impl<R: Scalar, const N: usize> Mul for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Mul for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,
-            partials: from_fn(|i| {
-                self.partials[i].fma(other.value, self.value * other.partials[i])
-            }),
+            partials: self
+                .partials
+                .times_plus(other.value, other.partials.times(self.value)),
         }
     }
 }
-impl<R: Scalar, const N: usize> Div for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Div for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl)] // the product rule with the reciprocal
@@ -64,29 +66,29 @@ impl<R: Scalar, const N: usize> Div for Dual<R, N> {
         self * other.recip()
     }
 }
-impl<R: Scalar, const N: usize> Neg for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Neg for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
         Self {
             value: -self.value,
-            partials: from_fn(|i| -self.partials[i]),
+            partials: self.partials.negated(),
         }
     }
 }
-impl<R: Scalar, const N: usize> AddAssign for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> AddAssign for DualNumber<R, P> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
-impl<R: Scalar, const N: usize> SubAssign for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> SubAssign for DualNumber<R, P> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
-impl<R: Scalar, const N: usize> Add<f64> for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Add<f64> for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: f64) -> Self {
@@ -96,40 +98,37 @@ impl<R: Scalar, const N: usize> Add<f64> for Dual<R, N> {
         }
     }
 }
-impl<R: Scalar, const N: usize> Sub<f64> for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Sub<f64> for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: f64) -> Self {
         self + (-other)
     }
 }
-impl<R: Scalar, const N: usize> Mul<f64> for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Mul<f64> for DualNumber<R, P> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: f64) -> Self {
-        Self {
-            value: self.value * other,
-            partials: from_fn(|i| self.partials[i] * other),
-        }
+        self.chain(self.value * other, R::constant(other))
     }
 }
 
-impl<R: Scalar, const N: usize> Scalar for Dual<R, N> {
+impl<R: Scalar, P: Partials<R>> Scalar for DualNumber<R, P> {
     const LANES: usize = R::LANES;
-    const PARTIALS: usize = N;
+    const PARTIALS: usize = P::COUNT;
 
     #[inline(always)]
     fn constant(x: f64) -> Self {
         Self {
             value: R::constant(x),
-            partials: [R::zero(); N],
+            partials: P::zero(),
         }
     }
     #[inline(always)]
     fn from_lanes(value_of: impl FnMut(usize) -> f64) -> Self {
         Self {
             value: R::from_lanes(value_of),
-            partials: [R::zero(); N],
+            partials: P::zero(),
         }
     }
     #[inline(always)]
@@ -138,22 +137,27 @@ impl<R: Scalar, const N: usize> Scalar for Dual<R, N> {
     }
     #[inline(always)]
     fn partial(&self, partial: usize, lane: usize) -> f64 {
-        self.partials.get(partial).map_or(0.0, |p| p.lane(lane))
+        self.partials.along(partial).map_or(0.0, |p| p.lane(lane))
     }
     #[inline(always)]
     fn seeded(mut self, partial: usize) -> Self {
-        if let Some(p) = self.partials.get_mut(partial) {
-            *p = R::one();
-        }
+        self.partials = self.partials.seeded(partial);
         self
     }
     #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
         Self {
             value: self.value.fma(b.value, c.value),
-            partials: from_fn(|i| {
-                self.partials[i].fma(b.value, self.value.fma(b.partials[i], c.partials[i]))
-            }),
+            partials: self
+                .partials
+                .times_plus(b.value, b.partials.times_plus(self.value, c.partials)),
+        }
+    }
+    #[inline(always)]
+    fn axpy(self, a: f64, y: Self) -> Self {
+        Self {
+            value: self.value.axpy(a, y.value),
+            partials: self.partials.times_plus(R::constant(a), y.partials),
         }
     }
     #[inline(always)]
@@ -185,7 +189,7 @@ impl<R: Scalar, const N: usize> Scalar for Dual<R, N> {
     fn if_positive(self, a: Self, b: Self) -> Self {
         Self {
             value: self.value.if_positive(a.value, b.value),
-            partials: from_fn(|i| self.value.if_positive(a.partials[i], b.partials[i])),
+            partials: P::if_positive(self.value, a.partials, b.partials),
         }
     }
 }

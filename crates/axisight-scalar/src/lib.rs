@@ -2,7 +2,8 @@
 //!
 //! Equations of motion and effects are written once over [`Scalar`]: `f64`
 //! for one run, [`Lanes`] for several runs in lock-step, [`Dual`] for exact
-//! derivatives, and `Dual<Lanes<L>, N>` for both.
+//! derivatives, and `Dual<Lanes<L>, N>` for both. The derivatives of a [`DualNumber`] stand in
+//! an array ([`Dual`]) or in one vector register, see [`Partials`].
 
 // Kernels are generic over the scalar and must be inlined to become vector code.
 #![allow(clippy::inline_always)]
@@ -10,13 +11,15 @@
 mod dual;
 mod elementary;
 mod lanes;
+mod partials;
 mod register;
 mod registers;
 #[cfg(target_arch = "x86_64")]
 pub mod wide;
 
-pub use dual::Dual;
+pub use dual::{Dual, DualNumber};
 pub use lanes::Lanes;
+pub use partials::Partials;
 pub use register::{MOST_LANES, Register};
 
 use std::fmt::Debug;
@@ -60,6 +63,12 @@ pub trait Scalar:
     /// `self * b + c` with one rounding per operation of the hardware.
     #[must_use]
     fn fma(self, b: Self, c: Self) -> Self;
+    /// `a * self + y` as [`Scalar::fma`], cheaper because `a` carries no derivatives.
+    #[must_use]
+    #[inline(always)]
+    fn axpy(self, a: f64, y: Self) -> Self {
+        self.fma(Self::constant(a), y)
+    }
     /// Reciprocal.
     #[must_use]
     fn recip(self) -> Self;

@@ -3,7 +3,9 @@
 
 use super::{Lanes, Scalar};
 use nalgebra::Complex;
-use std::ops::{Add, Mul, Sub};
+use std::array::from_fn;
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Neg, Sub};
 
 type C = Complex<f64>;
 
@@ -12,7 +14,15 @@ pub const MOST_LANES: usize = 8;
 
 /// `LANES` doubles; arithmetic is elementwise, with the same bits at any width.
 pub trait Register:
-    Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
 {
     /// Doubles held.
     const LANES: usize;
@@ -44,20 +54,21 @@ pub trait Register:
 /// Bits of the exponent.
 pub(super) const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 
-impl Register for Lanes<4> {
-    const LANES: usize = 4;
+/// `L` up to [`MOST_LANES`], in registers of 256 bits.
+impl<const L: usize> Register for Lanes<L> {
+    const LANES: usize = L;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
-        Self([x; 4])
+        Self([x; L])
     }
     #[inline(always)]
     fn load(from: &[f64]) -> Self {
-        Self([from[0], from[1], from[2], from[3]])
+        Self(from.as_chunks::<L>().0[0])
     }
     #[inline(always)]
     fn store(self, to: &mut [f64]) {
-        to[..4].copy_from_slice(&self.0);
+        to[..L].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn fma(self, b: Self, c: Self) -> Self {
@@ -86,15 +97,15 @@ impl Register for Lanes<4> {
     }
     #[inline(always)]
     fn split(from: &[C], step: usize) -> (Self, Self) {
-        let [a, b, c, d] = [from[0], from[step], from[2 * step], from[3 * step]];
+        let from = &from[..=(L - 1) * step];
         (
-            Self([a.re, b.re, c.re, d.re]),
-            Self([a.im, b.im, c.im, d.im]),
+            Self(from_fn(|l| from[l * step].re)),
+            Self(from_fn(|l| from[l * step].im)),
         )
     }
     #[inline(always)]
     fn join(re: Self, im: Self, to: &mut [C], step: usize) {
-        for l in 0..4 {
+        for l in 0..L {
             to[l * step] = C::new(re.0[l], im.0[l]);
         }
     }

@@ -4,7 +4,8 @@
 //! instructions, and moves the rest through memory.
 
 /// One operation on `[f64; L]` from the instruction for four of them and the
-/// plain operation for the rest.
+/// plain operation for the rest. The fours are written out: a loop over them costs the compiler
+/// several times as much, because it has to be unrolled before the numbers leave memory.
 macro_rules! operation {
     ($(#[$doc:meta])* $name:ident ( $($argument:ident),+ ), $packed:expr, $plain:expr) => {
         $(#[$doc])*
@@ -13,16 +14,27 @@ macro_rules! operation {
             let mut out = [0.0; L];
             let mut first = 0;
             #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
-            while first + 4 <= L {
+            {
                 use std::arch::x86_64::{_mm256_loadu_pd, _mm256_storeu_pd};
-                // SAFETY: entries `first` to `first + 3` lie inside arrays of `L` numbers, the
-                // unaligned instructions take any address, and the features are compiled in.
-                #[allow(unsafe_code)]
-                unsafe {
-                    $(let $argument = _mm256_loadu_pd($argument.as_ptr().add(first));)+
-                    _mm256_storeu_pd(out.as_mut_ptr().add(first), ($packed)($($argument),+));
+                if L >= 4 {
+                    // SAFETY: entries 0 to 3 lie inside arrays of `L` numbers, the unaligned
+                    // instructions take any address, and the features are compiled in.
+                    #[allow(unsafe_code)]
+                    unsafe {
+                        $(let $argument = _mm256_loadu_pd($argument.as_ptr());)+
+                        _mm256_storeu_pd(out.as_mut_ptr(), ($packed)($($argument),+));
+                    }
+                    first = 4;
                 }
-                first += 4;
+                if L >= 8 {
+                    // SAFETY: the same for entries 4 to 7.
+                    #[allow(unsafe_code)]
+                    unsafe {
+                        $(let $argument = _mm256_loadu_pd($argument.as_ptr().add(4));)+
+                        _mm256_storeu_pd(out.as_mut_ptr().add(4), ($packed)($($argument),+));
+                    }
+                    first = 8;
+                }
             }
             while first < L {
                 out[first] = ($plain)($($argument[first]),+);

@@ -11,9 +11,9 @@ use std::arch::x86_64::{
     _mm512_castpd128_pd512, _mm512_castpd512_pd128, _mm512_cmp_pd_mask, _mm512_div_pd,
     _mm512_extractf64x2_pd, _mm512_fmadd_pd, _mm512_fnmadd_pd, _mm512_insertf64x2, _mm512_loadu_pd,
     _mm512_mask_blend_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd,
-    _mm512_storeu_pd, _mm512_sub_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+    _mm512_storeu_pd, _mm512_sub_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd, _mm512_xor_pd,
 };
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 type C = Complex<f64>;
 
@@ -52,6 +52,14 @@ macro_rules! operator {
 operator!(Add, add, _mm512_add_pd);
 operator!(Sub, sub, _mm512_sub_pd);
 operator!(Mul, mul, _mm512_mul_pd);
+
+impl Neg for Wide {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(instructions!(_mm512_xor_pd(self.0, _mm512_set1_pd(-0.0))))
+    }
+}
 
 impl Register for Wide {
     const LANES: usize = 8;

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import DEMONSTRATION
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
@@ -18,11 +19,9 @@ from axisight.storage import write_bytes, write_whole
 Array = NDArray[np.float64]
 
 _SECONDS = 5.0
-# What the simulator of the demo does not know.
-WITHHELD = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 
 
-def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = WITHHELD) -> Path:
+def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = DEMONSTRATION) -> Path:
     """Write a case of three estimation and two validation logs of 5 s, and return its folder.
 
     The machine differs from the preset ``irb6600_like`` by 1 % in masses,

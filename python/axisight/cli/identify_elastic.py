@@ -25,6 +25,7 @@ from axisight.cli.identify_common import (
     say,
     write_robot,
 )
+from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frf.interop import load_netcdf
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from axisight.frequency_fit.options import Criterion
 
 _USUAL = ("*.stiffness", "*.damping")
-_LINEAR = ("payload", "joint_stiffness", "joint_damping", "motor_inertia")
 _CONVERGED = ("loss_converged", "step_converged")
 POSE = "joint_angle_rad"
 """Attribute of a response that holds its operating point."""
@@ -95,7 +95,9 @@ def elastic_command(
     with errors():
         refuse_in_the_way(out, force)
         machine = load_source(robot)
-        linear = [effect for effect in machine.effects if effect.name in _LINEAR]
+        linear = [
+            effect for effect in machine.effects if effect_info(effect.name).linear == "parameters"
+        ]
         model = machine.with_effects(linear)
         data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))

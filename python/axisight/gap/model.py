@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
 from axisight.fitting import (
     FitOptions,
     Parameter,
@@ -111,7 +111,7 @@ class ModelFitter(ABC):
         for own in self.robot.effects:
             if own.label == effect.label:
                 change -= own.values()[0]
-        nominal = 1.0 if effect.name in _RELATIVE else robot_parameters(self.robot)[name]
+        nominal = 1.0 if _is_relative(effect.name) else robot_parameters(self.robot)[name]
         return abs(change) < 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
@@ -186,24 +186,17 @@ def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: 
     )
 
 
-# Effects that change a quantity the simulator has a tolerance for.
-_SAME = {
-    "joint_stiffness": "stiffness",
-    "joint_damping": "damping",
-    "motor_inertia": "motor_inertia",
-    "viscous_friction": "viscous_friction",
-}
-
-
-_RELATIVE = ("joint_stiffness", "joint_damping", "motor_inertia")
+def _is_relative(effect: str) -> bool:
+    stands_for = effect_info(effect).stands_for
+    return stands_for is not None and stands_for[1] == "relative"
 
 
 def _same_quantity(robot: Robot, effect: Effect) -> str | None:
     """Return the robot parameter that an effect stands in for: it is then held at its value."""
-    if effect.axis is None or effect.name not in _SAME:
+    stands_for = effect_info(effect.name).stands_for
+    if effect.axis is None or stands_for is None:
         return None
-    joint = robot.axis_names[effect.axis - 1]
-    return f"{joint}.{_SAME[effect.name]}"
+    return f"{robot.axis_names[effect.axis - 1]}.{stands_for[0]}"
 
 
 def _evidence(

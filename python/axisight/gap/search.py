@@ -269,15 +269,13 @@ def _worth_polishing(candidate: Ranked, leader: Ranked) -> bool:
     return candidate.score > 0.02 and candidate.score > 0.3 * leader.score
 
 
-# An effect that two simpler ones imitate: both named if they fit as well.
-_PARTS = {"asymmetric_friction": ("coulomb_friction", "torque_offset")}
-
-
 def _first_part(winner: Ranked, ranked: Sequence[Ranked]) -> Ranked | None:
+    """Return the rival that is the first part of a winner which simpler effects imitate."""
     effect = winner.trial.candidate.effect
-    if effect.name not in _PARTS:
+    parts = effect_info(effect.name).parts
+    if not parts:
         return None
-    label = Effect(_PARTS[effect.name][0], effect.axis).label
+    label = Effect(parts[0], effect.axis).label
     return next((r for r in ranked if r.trial.label == label), None)
 
 
@@ -287,7 +285,7 @@ def _parts_do(winner: Ranked, ranked: Sequence[Ranked], fitter: ModelFitter) -> 
     if part is None:
         return False
     effect = winner.trial.candidate.effect
-    second = _PARTS[effect.name][1]
+    second = effect_info(effect.name).parts[1]
     other = FreeEffect(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
     try:
         both = fitter.fit([*part.trial.evidence.free, other], part.trial.evidence, lazy=True)

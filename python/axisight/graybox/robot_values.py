@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import of_axis_fit
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.graybox.axis_result import AxisFit
@@ -30,9 +31,7 @@ QUANTITIES = {
 }
 EXACT_SIGN_SMOOTHING_RAD_S = 0.01
 """What effects take for a sign that the fit followed exactly, as the preset of the thesis does."""
-MOST_RIPPLES = 3
-"""Harmonics that the effect torque_ripple holds."""
-# What a fitted axis stands for, of the table of absorbed effects.
+# What a fitted axis stands for, of what absorbs effects.
 STANDS_FOR = (
     "motor_inertia",
     "viscous_friction",
@@ -221,27 +220,19 @@ def _effects(
     fit: AxisFit, values: Mapping[str, float], axis: int, width: float
 ) -> tuple[list[Effect], dict[str, str]]:
     """Effects of the fit, and the full name of the effect parameter by its thesis name."""
-    table: list[tuple[str, dict[str, str], dict[str, float]]] = [
-        ("nonlinear_stiffness", {"k3": "cubic_nm_rad3"}, {}),
-        ("backlash", {"b": "half_width_rad"}, {}),
-        ("torque_offset", {"u_0": "offset_nm"}, {}),
-    ]
-    friction = {"F_c": "coulomb_nm"}
-    if fit.model.stribeck:
-        friction |= {"F_s": "excess_nm", "v_s": "stribeck_speed_rad_s"}
-    kind = "stribeck_friction" if fit.model.stribeck else "coulomb_friction"
-    table.append((kind, friction, {"smoothing_rad_s": width}))
-    orders = fit.model.ripple_orders[:MOST_RIPPLES]
-    ripple = {f"a_{n:g}": f"cosine_{i}_nm" for i, n in enumerate(orders, 1)}
-    ripple |= {f"b_{n:g}": f"sine_{i}_nm" for i, n in enumerate(orders, 1)}
-    table.append(("torque_ripple", ripple, {f"order_{i}": n for i, n in enumerate(orders, 1)}))
+    table = of_axis_fit(
+        stribeck=fit.model.stribeck,
+        ripple_orders=fit.model.ripple_orders,
+        smoothing_rad_s=width,
+    )
     effects: list[Effect] = []
     owner: dict[str, str] = {}
-    for name, places, shape in table:
-        used = {n: p for n, p in places.items() if n in values}
+    for stated in table:
+        used = {n: p for n, p in stated.places.items() if n in values}
         if not any(n in fit.free or values[n] for n in used if n != "v_s"):
             continue
-        effect = Effect(name, axis, shape | {p: values[n] for n, p in used.items()})
+        found = {p: values[n] for n, p in used.items()}
+        effect = Effect(stated.name, axis, stated.shape | found)
         effects.append(effect)
         owner |= {n: f"{effect.label}.{p}" for n, p in used.items()}
     return effects, owner

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import RIGID_BODY_QUANTITIES, RIGID_BODY_TERMS
 from axisight.errors import InputError, RobotError
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.robot_file import Identified, Provenance, identified
@@ -16,18 +17,6 @@ from axisight.robot_file.values import noted
 Array = NDArray[np.float64]
 
 LINK = 10
-# Terms that are effects: effect and parameter of the effect.
-EFFECTS = {
-    "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
-    "torque_offset": ("torque_offset", "offset_nm"),
-}
-# Terms by what they take up of effects that the robot has.
-TAKES_UP = {
-    "motor_inertia": "motor_inertia",
-    "viscous_friction": "viscous_friction",
-    "coulomb_friction": "dry_friction",
-    "torque_offset": "torque_offset",
-}
 ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -94,8 +83,8 @@ def identified_bodies(
     effects: list[Effect] = []
     for i, name in enumerate(names):
         joint, _, quantity = name.rpartition(".")
-        if quantity in EFFECTS:
-            effect, parameter = EFFECTS[quantity]
+        if quantity in RIGID_BODY_TERMS:
+            effect, parameter = RIGID_BODY_TERMS[quantity]
             found = Effect(effect, _axis(model, joint), {parameter: float(out[i])})
             names[i] = f"{found.label}.{parameter}"
             effects.append(found)
@@ -115,9 +104,9 @@ def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
     out = absorbed_effects(own, ["links", "torque"], axis=None)
     for name in model.names:
         joint, _, quantity = name.rpartition(".")
-        if quantity in TAKES_UP:
+        if quantity in RIGID_BODY_QUANTITIES:
             axis = _axis(model, joint)
-            out += absorbed_effects(own, [TAKES_UP[quantity]], axis=axis, found=found)
+            out += absorbed_effects(own, [RIGID_BODY_QUANTITIES[quantity]], axis=axis, found=found)
     return out
 
 

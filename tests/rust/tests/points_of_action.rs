@@ -131,7 +131,6 @@ fn odometers_return_the_angle_they_see() {
     let robot = weightless();
     let m = 3;
     // (info, place, what the odometer must return from a state [phi, q, ..])
-    type Seen = fn(&[f64], usize) -> f64;
     let ratio = |axis: usize| {
         robot
             .driven()
@@ -154,7 +153,6 @@ fn odometers_return_the_angle_they_see() {
         (&PAIR, Place::Axes(2, 0), Box::new(|x: &[f64]| x[2] - x[0])),
         (&ARM, Place::Arm, Box::new(|x: &[f64]| x[m + 6])),
     ];
-    let _: Option<Seen> = None;
     for (info, place, seen) in cases {
         let plant = with(&robot, info, place, Odometer { k: 0.0 });
         assert_eq!(plant.n_states(), 21, "{place}");
@@ -221,7 +219,7 @@ fn springs_on_odometers_are_known_springs() {
 fn a_spring_between_two_motors_pulls_both() {
     let robot = weightless();
     let coupled = with(&robot, &PAIR, Place::Axes(0, 2), Odometer { k: 0.05 });
-    let x: Vec<f64> = (0..21).map(|i| 1e-3 * f64::from(i % 5)).collect();
+    let x: Vec<f64> = (0..21).map(|i| 1e-3 * f64::from(i % 7)).collect();
     let zeros = [0.0; 3];
     let rates = |x: &[f64], plant: &Plant<f64>| {
         let mut dx = vec![0.0; x.len()];
@@ -238,7 +236,7 @@ fn a_spring_between_two_motors_pulls_both() {
     };
     let torque = |axis: usize| (bound[10 + axis] - free[10 + axis]) * inertia(axis);
     let pull = 0.05 * x[20];
-    assert!((torque(0) + pull).abs() < 1e-9 * pull && (torque(2) - pull).abs() < 1e-9 * pull);
+    assert!((torque(0) + pull).abs() < 1e-6 * pull && (torque(2) - pull).abs() < 1e-6 * pull);
     assert_eq!(bound[..10], free[..10]);
     assert_eq!(bound[20].to_bits(), (x[10] - x[12]).to_bits());
     // What the log calls disturbance holds it too.

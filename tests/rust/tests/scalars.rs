@@ -2,8 +2,9 @@
 
 use axisight_core::robot::EffectSetting;
 use axisight_core::simulation::{Drive, Method, Status, measurement_noise};
-use axisight_scalar::{Dual, Lanes, Scalar};
-use axisight_tests::{PRESET, Trace, effect, plant, robot, sines, trace};
+use axisight_scalar::{Dual, DualNumber, Lanes, Partials, Register, Scalar};
+use axisight_tests::{PRESET, Random, Trace, effect, plant, robot, sines, trace};
+use nalgebra::Complex;
 
 const SAMPLES: usize = 150;
 
@@ -176,4 +177,166 @@ fn elementary_functions_of_dual_numbers_have_their_slopes() {
             );
         }
     }
+}
+
+/// Every operation on dual numbers once, with branches taken either way.
+#[inline(always)]
+fn every_operation<P: Partials<f64>>(numbers: &[DualNumber<f64, P>; 3], out: &mut [Vec<f64>; 2]) {
+    let [x, y, z] = *numbers;
+    let (s, c) = x.sin_cos();
+    let mut sum = x;
+    sum += y;
+    sum -= z * 3.0;
+    let results = [
+        x + y,
+        x - y,
+        x * y,
+        x / y,
+        -x,
+        x + 0.3,
+        x - 0.3,
+        x * 0.7,
+        x.fma(y, z),
+        x.axpy(0.7, z),
+        x.recip(),
+        x.square().sqrt(),
+        s,
+        c,
+        x.exp(),
+        x.tanh(),
+        x.abs(),
+        x.if_positive(y, z),
+        sum,
+    ];
+    for result in &results {
+        out[0].push(result.lane(0));
+        out[1].extend((0..8).map(|i| result.partial(i, 0)));
+    }
+}
+
+/// Results for pairs of numbers made from `numbers`, eight partials each.
+#[inline(always)]
+fn all_operations<P: Partials<f64>>(numbers: &[[f64; 9]]) -> [Vec<f64>; 2] {
+    let mut out = [Vec::new(), Vec::new()];
+    for triple in numbers.windows(3) {
+        let number = |n: &[f64; 9]| {
+            // `value + sum_i slope_i eps_i` from constants and seeds.
+            let mut x = DualNumber::<f64, P>::constant(n[0]);
+            for (i, slope) in n[1..].iter().enumerate() {
+                x += (DualNumber::constant(0.0).seeded(i)) * *slope;
+            }
+            x
+        };
+        let numbers = [number(&triple[0]), number(&triple[1]), number(&triple[2])];
+        every_operation(&numbers, &mut out);
+    }
+    out
+}
+
+fn random_numbers() -> Vec<[f64; 9]> {
+    let mut random = Random(5);
+    (0..200)
+        .map(|_| std::array::from_fn(|_| random.within(3.0)))
+        .collect()
+}
+
+fn assert_same_bits(got: &[Vec<f64>; 2], want: &[Vec<f64>; 2]) {
+    for (got, want) in got.iter().zip(want) {
+        assert_eq!(got.len(), want.len());
+        for (i, (a, b)) in got.iter().zip(want).enumerate() {
+            assert_eq!(a.to_bits(), b.to_bits(), "number {i}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn partials_in_a_register_are_the_partials_in_an_array_bit_for_bit() {
+    let numbers = random_numbers();
+    let array = all_operations::<[f64; 8]>(&numbers);
+    assert_same_bits(&all_operations::<Lanes<8>>(&numbers), &array);
+    let moving = array[1].iter().filter(|x| **x != 0.0).count();
+    assert!(2 * moving > array[1].len(), "derivatives of constants");
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn partials_in_a_wide_register_are_the_same_bit_for_bit() {
+    use axisight_scalar::wide::{Wide, available};
+
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn wide(numbers: &[[f64; 9]]) -> [Vec<f64>; 2] {
+        all_operations::<Wide>(numbers)
+    }
+    if available() {
+        let numbers = random_numbers();
+        // SAFETY: the processor has the instructions.
+        #[allow(unsafe_code)]
+        let got = unsafe { wide(&numbers) };
+        assert_same_bits(&got, &all_operations::<[f64; 8]>(&numbers));
+    }
+}
+
+#[test]
+fn a_factor_without_derivatives_is_a_constant() {
+    // `axpy` leaves products with zero out; the sums are the same.
+    type D = Dual<Lanes<2>, 3>;
+    let mut random = Random(9);
+    for _ in 0..100 {
+        let mut number = || D {
+            value: Lanes([random.within(3.0), random.within(3.0)]),
+            partials: std::array::from_fn(|_| Lanes([random.within(3.0), random.within(3.0)])),
+        };
+        let (x, y) = (number(), number());
+        assert_eq!(x.axpy(-1.7, y), x.fma(D::constant(-1.7), y));
+    }
+    assert_eq!(2.0.axpy(3.0, 1.0), 7.0);
+}
+
+fn registers_of<const L: usize>() {
+    let mut random = Random(L as u64);
+    let (x, y) = (random.vector(L, 3.0), random.vector(L, 3.0));
+    let (a, b) = (Lanes::<L>::load(&x), Lanes::<L>::load(&y));
+    let mut out = vec![0.0; L + 1];
+    let mut check = |name: &str, result: Lanes<L>, plain: &dyn Fn(f64, f64) -> f64| {
+        out[L] = 7.0;
+        result.store(&mut out);
+        for lane in 0..L {
+            let want = plain(x[lane], y[lane]);
+            assert_eq!(out[lane].to_bits(), want.to_bits(), "{name}, {L} lanes");
+        }
+        assert_eq!(out[L], 7.0, "{name} writes beyond {L} lanes");
+    };
+    check("+", a + b, &|a, b| a + b);
+    check("-", a - b, &|a, b| a - b);
+    check("*", a * b, &|a, b| a * b);
+    check("neg", -a, &|a, _| -a);
+    check("fma", Register::fma(a, b, a), &|a, b| a.mul_add(b, a));
+    check("fnma", Register::fnma(a, b, a), &|a, b| (-a).mul_add(b, a));
+    check("recip", Register::recip(a), &|a, _| 1.0 / a);
+    check("choice", Register::if_positive(a, b, a), &|a, b| {
+        if a > 0.0 { b } else { a }
+    });
+    check("power", Register::inverse_power_of_two(a * a), &|a, _| {
+        (-(a * a).log2().floor()).exp2()
+    });
+    // Numbers three apart, there and back.
+    let numbers: Vec<_> = (0..3 * L)
+        .map(|i| Complex::new(i as f64, -0.5 * i as f64))
+        .collect();
+    let (re, im) = Lanes::<L>::split(&numbers, 3);
+    assert_eq!(re.0, std::array::from_fn::<_, L, _>(|l| 3.0 * l as f64));
+    let mut back = vec![Complex::default(); 3 * L];
+    Lanes::<L>::join(re, im, &mut back, 3);
+    for (i, (a, b)) in numbers.iter().zip(&back).enumerate() {
+        assert_eq!(*b, if i % 3 == 0 { *a } else { Complex::default() });
+    }
+}
+
+#[test]
+fn registers_of_any_length_are_plain_numbers_side_by_side() {
+    registers_of::<1>();
+    registers_of::<2>();
+    registers_of::<4>();
+    registers_of::<5>();
+    registers_of::<8>();
 }

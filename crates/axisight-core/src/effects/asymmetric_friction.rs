@@ -1,5 +1,6 @@
 //! Coulomb friction that differs between the two directions of motion.
 
+use super::formulas::smoothed_sign;
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -66,7 +67,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Asymmetric<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let t = (motor.speed * self.inverse_width).tanh();
+        let t = smoothed_sign(motor.speed, self.inverse_width);
         -(t * self.half_difference.fma(t, self.mean))
     }
 }

@@ -1,5 +1,6 @@
 //! Coulomb friction.
 
+use super::formulas::smoothed_sign;
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -55,6 +56,6 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Coulomb<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        -(self.level * (motor.speed * self.inverse_width).tanh())
+        -(self.level * smoothed_sign(motor.speed, self.inverse_width))
     }
 }

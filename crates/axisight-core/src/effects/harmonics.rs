@@ -1,5 +1,6 @@
 //! Sums of harmonics of the motor angle, shared by the ripple effects.
 
+use super::formulas::harmonic;
 use axisight_scalar::Scalar;
 
 /// `sum_i c_i cos(n_i phi) + s_i sin(n_i phi)`.
@@ -23,8 +24,7 @@ impl<S: Scalar> Harmonics<S> {
     pub(super) fn evaluate(&self, angle: S) -> S {
         let mut sum = S::zero();
         for [order, cosine, sine] in &self.terms {
-            let (s, c) = (*order * angle).sin_cos();
-            sum += cosine.fma(c, *sine * s);
+            sum += harmonic(*order * angle, *cosine, *sine);
         }
         sum
     }

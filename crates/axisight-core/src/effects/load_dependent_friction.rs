@@ -1,5 +1,6 @@
 //! Coulomb friction in proportion to the gear load.
 
+use super::formulas::smoothed_sign;
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -55,7 +56,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for LoadFriction<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let sign = (motor.speed * self.inverse_width).tanh();
+        let sign = smoothed_sign(motor.speed, self.inverse_width);
         -(self.coefficient * motor.load.abs() * sign)
     }
 }

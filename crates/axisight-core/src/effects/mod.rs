@@ -2,9 +2,11 @@
 //!
 //! One file per effect states all that is known of it: its parameters, the value at which it
 //! vanishes, where it acts, its equation and its source, and what others have to know of it
-//! ([`EffectInfo`]). A new effect is a new file and one line in the table below.
+//! ([`EffectInfo`]). A new effect is a new file and one line in the table below. Equations that
+//! other models share are in [`formulas`].
 
 mod error;
+pub mod formulas;
 mod harmonics;
 mod info;
 mod kernel;

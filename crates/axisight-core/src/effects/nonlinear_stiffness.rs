@@ -1,5 +1,6 @@
 //! Gear stiffness that changes with load.
 
+use super::formulas::spring_torque;
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
 use axisight_scalar::Scalar;
 
@@ -38,6 +39,6 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Cubic<S> {
     fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
-        self.0 * spring.loaded.square() * spring.loaded
+        spring_torque(S::zero(), self.0, spring.loaded)
     }
 }

@@ -1,5 +1,6 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
+use super::formulas::stribeck_level;
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -89,8 +90,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 impl<S: Scalar> Presliding<S> {
     /// Deflection of the bristles, in units of the one at which they slip, and its rate.
     fn bristles(&self, motor: &Motor<'_, S>) -> (S, S) {
-        let hump = (-(motor.speed * self.inverse_speed).square()).exp();
-        let level = self.excess.fma(hump, S::one());
+        let level = stribeck_level(S::one(), self.excess, self.inverse_speed, motor.speed);
         match motor.internal.first() {
             Some(z) => {
                 let slip = motor.speed.abs() * (*z / level);

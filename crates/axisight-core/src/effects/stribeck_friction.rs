@@ -1,5 +1,6 @@
 //! Stribeck friction: Coulomb friction with an excess at low speed.
 
+use super::formulas::{smoothed_sign, stribeck_level};
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -77,8 +78,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for Stribeck<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let hump = (-(motor.speed * self.inverse_speed).square()).exp();
-        let level = self.excess.fma(hump, self.coulomb);
-        -(level * (motor.speed * self.inverse_width).tanh())
+        let level = stribeck_level(self.coulomb, self.excess, self.inverse_speed, motor.speed);
+        -(level * smoothed_sign(motor.speed, self.inverse_width))
     }
 }

@@ -1,5 +1,6 @@
 //! Kinematic error of the gear over the motor angle.
 
+use super::formulas::harmonic_slope;
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
@@ -66,9 +67,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 
 impl<S: Scalar> Kernel<S> for TransmissionError<S> {
     fn transmission_error(&self, angle: S) -> Option<(S, S)> {
-        let (s, c) = (self.order * angle).sin_cos();
-        let error = self.cosine.fma(c, self.sine * s);
-        let slope = self.order * self.sine.fma(c, -(self.cosine * s));
-        Some((error, slope))
+        let (error, slope) = harmonic_slope(self.order * angle, self.cosine, self.sine);
+        Some((error, self.order * slope))
     }
 }

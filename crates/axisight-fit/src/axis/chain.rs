@@ -2,9 +2,13 @@
 //!
 //! The states are the deflections of the springs and the speeds of the masses, so that a
 //! turning axis has no state that drifts; the motor angle is carried where something needs it.
+//! Friction, backlash, springs and ripple are the formulas of the core's effects.
 
-use super::jet::Number;
 use super::layout::AxisModel;
+use axisight_core::effects::formulas::{
+    dead_zone, harmonic, smoothed_sign, spring_torque, stribeck_level,
+};
+use axisight_scalar::Scalar;
 use std::array::from_fn;
 
 /// State of a chain of `N` masses, or its rate.
@@ -16,7 +20,7 @@ pub(super) struct State<S, const N: usize> {
     pub speed: [S; N],
 }
 
-impl<S: Number, const N: usize> State<S, N> {
+impl<S: Scalar, const N: usize> State<S, N> {
     /// From motor angle, deflections and speeds, one after the other.
     #[inline(always)]
     pub fn new(entry: impl Fn(usize) -> S) -> Self {
@@ -32,9 +36,9 @@ impl<S: Number, const N: usize> State<S, N> {
         let mut out = *self;
         for i in 0..N {
             if EXTENDED || i > 0 {
-                out.place[i] = rate.place[i].times_plus(h, self.place[i]);
+                out.place[i] = rate.place[i].axpy(h, self.place[i]);
             }
-            out.speed[i] = rate.speed[i].times_plus(h, self.speed[i]);
+            out.speed[i] = rate.speed[i].axpy(h, self.speed[i]);
         }
         out
     }
@@ -105,10 +109,7 @@ pub(super) struct Chain<S, const N: usize> {
     pub inverse_smoothing: Option<f64>,
 }
 
-/// The edge of the gap is rounded over this share of its half width, as in the effect `backlash`.
-const EDGE: f64 = 0.05;
-
-impl<S: Number, const N: usize> Chain<S, N> {
+impl<S: Scalar, const N: usize> Chain<S, N> {
     /// Chain with the parameters that `value` gives by their place.
     #[inline(always)]
     pub fn new(model: &AxisModel, value: impl Fn(usize) -> S) -> Self {
@@ -159,7 +160,7 @@ impl<S: Number, const N: usize> Chain<S, N> {
         if EXTENDED {
             x.fma(self.ratio, -y)
         } else {
-            x.times_plus(self.plain_ratio, -y)
+            x.axpy(self.plain_ratio, -y)
         }
     }
 
@@ -180,9 +181,9 @@ impl<S: Number, const N: usize> Chain<S, N> {
             } else {
                 (x.place[i], rates[i])
             };
-            let stiffness = self.cubic[i].fma(deflection.square(), self.linear[i]);
+            let spring = spring_torque(self.linear[i], self.cubic[i], deflection);
             // The rate comes last: every operation after it delays the next stage.
-            torques[i] = rate.fma(self.damping[i], stiffness * deflection);
+            torques[i] = rate.fma(self.damping[i], spring);
         }
         (rates, torques)
     }
@@ -194,8 +195,7 @@ impl<S: Number, const N: usize> Chain<S, N> {
         if EXTENDED {
             drive += self.offset;
             for (order, cosine, sine) in &self.ripple {
-                let (s, c) = (x.place[0] * *order).sin_cos();
-                drive += *cosine * c + *sine * s;
+                drive += harmonic(x.place[0] * *order, *cosine, *sine);
             }
         }
         drive
@@ -204,13 +204,18 @@ impl<S: Number, const N: usize> Chain<S, N> {
     /// Friction torque.
     #[inline(always)]
     fn friction<const EXTENDED: bool>(&self, speed: S, regime: Regime) -> S {
-        let mut level = self.coulomb;
-        if EXTENDED && self.humped {
-            let hump = (-(speed * self.inverse_stribeck_speed).square()).exp();
-            level = self.excess.fma(hump, level);
-        }
+        let level = if EXTENDED && self.humped {
+            stribeck_level(
+                self.coulomb,
+                self.excess,
+                self.inverse_stribeck_speed,
+                speed,
+            )
+        } else {
+            self.coulomb
+        };
         let dry = match (regime, self.inverse_smoothing) {
-            (Regime::Smooth, Some(inverse)) => level * (speed * inverse).tanh(),
+            (Regime::Smooth, Some(inverse)) => level * smoothed_sign(speed, inverse),
             (Regime::Slip(sign), _) => level * sign,
             _ => S::zero(),
         };
@@ -254,30 +259,125 @@ impl<S: Number, const N: usize> Chain<S, N> {
     }
 
     /// Torque on a standing motor but for the friction.
-    #[inline(always)]
-    pub fn standing_drive<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> S {
-        let (_, springs) = self.springs::<EXTENDED>(x);
-        self.drive::<EXTENDED>(x, torque) - springs[1] * self.ratio
+    pub fn standing_drive(&self, x: &State<S, N>, torque: f64) -> S {
+        let (_, springs) = self.springs::<true>(x);
+        self.drive::<true>(x, torque) - springs[1] * self.ratio
     }
 
     /// Torque that the friction of a standing motor withstands.
-    #[inline(always)]
     pub fn breakaway(&self) -> S {
         self.coulomb + self.excess
     }
 }
 
-/// Deflection beyond a gap of half width `b`, and its slope.
-#[inline(always)]
-fn dead_zone<S: Number>(delta: S, b: S) -> (S, S) {
-    let (zero, one) = (S::zero(), S::one());
-    let edge = b * EDGE;
-    let over = delta.abs() - b;
-    let into = over + edge;
-    let rounded = (edge - over).if_positive(into * into / (edge * 4.0), over);
-    let slope = (edge - over).if_positive(into / (edge * 2.0), one);
-    // Strictly inside the gap; a gap of no width has no inside.
-    let size = (-into).if_positive(zero, rounded);
-    let slope = (-into).if_positive(zero, slope);
-    (delta.if_positive(size, -size), slope)
+#[cfg(test)]
+mod tests {
+    use super::super::layout::{Hold, Output};
+    use super::*;
+    use axisight_core::effects::{Kernel, Motor, Spring, build};
+
+    const ORDER: f64 = 3.0;
+    const SMOOTHING: f64 = 0.3;
+
+    /// A chain of two masses with nothing but what `set` gives.
+    fn chain(set: impl Fn(&mut Vec<f64>)) -> Chain<f64, 2> {
+        let model = AxisModel {
+            masses: 2,
+            output: Output::Velocity,
+            hold: Hold::Zero,
+            smoothing: SMOOTHING,
+            ripple_orders: vec![ORDER],
+            substeps: 1,
+        };
+        let mut theta = vec![0.0; model.layout().len(1)];
+        set(&mut theta);
+        Chain::new(&model, |i| theta[i])
+    }
+
+    fn layout() -> super::super::layout::Layout {
+        super::super::layout::Layout {
+            masses: 2,
+            orders: 1,
+        }
+    }
+
+    fn kernel(name: &str, parameters: &[f64]) -> Box<dyn Kernel<f64>> {
+        build(name, parameters).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn motor(angle: f64, speed: f64) -> Motor<'static, f64> {
+        Motor {
+            angle,
+            speed,
+            command: 0.0,
+            load: 0.0,
+            internal: &[],
+        }
+    }
+
+    fn assert_same(got: f64, want: f64) {
+        assert_eq!(got.to_bits(), want.to_bits(), "{got} {want}");
+    }
+
+    fn sweep() -> impl Iterator<Item = f64> {
+        (-40..=40).map(|i| 0.137 * f64::from(i) + 0.001)
+    }
+
+    #[test]
+    fn friction_is_that_of_the_effects() {
+        let chain = chain(|theta| {
+            theta[layout().coulomb()] = 0.64;
+            theta[layout().excess()] = 0.27;
+            theta[layout().stribeck_speed()] = 1.7;
+        });
+        let stribeck = kernel("stribeck_friction", &[0.64, 0.27, 1.7, SMOOTHING]);
+        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING]);
+        for speed in sweep() {
+            let own = chain.friction::<true>(speed, Regime::Smooth);
+            assert_same(own, -stribeck.motor_torque(&motor(0.0, speed)));
+            let own = chain.friction::<false>(speed, Regime::Smooth);
+            assert_same(own, -coulomb.motor_torque(&motor(0.0, speed)));
+        }
+    }
+
+    #[test]
+    fn the_gear_is_that_of_the_effects() {
+        let chain = chain(|theta| {
+            theta[layout().cubic(0)] = 5.0;
+            theta[layout().backlash()] = 0.8;
+        });
+        let (gap, spring) = (
+            kernel("backlash", &[0.8]),
+            kernel("nonlinear_stiffness", &[5.0]),
+        );
+        let at = |loaded| Spring {
+            loaded,
+            rate: 0.0,
+            internal: &[],
+        };
+        for deflection in sweep() {
+            let state = State::new(|i| if i == 1 { deflection } else { 0.0 });
+            let (_, torques) = chain.springs::<true>(&state);
+            let (loaded, _) = gap.deflection(deflection);
+            assert!((torques[1] - spring.gear_torque(&at(loaded))).abs() <= 0.0);
+            let (_, torques) = chain.springs::<false>(&state);
+            assert!((torques[1] - spring.gear_torque(&at(deflection))).abs() <= 0.0);
+        }
+    }
+
+    #[test]
+    fn ripple_is_that_of_the_effect() {
+        let chain = chain(|theta| {
+            theta[layout().ripple(0)] = 0.11;
+            theta[layout().ripple(0) + 1] = -0.06;
+        });
+        let mut parameters = [0.0; 12];
+        parameters[..3].copy_from_slice(&[ORDER, 0.11, -0.06]);
+        let ripple = kernel("torque_ripple", &parameters);
+        for angle in sweep() {
+            let state = State::new(|i| if i == 0 { angle } else { 0.0 });
+            let own = chain.drive::<true>(&state, 0.0);
+            assert_same(own, ripple.motor_torque(&motor(angle, 0.0)));
+        }
+    }
 }

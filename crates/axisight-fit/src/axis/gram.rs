@@ -1,6 +1,6 @@
 //! Residuals with their derivatives, sample by sample, and the normal equations they sum to.
 
-use super::problem::LANES;
+use super::numbers::LANES;
 
 /// Residuals of one data set and their derivatives.
 pub(super) struct Rows {

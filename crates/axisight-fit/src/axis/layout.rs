@@ -1,6 +1,6 @@
 //! The structure of a model and the place of each of its parameters.
 
-use super::AxisError;
+use super::error::AxisError;
 
 /// Most masses of a chain.
 pub const MOST_MASSES: usize = 4;

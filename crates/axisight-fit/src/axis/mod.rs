@@ -6,20 +6,20 @@
 //! residuals and normal equations; [`search`] and [`multistart`] minimize.
 
 mod chain;
+mod data;
 mod error;
 mod gram;
-mod jet;
 mod layout;
 mod motion;
+mod numbers;
 mod predictor;
 mod problem;
 mod search;
-#[cfg(target_arch = "x86_64")]
-mod wide;
 
+pub use data::AxisSet;
 pub use error::AxisError;
 pub use gram::Normal;
 pub use layout::{AxisModel, Hold, Layout, Output};
 pub use predictor::Trajectory;
-pub use problem::{AxisProblem, AxisSet, Linearization};
+pub use problem::{AxisProblem, Linearization};
 pub use search::{SearchOptions, SearchParameter, SearchResult, SearchStatus, search};

@@ -8,13 +8,15 @@
 //! one Newton step on the guard in dual numbers from the root found in plain ones.
 
 use super::chain::{Chain, Regime, State};
-use super::jet::Number;
+use super::numbers::Number;
+use axisight_scalar::Scalar;
 
 /// Changes of regime within one step; beyond, the rest is done in the last regime.
 const MOST_CHANGES: usize = 8;
 
 /// A chain in three kinds of numbers: for the steps, for the steps in which the regime changes,
-/// and without derivatives for the search of the instants.
+/// and without derivatives for the search of the instants. Changes of regime are rare: they are
+/// compiled once for all chains of a length, with the extended equations.
 pub(super) struct Motion<S: Number, const N: usize> {
     chain: Chain<S, N>,
     changes: Changes<S::Plain, N>,
@@ -46,27 +48,34 @@ impl Ramp {
 }
 
 #[inline(always)]
-fn runge_kutta4<S: Number, const N: usize, const EXTENDED: bool>(
+fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
     chain: &Chain<S, N>,
     x: &State<S, N>,
     ramp: Ramp,
     h: f64,
     regime: Regime,
 ) -> State<S, N> {
-    let (half, middle) = (0.5 * h, ramp.at(0.5 * h));
-    let a = chain.rate::<EXTENDED>(x, ramp.torque, regime);
-    let b = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&a, half), middle, regime);
-    let c = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&b, half), middle, regime);
-    let d = chain.rate::<EXTENDED>(&x.moved::<EXTENDED>(&c, h), ramp.at(h), regime);
-    x.moved::<EXTENDED>(&a, h / 6.0)
-        .moved::<EXTENDED>(&b, h / 3.0)
-        .moved::<EXTENDED>(&c, h / 3.0)
-        .moved::<EXTENDED>(&d, h / 6.0)
+    let middle = ramp.at(0.5 * h);
+    // By how far a stage looks ahead along the last rate, its torque, its weight in the step.
+    let stages = [
+        (0.0, ramp.torque, h / 6.0),
+        (0.5 * h, middle, h / 3.0),
+        (0.5 * h, middle, h / 3.0),
+        (h, ramp.at(h), h / 6.0),
+    ];
+    // A loop: written out, it takes the compiler four times as long and is not faster.
+    let (mut next, mut rate) = (*x, State::new(|_| S::zero()));
+    for (ahead, torque, weight) in stages {
+        let stage = x.moved::<EXTENDED>(&rate, ahead);
+        rate = chain.rate::<EXTENDED>(&stage, torque, regime);
+        next = next.moved::<EXTENDED>(&rate, weight);
+    }
+    next
 }
 
 /// Positive while `regime` lasts.
 #[inline(always)]
-fn guard<S: Number, const N: usize, const EXTENDED: bool>(
+fn guard<S: Scalar, const N: usize>(
     chain: &Chain<S, N>,
     x: &State<S, N>,
     torque: f64,
@@ -74,7 +83,7 @@ fn guard<S: Number, const N: usize, const EXTENDED: bool>(
 ) -> S {
     match regime {
         Regime::Slip(sign) => x.speed[0] * sign,
-        Regime::Stick => chain.breakaway() - chain.standing_drive::<EXTENDED>(x, torque).abs(),
+        Regime::Stick => chain.breakaway() - chain.standing_drive(x, torque).abs(),
         Regime::Smooth => S::one(),
     }
 }
@@ -101,110 +110,92 @@ impl<S: Number, const N: usize> Motion<S, N> {
             Regime::Slip(speed.signum())
         } else {
             self.changes
-                .leaving_standstill::<EXTENDED>(&x.values(), ramp.torque)
+                .plain
+                .leaving_standstill(&x.values(), ramp.torque)
         };
         let next = runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime);
         let lasts = match regime {
             Regime::Smooth => true,
             Regime::Slip(sign) => next.speed[0].lane(0) * sign >= 0.0,
-            Regime::Stick => self
-                .changes
-                .lasts::<EXTENDED>(&next.values(), ramp.at(h), regime),
+            Regime::Stick => self.changes.plain.lasts(&next.values(), ramp.at(h), regime),
         };
         if lasts {
             next
         } else {
             let x = State::new(|i| x.entry(i).plain());
-            let next = self.changes.change::<EXTENDED>(&x, ramp, h, regime);
+            let next = self.changes.step(&x, ramp, h, regime);
             State::new(|i| S::from_plain(next.entry(i)))
         }
     }
 }
 
-impl<S: Number, const N: usize> Changes<S, N> {
+impl<S: Scalar, const N: usize> Changes<S, N> {
+    /// A step in which the regime changes.
     #[inline(never)]
-    fn leaving_standstill<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64) -> Regime {
-        let drive = self.plain.standing_drive::<EXTENDED>(x, torque);
-        if drive.abs() <= self.plain.breakaway() {
+    fn step(&self, x: &State<S, N>, ramp: Ramp, h: f64, regime: Regime) -> State<S, N> {
+        let (mut x, mut ramp, mut left, mut regime) = (*x, ramp, h, regime);
+        // The instants carry derivatives, the lengths of the parts do not: `late` is by how
+        // much the state stands behind its nominal time, zero but for its derivatives.
+        let mut late = S::zero();
+        for _ in 0..MOST_CHANGES {
+            let next = self.advance(&x, ramp, left, regime);
+            if self.plain.lasts(&next.values(), ramp.at(left), regime) {
+                break;
+            }
+            let (instant, slope) = self.plain.instant(&x.values(), ramp, left, regime);
+            x = self.advance(&x, ramp, instant, regime);
+            ramp = ramp.later(instant);
+            left -= instant;
+            if slope != 0.0 {
+                let value = guard(&self.chain, &x, ramp.torque, regime);
+                let shift = value * (-1.0 / slope);
+                x = self.shifted(&x, ramp.torque, regime, shift);
+                late += shift;
+            }
+            if matches!(regime, Regime::Slip(_)) {
+                x.speed[0] = S::zero();
+                regime = self.plain.leaving_standstill(&x.values(), ramp.torque);
+            } else {
+                let drive = self.plain.standing_drive(&x.values(), ramp.torque);
+                regime = Regime::Slip(drive.signum());
+            }
+        }
+        let next = self.advance(&x, ramp, left, regime);
+        self.shifted(&next, ramp.at(left), regime, -late)
+    }
+
+    #[inline(never)]
+    fn advance(&self, x: &State<S, N>, ramp: Ramp, h: f64, regime: Regime) -> State<S, N> {
+        runge_kutta4::<S, N, true>(&self.chain, x, ramp, h, regime)
+    }
+
+    /// The state a short time later, which carries derivatives.
+    #[inline(never)]
+    fn shifted(&self, x: &State<S, N>, torque: f64, regime: Regime, time: S) -> State<S, N> {
+        x.shifted(&self.chain.rate::<true>(x, torque, regime), time)
+    }
+}
+
+impl<const N: usize> Chain<f64, N> {
+    fn leaving_standstill(&self, x: &State<f64, N>, torque: f64) -> Regime {
+        let drive = self.standing_drive(x, torque);
+        if drive.abs() <= self.breakaway() {
             Regime::Stick
         } else {
             Regime::Slip(drive.signum())
         }
     }
 
-    #[inline(never)]
-    fn lasts<const EXTENDED: bool>(&self, x: &State<f64, N>, torque: f64, regime: Regime) -> bool {
-        guard::<f64, N, EXTENDED>(&self.plain, x, torque, regime) >= 0.0
-    }
-
-    /// A step in which the regime changes.
-    #[inline(never)]
-    fn change<const EXTENDED: bool>(
-        &self,
-        x: &State<S, N>,
-        ramp: Ramp,
-        h: f64,
-        regime: Regime,
-    ) -> State<S, N> {
-        let (mut x, mut ramp, mut left, mut regime) = (*x, ramp, h, regime);
-        // The instants carry derivatives, the lengths of the parts do not: `late` is by how
-        // much the state stands behind its nominal time, zero but for its derivatives.
-        let mut late = S::zero();
-        for _ in 0..MOST_CHANGES {
-            let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
-            if self.lasts::<EXTENDED>(&next.values(), ramp.at(left), regime) {
-                break;
-            }
-            let (instant, slope) = self.instant::<EXTENDED>(&x.values(), ramp, left, regime);
-            x = self.advance::<EXTENDED>(&x, ramp, instant, regime);
-            ramp = ramp.later(instant);
-            left -= instant;
-            if slope != 0.0 {
-                let value = guard::<S, N, EXTENDED>(&self.chain, &x, ramp.torque, regime);
-                let shift = value * (-1.0 / slope);
-                let rate = self.chain.rate::<EXTENDED>(&x, ramp.torque, regime);
-                x = x.shifted(&rate, shift);
-                late += shift;
-            }
-            if matches!(regime, Regime::Slip(_)) {
-                x.speed[0] = S::zero();
-                regime = self.leaving_standstill::<EXTENDED>(&x.values(), ramp.torque);
-            } else {
-                let drive = self
-                    .plain
-                    .standing_drive::<EXTENDED>(&x.values(), ramp.torque);
-                regime = Regime::Slip(drive.signum());
-            }
-        }
-        let next = self.advance::<EXTENDED>(&x, ramp, left, regime);
-        let rate = self.chain.rate::<EXTENDED>(&next, ramp.at(left), regime);
-        next.shifted(&rate, -late)
-    }
-
-    #[inline(never)]
-    fn advance<const EXTENDED: bool>(
-        &self,
-        x: &State<S, N>,
-        ramp: Ramp,
-        h: f64,
-        regime: Regime,
-    ) -> State<S, N> {
-        runge_kutta4::<S, N, EXTENDED>(&self.chain, x, ramp, h, regime)
+    fn lasts(&self, x: &State<f64, N>, torque: f64, regime: Regime) -> bool {
+        guard(self, x, torque, regime) >= 0.0
     }
 
     /// When the guard of `regime` falls through zero within `h`, and its slope there; slope
     /// zero where it does so at once.
-    #[inline(never)]
-    fn instant<const EXTENDED: bool>(
-        &self,
-        x: &State<f64, N>,
-        ramp: Ramp,
-        h: f64,
-        regime: Regime,
-    ) -> (f64, f64) {
+    fn instant(&self, x: &State<f64, N>, ramp: Ramp, h: f64, regime: Regime) -> (f64, f64) {
         let value = |t: f64| {
-            let x = runge_kutta4::<f64, N, EXTENDED>(&self.plain, x, ramp, t, regime);
-            guard::<f64, N, EXTENDED>(&self.plain, &x, ramp.at(t), regime)
+            let x = self.advanced(x, ramp, t, regime);
+            guard(self, &x, ramp.at(t), regime)
         };
         let (mut low, mut high) = (1e-6 * h, h);
         let (mut above, mut below) = (value(low), value(high));
@@ -231,5 +222,10 @@ impl<S: Number, const N: usize> Changes<S, N> {
         }
         let e = 1e-4 * h;
         (t, (value(t + e) - value(t - e)) / (2.0 * e))
+    }
+
+    #[inline(never)]
+    fn advanced(&self, x: &State<f64, N>, ramp: Ramp, h: f64, regime: Regime) -> State<f64, N> {
+        runge_kutta4::<f64, N, true>(self, x, ramp, h, regime)
     }
 }

@@ -1,11 +1,11 @@
 //! Runs of one data set: simulation, and prediction with the innovations form (3.33).
 
-use super::AxisError;
 use super::chain::{Chain, State};
-use super::jet::Number;
+use super::data::AxisSet;
+use super::error::AxisError;
 use super::layout::{AxisModel, Hold, Output};
 use super::motion::{Motion, Ramp};
-use super::problem::AxisSet;
+use super::numbers::Number;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Motor speed [rad/s] beyond which a run counts as diverged.

@@ -1,35 +1,16 @@
 //! Data sets and parameters as residuals, their derivatives and normal equations.
 
-use super::AxisError;
+use super::data::AxisSet;
+use super::error::AxisError;
 use super::gram::{Normal, Rows};
-use super::jet::{Jet, Partials};
 use super::layout::{AxisModel, Layout};
+use super::numbers::{Jet, LANES, PlainLanes, stored};
 use super::predictor::{Predictor, Trajectory};
 #[cfg(target_arch = "x86_64")]
-use super::wide;
-use axisight_scalar::{Lanes, Scalar};
+use axisight_scalar::wide;
+use axisight_scalar::{Register, Scalar};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-
-/// Parameters differentiated in one pass.
-pub(super) const LANES: usize = 8;
-
-/// A record of one axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AxisSet {
-    /// Its number, from 0.
-    pub number: usize,
-    /// Motor torque [Nm].
-    pub torque: Vec<f64>,
-    /// Measured output.
-    pub output: Vec<f64>,
-    /// Sample time [s].
-    pub sample_time: f64,
-    /// Weight of its squared residuals.
-    pub weight: f64,
-    /// Samples of a block of the sandwich covariance.
-    pub block: usize,
-}
 
 /// Residuals with derivatives by data set, and the normal equations they sum to.
 pub(super) struct Evaluation {
@@ -71,7 +52,7 @@ impl<'a> AxisProblem<'a> {
     ) -> Result<Self, AxisError> {
         model.check()?;
         for (i, set) in sets.iter().enumerate() {
-            check(i, set)?;
+            set.check(i)?;
         }
         if whitening.iter().any(|a| !a.is_finite()) {
             return Err(AxisError::invalid("whitening", "finite numbers", "others"));
@@ -270,31 +251,31 @@ impl<'a> AxisProblem<'a> {
                 _ => {}
             }
         }
-        self.pass_of::<Lanes<LANES>, N, EXTENDED>(task, rows)
+        self.pass_of::<PlainLanes, N, EXTENDED>(task, rows)
     }
 
     // By name for the common chains: compiled for all of them, the package takes minutes longer.
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
+    #[target_feature(enable = "avx512f,avx512dq")]
     fn wide_pass_of_two(&self, task: &Pass<'_>, rows: &mut Rows) -> Result<(), AxisError> {
         self.pass_of::<wide::Wide, 2, false>(task, rows)
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
+    #[target_feature(enable = "avx512f,avx512dq")]
     fn wide_pass_of_three(&self, task: &Pass<'_>, rows: &mut Rows) -> Result<(), AxisError> {
         self.pass_of::<wide::Wide, 3, false>(task, rows)
     }
 
     #[inline(always)]
-    fn pass_of<P: Partials, const N: usize, const EXTENDED: bool>(
+    fn pass_of<V: Register, const N: usize, const EXTENDED: bool>(
         &self,
         task: &Pass<'_>,
         rows: &mut Rows,
     ) -> Result<(), AxisError> {
         let (theta, data) = (task.theta, &self.sets[task.set]);
         let value = |i: usize| {
-            let number = Jet::<P>::constant(theta.get(i).copied().unwrap_or(0.0));
+            let number = Jet::<V>::constant(theta.get(i).copied().unwrap_or(0.0));
             let seed = task.seeds.iter().position(|s| *s == i);
             seed.map_or(number, |s| number.seeded(s))
         };
@@ -302,11 +283,11 @@ impl<'a> AxisProblem<'a> {
         let Rows {
             residual, partials, ..
         } = rows;
-        run.run::<EXTENDED>(data, self.cancel, |k, _, y: Jet<P>| {
+        run.run::<EXTENDED>(data, self.cancel, |k, _, y: Jet<V>| {
             if task.first {
                 residual.push(y.value - data.output[k]);
             }
-            partials.push(y.partials.store());
+            partials.push(stored(y.partials));
         })
     }
 }
@@ -318,33 +299,4 @@ struct Pass<'a> {
     set: usize,
     /// The run also gives the residuals.
     first: bool,
-}
-
-fn check(i: usize, set: &AxisSet) -> Result<(), AxisError> {
-    let field = |name: &str| format!("data_sets[{i}].{name}");
-    let (n, m) = (set.torque.len(), set.output.len());
-    if n != m || n == 0 {
-        return Err(AxisError::invalid(
-            field("output"),
-            format!("as many samples as the torque has, {n}, and some"),
-            m,
-        ));
-    }
-    let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
-    if !finite(&set.torque) || !finite(&set.output) {
-        return Err(AxisError::invalid(
-            field("samples"),
-            "finite numbers",
-            "others",
-        ));
-    }
-    let positive = |x: f64| x > 0.0 && x.is_finite();
-    if !positive(set.sample_time) || !positive(set.weight) {
-        return Err(AxisError::invalid(
-            field("sample_time, weight"),
-            "positive numbers",
-            format!("{}, {}", set.sample_time, set.weight),
-        ));
-    }
-    Ok(())
 }

@@ -1,24 +1,13 @@
 //! What a fit must be given, field by field.
 
+use super::error::{FrequencyFitError, invalid};
 use super::hold::Hold;
-use super::problem::{FrequencyFitError, FrequencyOptions, FrequencyParameter};
+use super::settings::{FrequencyOptions, FrequencyParameter};
 use super::weighting::{Criterion, PoseResponse, Uncertainty};
 use axisight_core::robot::RobotDescription;
 use nalgebra::Complex;
 
 type C = Complex<f64>;
-
-pub(super) fn invalid(
-    field: &str,
-    expected: &str,
-    got: impl std::fmt::Display,
-) -> FrequencyFitError {
-    FrequencyFitError::Invalid {
-        field: field.to_owned(),
-        expected: expected.to_owned(),
-        got: got.to_string(),
-    }
-}
 
 pub(super) fn check_parameters(
     parameters: &[FrequencyParameter],

@@ -1,7 +1,7 @@
 //! Responses by one linear solution per line: slower than by poles, right for any robot.
 
+use super::columns::Columns;
 use super::hold::{Hold, point};
-use super::response::Columns;
 use super::second_order::{SecondOrder, SecondOrderDerivative};
 use nalgebra::{Complex, DMatrix};
 

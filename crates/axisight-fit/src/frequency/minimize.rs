@@ -5,7 +5,9 @@
 //! per trial gives loss and normal equations: with all derivatives at the price of two or
 //! three responses, a trial that is accepted has nothing left to compute.
 
-use super::problem::{FrequencyFitError, FrequencyProblem, Normal, Scatter};
+use super::error::FrequencyFitError;
+use super::problem::{FrequencyProblem, Scatter};
+use super::residuals::Normal;
 use nalgebra::{DMatrix, DVector};
 
 /// When a search stops.

@@ -1,95 +1,22 @@
 //! Residuals of all operating points and their normal equations.
 
-use super::checks::{check_parameters, check_pose, invalid};
+use super::checks::{check_parameters, check_pose};
+use super::columns::Columns;
+use super::error::{FrequencyFitError, invalid};
 use super::hold::Hold;
-use super::residuals::Residuals;
-use super::response::{Columns, evaluate};
+use super::residuals::{Normal, Residuals};
+use super::response::evaluate;
 use super::second_order::{Linearizer, SecondOrderError};
+use super::settings::{FrequencyOptions, FrequencyParameter};
 use super::weighting::{Criterion, PoseResponse, Whitening, whitening};
 use crate::identification::Loss;
-use axisight_core::robot::{EffectSetting, Parameter, RobotDescription};
+use axisight_core::robot::{EffectSetting, RobotDescription};
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 type C = Complex<f64>;
-
-/// One number to fit; bounds, start and prior in its own unit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrequencyParameter {
-    /// What it is.
-    pub parameter: Parameter,
-    /// Where the search starts.
-    pub initial: f64,
-    /// Lower bound.
-    pub lower: f64,
-    /// Upper bound.
-    pub upper: f64,
-    /// Searched over its logarithm; start and bounds are positive.
-    pub logarithmic: bool,
-    /// Mean and standard deviation of what is known beforehand.
-    pub prior: Option<(f64, f64)>,
-    /// Kept at its initial value.
-    pub frozen: bool,
-}
-
-/// Why responses cannot be fitted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FrequencyFitError {
-    /// Misuse.
-    #[error("{field}: expected {expected}, got {got}")]
-    Invalid {
-        /// Argument.
-        field: String,
-        /// What it should be.
-        expected: String,
-        /// What came.
-        got: String,
-    },
-    /// A weighted criterion without uncertainty.
-    #[error(
-        "response {pose}: expected a variance or covariance for a weighted criterion, got none"
-    )]
-    NoVariance {
-        /// Operating point, from 1.
-        pose: usize,
-    },
-    /// A covariance that is none.
-    #[error("response {pose}: expected a positive definite covariance at line {line}")]
-    Covariance {
-        /// Operating point, from 1.
-        pose: usize,
-        /// Line, from 1.
-        line: usize,
-    },
-    /// The robot cannot be linearized.
-    #[error("operating point {pose}: {source}")]
-    Robot {
-        /// Operating point, from 1.
-        pose: usize,
-        /// Why.
-        source: SecondOrderError,
-    },
-    /// A response of the model is not finite or, for a logarithm, zero.
-    #[error(
-        "operating point {pose}: expected a finite response that is not zero at {frequency_hz} Hz \
-         from axis {input} to axis {output}; leave the element out if the axes do not couple"
-    )]
-    NotFinite {
-        /// Operating point, from 1.
-        pose: usize,
-        /// Line [Hz].
-        frequency_hz: f64,
-        /// Axis, from 1.
-        output: usize,
-        /// Axis, from 1.
-        input: usize,
-    },
-    /// Another thread asked to stop.
-    #[error("cancelled")]
-    Cancelled,
-}
 
 /// What a fit is made of.
 pub struct FrequencyProblem {
@@ -110,32 +37,6 @@ struct Prepared {
     whitening: Whitening,
     /// Variance that the response's uncertainty makes a residual have, per element.
     expected: Option<Vec<f64>>,
-}
-
-/// Settings of [`FrequencyProblem::new`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrequencyOptions {
-    /// How the torque reaches the plant.
-    pub hold: Hold,
-    /// What is compared.
-    pub criterion: Criterion,
-    /// Weigh by the response's uncertainty.
-    pub weighted: bool,
-    /// Loss of the magnitude of a complex residual.
-    pub loss: Loss,
-    /// Lines in a row whose residuals may depend on each other, for the sandwich covariance.
-    pub block_lines: usize,
-}
-
-/// Loss and normal equations of the free parameters (logarithms where searched so).
-#[derive(Debug, Clone)]
-pub struct Normal {
-    /// Sum of losses.
-    pub loss: f64,
-    /// `J^T W J`.
-    pub matrix: DMatrix<f64>,
-    /// `J^T W r`.
-    pub gradient: DVector<f64>,
 }
 
 /// What the end of a fit reports besides [`Normal`].

@@ -1,10 +1,20 @@
 //! Residuals of one operating point, their weights and normal equations.
 
-use super::problem::Normal;
 use crate::identification::Loss;
 use nalgebra::{Complex, DMatrix, DVector};
 
 type C = Complex<f64>;
+
+/// Loss and normal equations of the free parameters (logarithms where searched so).
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// Sum of losses.
+    pub loss: f64,
+    /// `J^T W J`.
+    pub matrix: DMatrix<f64>,
+    /// `J^T W r`.
+    pub gradient: DVector<f64>,
+}
 
 /// Residuals of one pose: `[element][real, imaginary][line]`, weights by element and line.
 pub(super) struct Residuals {

@@ -1,6 +1,6 @@
 //! Criteria (3.42) to (3.44): what is compared, and how a deviation is weighed.
 
-use super::problem::FrequencyFitError;
+use super::error::FrequencyFitError;
 use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;

@@ -1,76 +1,14 @@
-"""The effects a machine may have and a simulator may lack."""
+"""An effect at work: its name, its place, its parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from types import MappingProxyType
-from typing import Literal
 
-from axisight import _core
+from axisight.effects.table import EffectInfo, effect_info
 from axisight.errors import InputError
 
 EffectTuple = tuple[str, int | tuple[int, int] | None, list[float]]
-"""Name, axis or axes from 1 (None for the whole arm), parameters in the order of the table."""
-
-
-@dataclass(frozen=True)
-class EffectParameter:
-    """One parameter of an effect.
-
-    ``role``: the effect vanishes when every ``"amplitude"`` is at its neutral
-    value; a ``"shape"`` may then be anything. ``lower`` and ``upper`` bound the
-    value, ``typical`` is its natural scale; all in ``unit``.
-    """
-
-    name: str
-    unit: str
-    role: Literal["amplitude", "shape"]
-    neutral: float
-    lower: float
-    upper: float
-    typical: float
-
-
-@dataclass(frozen=True)
-class EffectInfo:
-    """Description of an effect: equation and symbols as in the source it names."""
-
-    name: str
-    summary: str
-    equation: str
-    source: str
-    scope: Literal["axis", "axes", "arm"]
-    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "sensor"]
-    parameters: tuple[EffectParameter, ...]
-
-
-@cache
-def effect_table() -> Mapping[str, EffectInfo]:
-    """Return every effect by name, in the order of the documentation."""
-    table = {}
-    for row in _core.effect_table():
-        parameters = tuple(EffectParameter(**p) for p in row["parameters"])
-        table[row["name"]] = EffectInfo(
-            name=row["name"],
-            summary=row["summary"],
-            equation=row["equation"],
-            source=row["source"],
-            scope=row["scope"],
-            acts=row["acts"],
-            parameters=parameters,
-        )
-    return MappingProxyType(table)
-
-
-def effect_info(name: str) -> EffectInfo:
-    """Return the description of the effect called ``name``; raises InputError if there is none."""
-    try:
-        return effect_table()[name]
-    except KeyError:
-        known = ", ".join(effect_table())
-        raise InputError(f"effect {name!r}: expected one of {known}") from None
 
 
 @dataclass(frozen=True, eq=False)

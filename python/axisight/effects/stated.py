@@ -1,0 +1,67 @@
+"""Which effects state what was identified, and where its numbers stand in them.
+
+Fits have parameters of their own; robot files have effects. The one place that knows both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from axisight.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Stated:
+    """An effect that states fitted parameters.
+
+    ``places`` maps the names of the fit to parameters of the effect; ``shape`` are values that the
+    fit does not have.
+    """
+
+    name: str
+    places: dict[str, str]
+    shape: dict[str, float] = field(default_factory=dict)
+
+
+MOST_RIPPLES = 3
+"""Harmonics that a stated torque ripple holds."""
+
+
+def of_axis_fit(
+    *, stribeck: bool, ripple_orders: Sequence[float], smoothing_rad_s: float
+) -> list[Stated]:
+    """Return the effects that state the fit of one axis, by its thesis names (chapter 9)."""
+    friction = {"F_c": "coulomb_nm"}
+    kind = "coulomb_friction"
+    if stribeck:
+        friction |= {"F_s": "excess_nm", "v_s": "stribeck_speed_rad_s"}
+        kind = "stribeck_friction"
+    orders = list(enumerate(ripple_orders[:MOST_RIPPLES], 1))
+    ripple = {f"a_{n:g}": f"cosine_{i}_nm" for i, n in orders}
+    ripple |= {f"b_{n:g}": f"sine_{i}_nm" for i, n in orders}
+    return [
+        Stated("nonlinear_stiffness", {"k3": "cubic_nm_rad3"}),
+        Stated("backlash", {"b": "half_width_rad"}),
+        Stated("torque_offset", {"u_0": "offset_nm"}),
+        Stated(kind, friction, {"smoothing_rad_s": smoothing_rad_s}),
+        Stated("torque_ripple", ripple, {f"order_{i}": n for i, n in orders}),
+    ]
+
+
+RIGID_BODY_TERMS = {
+    "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
+    "torque_offset": ("torque_offset", "offset_nm"),
+}
+"""Terms of a torque model that the robot has no parameter for: effect and its parameter."""
+
+RIGID_BODY_QUANTITIES = {
+    "motor_inertia": "motor_inertia",
+    "viscous_friction": "viscous_friction",
+    "coulomb_friction": "dry_friction",
+    "torque_offset": "torque_offset",
+}
+"""Terms of a torque model by what they take up of effects that the robot has."""
+
+DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
+"""What the machine of the demonstration has and its simulator has not."""

@@ -1,0 +1,198 @@
+"""Start values, bounds and priors of effects from data: one table entry per effect.
+
+An entry takes a :class:`Trial` and returns the effect with what is free in it, or None where the
+data have nothing to start from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, EffectInfo
+from axisight.gap.model import FreeEffect
+from axisight.gap.orders import strongest_orders
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+MOST_ORDERS = 3
+"""Orders of a ripple that one candidate takes up."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What start values are taken from: logs and baseline residual torque on a common grid.
+
+    ``residual[log][axis]`` weighted residual torque, ``angle`` and ``speed``
+    motor side at the same samples, ``bandwidth_hz`` below which the residual
+    torque follows a torque on the motor.
+    """
+
+    residual: list[list[Array]]
+    angle: list[list[Array]]
+    speed: list[list[Array]]
+    bandwidth_hz: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect to be tried at a place: ``axis`` from 1, None for the arm."""
+
+    info: EffectInfo
+    axis: int | None
+    robot: Robot
+    logs: Sequence[Log]
+    at: Situation
+
+    @property
+    def index(self) -> int:
+        """Column of the axis."""
+        return 0 if self.axis is None else self.axis - 1
+
+    def effect(self, values: Mapping[str, float]) -> Effect:
+        """Return the effect with these parameters."""
+        return Effect(self.info.name, self.axis, values)
+
+    def torque(self) -> list[Array]:
+        """Return the torque of the axis in every log [Nm]."""
+        return [log.torque_nm[:, self.index] for log in self.logs]
+
+
+def _neutral(trial: Trial) -> FreeEffect:
+    """Begin at the neutral values, everything free."""
+    parameters = trial.info.parameters
+    values = {p.name: p.neutral for p in parameters}
+    return FreeEffect(trial.effect(values), tuple(values))
+
+
+def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
+    """Begin at neutral values; speeds that shape a friction law are shares of the speeds seen."""
+
+    def start(trial: Trial) -> FreeEffect:
+        top = max(float(np.abs(v[trial.index]).max()) for v in trial.at.speed) or 1.0
+        found = {name: share * top for name, share in shares.items()}
+        values = {p.name: p.neutral for p in trial.info.parameters} | found
+        bounds = {name: (0.1 * value, 10 * value) for name, value in found.items()}
+        return FreeEffect(trial.effect(values), tuple(values), bounds=bounds)
+
+    return start
+
+
+_SMOOTHING = 0.003
+_STRIBECK = 0.1
+
+
+def _waves(*, speed_power: int) -> Callable[[Trial], FreeEffect | None]:
+    """Begin with the strongest orders of the residual over the motor angle.
+
+    ``speed_power``: power of the speed with which the residual torque of the effect grows.
+    """
+
+    def start(trial: Trial) -> FreeEffect | None:
+        i, at = trial.index, trial.at
+        orders = strongest_orders(
+            [r[i] for r in at.residual],
+            [a[i] for a in at.angle],
+            [v[i] for v in at.speed],
+            count=MOST_ORDERS,
+            bandwidth_hz=at.bandwidth_hz,
+            speed_power=speed_power,
+        )
+        if not orders:
+            return None
+        # Terms without an order are switched off.
+        values = {p.name: 0.0 for p in trial.info.parameters if p.name.startswith("order")}
+        free: list[str] = []
+        for found, (order, *waves) in zip(orders, trial.info.terms().values(), strict=False):
+            values[order] = float(found)
+            free += waves
+        return FreeEffect(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free))
+
+    return start
+
+
+def _gear_waves(trial: Trial) -> FreeEffect:
+    """Begin twice a motor turn, as harmonic drives have it."""
+    values = {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0}
+    return FreeEffect(trial.effect(values), ("cosine_rad", "sine_rad"))
+
+
+# An axis with less of the error than this is not worth many starts.
+_SMALL_SHARE = 0.1
+
+
+def _play(trial: Trial) -> FreeEffect:
+    """Begin at several widths, as shares of the deflection the largest torque gives."""
+    robot, i = trial.robot, trial.index
+    stiffness = robot.parameters()[f"{robot.axis_names[i]}.stiffness"]
+    ratio = abs(float(robot.gear_ratio[i]))
+    spread = max(float(np.std(torque)) for torque in trial.torque())
+    deflection = spread / ratio / stiffness
+    # The valley around the true width is narrow: impacts must stay in phase.
+    worth_it = _axis_share(trial.at, i) > _SMALL_SHARE
+    shares = np.geomspace(0.04, 0.8, 18) if worth_it else ()
+    starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
+    return FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",), starts=starts)
+
+
+def _axis_share(at: Situation, index: int) -> float:
+    """Return the share of the residual error on an axis [1]."""
+    squares = [sum(float(row @ row) for row in rows) for rows in zip(*at.residual, strict=True)]
+    return squares[index] / max(sum(squares), 1e-300)
+
+
+def _limit(trial: Trial) -> FreeEffect:
+    """Begin below the largest torques."""
+    tops = [float(np.abs(torque).max()) for torque in trial.torque()]
+    start = 0.9 * min(max(tops), float(np.median(tops)))
+    return FreeEffect(trial.effect({"limit_nm": start}), ("limit_nm",))
+
+
+def _point_mass(trial: Trial) -> FreeEffect | None:
+    """Begin at the centre of mass of the last link that has one; a single axis shows none."""
+    joints = trial.robot.joints
+    if len(joints) == 1:
+        return None
+    x, y, z = next(j.link.com_m for j in reversed(joints) if j.link is not None)
+    reach = sum(float(np.linalg.norm(j.origin_m)) for j in joints) or 1.0
+    centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
+    # Tools reach about as far as the last links do.
+    spread = 0.3 * reach
+    return FreeEffect(
+        trial.effect({"mass_kg": 0.0, **centre}),
+        ("mass_kg", "x_m", "y_m", "z_m"),
+        {name: (value, spread) for name, value in centre.items()},
+    )
+
+
+STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
+    "viscous_friction": _neutral,
+    "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
+    "asymmetric_friction": _law(smoothing_rad_s=_SMOOTHING),
+    "stribeck_friction": _law(smoothing_rad_s=_SMOOTHING, stribeck_speed_rad_s=_STRIBECK),
+    "presliding_friction": _law(stribeck_speed_rad_s=_STRIBECK),
+    "backlash": _play,
+    "nonlinear_stiffness": _neutral,
+    "joint_stiffness": _neutral,
+    "torque_ripple": _waves(speed_power=0),
+    "resolver_ripple": _waves(speed_power=2),
+    "input_delay": _neutral,
+    "actuator_bandwidth": _neutral,
+    "torque_constant": _neutral,
+    "torque_offset": _neutral,
+    "payload": _point_mass,
+    "motor_inertia": _neutral,
+    "joint_damping": _neutral,
+    "quadratic_drag": _neutral,
+    "load_dependent_friction": _law(smoothing_rad_s=_SMOOTHING),
+    "gravity_compensation": _neutral,
+    "cable_stiffness": _neutral,
+    "transmission_error": _gear_waves,
+    "torque_saturation": _limit,
+}
+"""By effect."""

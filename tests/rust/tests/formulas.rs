@@ -1,0 +1,216 @@
+//! The formulas that the effects and the axis fit share, and one axis run through both models.
+
+use axisight_core::effects::formulas::{
+    dead_zone, dead_zone_inverse, harmonic, harmonic_slope, smoothed_sign, spring_torque,
+    stribeck_level,
+};
+use axisight_core::robot::Parameter;
+use axisight_core::robot::{EffectSetting, Plant};
+use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
+use axisight_fit::axis::{AxisModel, AxisProblem, AxisSet, Hold, Output};
+use axisight_scalar::{Dual, Scalar};
+use axisight_tests::{ROTOR, Random, effect, robot, sines};
+use std::sync::atomic::AtomicBool;
+
+type D = Dual<f64, 1>;
+
+#[test]
+fn the_dead_zone_is_a_shifted_line_outside_its_edge_and_nothing_inside() {
+    let b = 0.4;
+    for delta in [0.43, 0.6, 5.0] {
+        assert_eq!(dead_zone(delta, b), (delta - b, 1.0));
+        assert_eq!(dead_zone(-delta, b), (-(delta - b), 1.0));
+    }
+    for delta in [0.0, 0.1, 0.379] {
+        assert_eq!(dead_zone(delta, b), (0.0, 0.0));
+    }
+    // A gap of no width is no gap.
+    assert_eq!(dead_zone(0.3, 0.0), (0.3, 1.0));
+    assert_eq!(dead_zone(0.0, 0.0).0, 0.0);
+}
+
+#[test]
+fn slopes_are_derivatives() {
+    let mut random = Random(1);
+    for _ in 0..300 {
+        let x = D::constant(random.within(0.6)).seeded(0);
+        let (value, slope) = dead_zone(x, D::constant(0.4));
+        assert!((value.partials[0] - slope.value).abs() < 1e-15, "{x:?}");
+        let (c, s) = (D::constant(random.within(2.0)), D::constant(0.7));
+        let (value, slope) = harmonic_slope(x, c, s);
+        assert!((value.partials[0] - slope.value).abs() < 1e-15, "{x:?}");
+        assert_eq!(value, harmonic(x, c, s));
+    }
+}
+
+#[test]
+fn the_dead_zone_is_inverted() {
+    let mut random = Random(2);
+    for _ in 0..300 {
+        let loaded = random.within(0.1);
+        let back = dead_zone(dead_zone_inverse(loaded, 0.3), 0.3).0;
+        // A square root near the edge: 1e-16 of the gap under the root.
+        assert!((back - loaded).abs() < 1e-15, "{loaded} {back}");
+    }
+    assert_eq!(dead_zone_inverse(0.0, 0.3), 0.0);
+}
+
+#[test]
+fn values_are_those_of_the_equations() {
+    let mut random = Random(3);
+    for _ in 0..300 {
+        let (x, a, b) = (random.within(4.0), random.within(2.0), random.within(2.0));
+        let near = |got: f64, want: f64| {
+            let size = want.abs().max(1.0);
+            assert!((got - want).abs() < 4e-15 * size, "{got} {want}");
+        };
+        near(smoothed_sign(x, 5.0), (x / 0.2).tanh());
+        near(
+            stribeck_level(a, b, 0.5, x),
+            a + b * (-(x / 2.0) * (x / 2.0)).exp(),
+        );
+        near(harmonic(x, a, b), a * x.cos() + b * x.sin());
+        near(
+            spring_torque(a, b, x) / 128.0,
+            (a * x + b * x.powi(3)) / 128.0,
+        );
+    }
+    assert_eq!(stribeck_level(0.5, 0.25, 3.0, 0.0), 0.75);
+}
+
+const SAMPLE_TIME: f64 = 5e-4;
+const RATIO: f64 = 1.0 / 224.3;
+const SMOOTHING: f64 = 2.0;
+
+/// Motor inertia, arm inertia, stiffness, cubic stiffness, damping, viscous and Coulomb
+/// friction, backlash, Stribeck excess, ripple (cosine, sine).
+const TRUTH: [f64; 11] = [
+    0.0121, 1130.0, 1.46e6, 3.72e10, 2630.0, 0.013, 0.644, 1e-4, 0.2, 0.06, -0.04,
+];
+const STRIBECK_SPEED: f64 = 3.0;
+const ORDER: f64 = 2.0;
+
+/// Motor speed at the samples through the plant of the simulator, with derivatives along
+/// eight of the parameters.
+fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
+    type S = Dual<f64, 8>;
+    let text = ROTOR
+        .replace("[1, 1, 3, 0, 0, 0]", "[1, 1, 1, 0, 0, 0]")
+        .replace(
+            "axis = [0, 0, 1]",
+            "axis = [0, 0, 1]\nstiffness = 1\ndamping = 1",
+        );
+    let mut robot = robot(&text);
+    if let Some(drive) = robot.joints[0].drive.as_mut() {
+        drive.gear_ratio = RATIO;
+    }
+    let value = |i: usize| {
+        let x = S::constant(TRUTH[i]);
+        match seeds.iter().position(|s| *s == i) {
+            Some(seed) => x.seeded(seed),
+            None => x,
+        }
+    };
+    let overrides = [
+        (Parameter::MotorInertia(0), value(0)),
+        (Parameter::InertiaScale(0), value(1)),
+        (Parameter::Stiffness(0), value(2)),
+        (Parameter::Damping(0), value(4)),
+        (Parameter::ViscousFriction(0), value(5)),
+    ];
+    let setting = |name: &str, parameters: &[S]| EffectSetting {
+        name: name.to_owned(),
+        axis: Some(0),
+        parameters: parameters.to_vec(),
+    };
+    let fixed = S::constant;
+    let mut ripple = effect::<S>("torque_ripple", Some(0), &[0.0; 12]);
+    ripple.parameters[..3].copy_from_slice(&[fixed(ORDER), value(9), value(10)]);
+    let settings = [
+        setting(
+            "stribeck_friction",
+            &[value(6), value(8), fixed(STRIBECK_SPEED), fixed(SMOOTHING)],
+        ),
+        setting("backlash", &[value(7)]),
+        setting("nonlinear_stiffness", &[value(3)]),
+        ripple,
+    ];
+    let plant = Plant::new(&robot, &overrides, &settings).expect("a plant");
+    let run = Run {
+        controller: &robot.controller,
+        sample_time: SAMPLE_TIME,
+        start: &robot.operating_point,
+        drive: Drive::Torque(&[torque]),
+        noise: &[],
+        resolution: 0.0,
+        method: Method::RungeKutta4 { substeps: 2 },
+        cancel: None,
+    };
+    let (mut out, speed) = (Vec::new(), plant.n_angles());
+    let status = simulate(&plant, &run, &mut Stepper::new(&plant), &mut |sample| {
+        out.push(sample.state[speed]);
+    });
+    assert_eq!(status, Ok(Status::Completed));
+    out
+}
+
+#[test]
+fn the_axis_fit_and_the_simulator_are_one_model() {
+    let n = 1500;
+    let torque = sines(n, 1, SAMPLE_TIME, 4.0);
+    let model = AxisModel {
+        masses: 2,
+        output: Output::Velocity,
+        hold: Hold::Zero,
+        smoothing: SMOOTHING,
+        ripple_orders: vec![ORDER],
+        substeps: 2,
+    };
+    let record = AxisSet {
+        number: 0,
+        torque: torque.clone(),
+        output: vec![0.0; n],
+        sample_time: SAMPLE_TIME,
+        weight: 1.0,
+        block: 100,
+    };
+    let cancel = AtomicBool::new(false);
+    let problem = AxisProblem::new(model, vec![record], Vec::new(), false, &cancel).expect("data");
+    let layout = problem.layout();
+    let places = [
+        layout.inertia(0),
+        layout.inertia(1),
+        layout.linear(0),
+        layout.cubic(0),
+        layout.damping(0),
+        layout.viscous(),
+        layout.coulomb(),
+        layout.backlash(),
+        layout.excess(),
+        layout.ripple(0),
+        layout.ripple(0) + 1,
+    ];
+    let mut theta = vec![0.0; problem.n_parameters()];
+    for (place, value) in places.iter().zip(TRUTH) {
+        theta[*place] = value;
+    }
+    theta[layout.ratio()] = RATIO;
+    theta[layout.stribeck_speed()] = STRIBECK_SPEED;
+    let chain = problem.linearize(&theta, &places).expect("a run");
+    for seeds in [[0, 1, 2, 3, 4, 5, 6, 7], [3, 4, 5, 6, 7, 8, 9, 10]] {
+        let plant = through_plant(&torque, &seeds);
+        // Angles of many turns instead of deflections: 1e-16 of them, times the stiffness.
+        let worst = |got: &dyn Fn(&Dual<f64, 8>) -> f64, want: &[f64]| {
+            let size = want.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            assert!(size > 0.0);
+            let each = plant.iter().zip(want).map(|(p, w)| (got(p) - w).abs());
+            each.fold(0.0, f64::max) / size
+        };
+        let error = worst(&|p| p.value, &chain.residual);
+        assert!(error < 1e-9, "velocity: {error:.1e}");
+        for (slot, seed) in seeds.iter().enumerate() {
+            let error = worst(&|p| p.partials[slot], &chain.columns[*seed]);
+            assert!(error < 1e-7, "along parameter {seed}: {error:.1e}");
+        }
+    }
+}
