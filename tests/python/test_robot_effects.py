@@ -439,7 +439,7 @@ def coupling(monkeypatch: pytest.MonkeyPatch) -> str:
     """A name whose effect acts between two axes: the table has none yet."""
     info = replace(effects.effect_info("backlash"), name="coupling", scope="axes")
     table = {**effects.effect_table(), "coupling": info}
-    monkeypatch.setattr(effects, "effect_table", lambda: table)
+    monkeypatch.setattr("axisight.effects.table.effect_table", lambda: table)
     return info.name
 
 
