@@ -14,8 +14,8 @@ from axisight import Effect, Log, load_robot, montecarlo, simulate
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.gap.candidates import all_candidates
-from axisight.gap.starts import Situation
 from axisight.gap.settings import DEFAULT_TOLERANCES
+from axisight.gap.starts import Situation
 from axisight.logs import read_log
 from axisight.robot_file import Provenance, hash_file, identified, load_identified, write_identified
 from axisight.robot_file.effect_tables import stated
