@@ -2,18 +2,12 @@
 
 from axisight import Effect
 from axisight.effects import effect_info
-from axisight.robot_file.absorbed import ABSORBED, absorbed_effects, absorbed_note
+from axisight.robot_file.absorbed import absorbed_effects, absorbed_note
 
 
-def test_the_table_names_effects_once() -> None:
-    names = [name for taken in ABSORBED.values() for name in taken]
-    assert len(set(names)) == len(names)
-    for name in names:
-        # One that is neutral stays.
-        assert any(p.role == "amplitude" for p in effect_info(name).parameters)
-    # All friction of the motor has its place.
+def test_all_dry_friction_is_taken_up_together() -> None:
     for name in ("coulomb_friction", "stribeck_friction", "presliding_friction"):
-        assert name in ABSORBED["dry_friction"]
+        assert effect_info(name).absorbed_by == ("dry_friction",)
 
 
 def test_effects_of_the_axis_are_taken_up() -> None:

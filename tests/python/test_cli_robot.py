@@ -26,7 +26,7 @@ COULOMB = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0
 SPRING = Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 3.7e10})
 # One that does nothing.
 NEUTRAL = Effect("stribeck_friction", 1, {})
-LINE = "with the effects of {}: coulomb_friction@1, nonlinear_stiffness@1"
+LINE = "with the effects of {}: nonlinear_stiffness@1, coulomb_friction@1"
 CHIRP = ("--kind", "chirp", "--period-s", 0.5, "--band-hz", "4,20", "--peak-rad-s", 8)
 CASE = """
 schema = "axisight.case/1"
@@ -83,7 +83,7 @@ def write_log(path: Path, log: Log) -> Path:
 
 @pytest.fixture
 def axis(tmp_path: Path) -> Path:
-    return write_robot(tmp_path / "axis.toml", COULOMB, SPRING, NEUTRAL)
+    return write_robot(tmp_path / "axis.toml", SPRING, COULOMB, NEUTRAL)
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ def truth(log: Path, *effects: Effect) -> np.ndarray:
 
 def test_simulate_takes_them_and_says_so(axis: Path, log: Path) -> None:
     torque, text = simulated(axis, log)
-    np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
     assert LINE.format(axis) in text
     assert "stribeck" not in text
 
@@ -121,7 +121,7 @@ def test_a_robot_edited_since_keeps_its_effects(axis: Path, log: Path) -> None:
     axis.write_text(axis.read_text() + "# looked at\n")
     axis.with_name("axis.identified.json").write_text("spoilt")
     torque, _ = simulated(axis, log)
-    np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
 
 
 def test_nothing_is_said_where_there_is_nothing(log: Path, tmp_path: Path) -> None:
@@ -145,14 +145,20 @@ def test_effects_beside_a_robot_file_are_refused_until_written_again(
     ):
         text = run(*command, code=2)
         assert "old.identified.json: expected effects in the robot file" in text
-        assert "got coulomb_friction@1, nonlinear_stiffness@1 beside it" in text
+        assert "got nonlinear_stiffness@1, coulomb_friction@1 beside it" in text
+    # Stated in the robot file by hand.
+    by_hand = old.with_name("by_hand.toml")
+    by_hand.write_text(axis.read_text())
+    shutil.copy(old.with_name("old.identified.json"), by_hand.with_name("by_hand.identified.json"))
+    torque, _ = simulated(by_hand, log)
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
     # As the message says.
     found = load_identified(old)
-    assert found.robot.effects == found.effects == (COULOMB, SPRING, NEUTRAL)
+    assert found.robot.effects == found.effects == (SPRING, COULOMB, NEUTRAL)
     write_identified(found.robot, old, found, overwrite=True)
     assert load_robot(old).effects == load_identified(old).effects == found.effects
     torque, _ = simulated(old, log)
-    np.testing.assert_array_equal(torque, truth(log, COULOMB, SPRING))
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
 
 
 # The diagnosis.
@@ -176,7 +182,7 @@ def test_diagnose_knows_what_was_identified(axis: Path) -> None:
     found, text = diagnosed(axis, 0.5)
     assert LINE.format(axis) in text
     assert found["verdict"] == "none"
-    assert found["provenance"]["robot_effects"] == ["coulomb_friction@1", "nonlinear_stiffness@1"]
+    assert found["provenance"]["robot_effects"] == ["nonlinear_stiffness@1", "coulomb_friction@1"]
 
 
 def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypatch) -> None:
@@ -193,7 +199,7 @@ def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypa
     case.write_text(CASE)
     shutil.copy(log, log.with_name("log2.parquet"))
     assert "with the effects of" in run("diagnose", axis.parent, code=2)
-    assert seen == [(COULOMB, SPRING, NEUTRAL), (COULOMB, SPRING, NEUTRAL)]
+    assert seen == [(SPRING, COULOMB, NEUTRAL), (SPRING, COULOMB, NEUTRAL)]
 
 
 def test_candidates_begin_where_the_simulator_is(axis: Path, log: Path) -> None:
@@ -258,7 +264,7 @@ def test_montecarlo_takes_them(axis: Path, tmp_path: Path) -> None:
     given = montecarlo.read_study(study).model_copy(update={"robot": str(bare)})
     entries = [
         montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=e.parameters)
-        for e in (COULOMB, SPRING, NEUTRAL)
+        for e in (SPRING, COULOMB, NEUTRAL)
     ]
     wanted = montecarlo.run(given.model_copy(update={"effect": entries}), threads=1)
     without = montecarlo.run(given, threads=1)

@@ -94,7 +94,7 @@ def test_parameters_left_out_have_their_neutral_values() -> None:
         (["name = 'backlash'\naxis = 4"], 3, "expected an axis from 1 to 3"),
         (["name = 'backlash'"], 1, "missing key .*axis"),
         (["name = 'payload'\naxis = 1"], 3, "unknown key .*axis"),
-        (["name = 'backslash'\naxis = 1"], 2, "expected one of torque_ripple"),
+        (["name = 'backslash'\naxis = 1"], 2, "expected one of .*backlash"),
     ],
 )
 def test_impossible_effects_are_refused_with_the_line(tables, line, words, tmp_path: Path) -> None:
@@ -156,6 +156,7 @@ def inverse(robot: Robot, given: list[Effect]) -> list[np.ndarray]:
         velocity_ref_rad_s=None,
         torque_nm=np.repeat(log.torque_nm, 3, axis=1),
         position_rad=np.repeat(log.position_rad, 3, axis=1),
+        axis_kinds=(),
     )
     return [predicted_torque(robot, Variant({}, tuple(given)), motion(three, 30.0))]
 
@@ -438,7 +439,7 @@ def coupling(monkeypatch: pytest.MonkeyPatch) -> str:
     """A name whose effect acts between two axes: the table has none yet."""
     info = replace(effects.effect_info("backlash"), name="coupling", scope="axes")
     table = {**effects.effect_table(), "coupling": info}
-    monkeypatch.setattr(effects, "effect_table", lambda: table)
+    monkeypatch.setattr("axisight.effects.table.effect_table", lambda: table)
     return info.name
 
 

@@ -45,7 +45,7 @@ def load_source(robot: str) -> Robot:
     Raises InputError as `refuse_effects_beside`.
     """
     machine = load_robot(robot)
-    refuse_effects_beside(robot)
+    refuse_effects_beside(robot, machine)
     return machine
 
 

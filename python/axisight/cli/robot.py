@@ -23,7 +23,7 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
 
     Raises InputError as `refuse_effects_beside`.
     """
-    refuse_effects_beside(source)
+    refuse_effects_beside(source, robot)
     replaced = {effect.label for effect in given}
     acting = [e.label for e in robot.effects if e.acts and e.label not in replaced]
     if acting:

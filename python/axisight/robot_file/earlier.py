@@ -25,16 +25,19 @@ def with_earlier_effects(robot: Robot, report: Sidecar | Earlier) -> Robot:
     return robot.with_effects(effects)
 
 
-def refuse_effects_beside(source: Path | str) -> None:
+def refuse_effects_beside(source: Path | str, robot: Robot) -> None:
     """Refuse a robot whose effects stand in a sidecar of version 1: it would go without them.
 
-    ``source`` is a robot file or the name of a preset. Raises InputError that says how to bring
-    them into the robot file.
+    ``source`` is the file of the ``robot``, or the name of a preset. Raises InputError that says how
+    to bring them into the robot file. A sidecar that cannot be read takes nothing from the robot.
     """
     path = sidecar_path(source)
-    if (isinstance(source, str) and source in PRESETS) or not path.is_file():
+    if robot.effects or (isinstance(source, str) and source in PRESETS) or not path.is_file():
         return
-    report = read_sidecar(path)
+    try:
+        report = read_sidecar(path)
+    except InputError:
+        return
     if isinstance(report, Sidecar):
         return
     effects = [Effect(e.name, e.axis, e.parameters) for e in report.effects]
