@@ -277,7 +277,9 @@ fn short_steps_of_a_wrong_slope_are_not_taken_for_convergence() {
 /// A loss that rises by a kink wherever one goes, although its slope promises a little.
 #[test]
 fn little_promise_that_nothing_keeps_is_settled() {
-    for rules in &RULES {
+    // Under the rule that doubles its growth the step is lost in rounding first.
+    let ends = [Status::StepConverged, Status::LossConverged];
+    for (rules, end) in RULES.iter().zip(ends) {
         let rules = Rules {
             settled: 1e-3,
             step_tolerance: 0.0,
@@ -290,7 +292,7 @@ fn little_promise_that_nothing_keeps_is_settled() {
         };
         let mut model = Model::new(kinked, &start);
         let (outcome, _) = run(&mut model, &wide(1), &rules, &start);
-        assert_eq!(outcome.status, Status::LossConverged);
+        assert_eq!(outcome.status, end);
     }
 }
 

@@ -50,6 +50,9 @@ pub struct FrequencyFit {
     pub at_bound: Vec<usize>,
 }
 
+/// Promise, in variances of one residual, below which a search that no step helps has settled:
+/// what is left is lost in the rounding of the loss.
+const SETTLED: f64 = 1e-3;
 /// Longest step: a factor of e where searched over logarithms.
 const LONGEST_STEP: f64 = 1.0;
 
@@ -159,7 +162,7 @@ impl<'a> Search<'a> {
             progress: Progress::Promised,
             step_tolerance: options.step_tolerance,
             rounding: 0.0,
-            settled: options.gain_tolerance,
+            settled: SETTLED / self.problem.count().max(1) as f64,
             damping: Damping::Kept,
         };
         let (limits, start) = (self.limits(), self.free());

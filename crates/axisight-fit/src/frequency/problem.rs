@@ -121,6 +121,11 @@ impl FrequencyProblem {
         Ok(sum)
     }
 
+    /// Number of residuals that count, real and imaginary parts.
+    pub(super) fn count(&self) -> usize {
+        self.poses.iter().map(|pose| 2 * pose.n_used()).sum()
+    }
+
     /// Normal matrix of every pose at `theta`: the information it gives.
     ///
     /// # Errors

@@ -100,6 +100,11 @@ pub struct Fit {
 /// Share of the loss that new nuisance columns, or another step, have to be worth.
 const WORTH_REFRESHING: f64 = 1e-4;
 
+/// Sum of squares of whitened residuals by which a natural change of any parameter is taken to
+/// move them. One that moves them less, a millionth of the noise of one, is left where it is:
+/// the shape of a friction of no size, say.
+const LEAST_INFLUENCE: f64 = 1e-12;
+
 /// The present point of a fit, with everything the next step needs.
 struct Search<'a, P: Problem> {
     problem: &'a P,
@@ -222,8 +227,17 @@ impl<'a, P: Problem> Search<'a, P> {
         self.sum();
     }
 
-    /// Normal equations of all blocks and the priors.
+    /// Normal equations of the present point, for the search.
     fn sum(&mut self) {
+        let mut normal = self.total();
+        for (slot, i) in self.free.iter().enumerate() {
+            normal.matrix[(slot, slot)] += LEAST_INFLUENCE / self.parameters[*i].scale.powi(2);
+        }
+        self.normal = normal;
+    }
+
+    /// Normal equations of all blocks and the priors.
+    fn total(&self) -> Normal {
         let n = self.free.len();
         let mut normal = Normal::zero(n);
         normal.loss = self.plain;
@@ -237,7 +251,7 @@ impl<'a, P: Problem> Search<'a, P> {
                 normal.add_prior(slot, self.theta[*i] - mean, std);
             }
         }
-        self.normal = normal;
+        normal
     }
 
     /// All parameters, where the free ones are `free`.
@@ -260,9 +274,8 @@ impl<'a, P: Problem> Search<'a, P> {
     fn finish(self, status: Status, initial_loss: f64, iterations: usize) -> Fit {
         let scale = limits(self.parameters, &self.free).scale;
         let n = self.free.len();
-        let scaled = DMatrix::from_fn(n, n, |i, j| {
-            self.normal.matrix[(i, j)] * scale[i] * scale[j]
-        });
+        let total = self.total();
+        let scaled = DMatrix::from_fn(n, n, |i, j| total.matrix[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled
             .clone()
             .try_inverse()
