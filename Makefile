@@ -21,7 +21,7 @@ WHEELS := $(TARGET)/wheels
 STAMPS := $(VENV)/.stamps
 
 # The crates that hold Rust tests; the extension module cannot be linked into a test binary.
-RUST_TESTS := -p axisight-core -p axisight-graybox -p axisight-tests
+RUST_TESTS := --workspace --exclude axisight-python --exclude axisight-benches
 
 # Whatever goes into the wheel. README and licences are part of its metadata.
 SOURCES := $(sort $(shell find crates python -type f \

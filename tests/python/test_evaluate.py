@@ -7,7 +7,7 @@ import pytest
 
 from axisight import Effect, Robot, _core, load_robot
 from axisight.effects import core_effects
-from axisight.fitting import (
+from axisight.fitting.simulation_error import (
     FitOptions,
     Parameter,
     Weighting,
@@ -22,7 +22,7 @@ EFFECTS = [Effect("coulomb_friction", 1, {"coulomb_nm": 0.3, "smoothing_rad_s": 
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return Robot(load_robot("two_mass_axis").core)
+    return load_robot("two_mass_axis").with_effects([])
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,14 @@ pub struct Lanes<const L: usize>(pub [f64; L]);
 impl<const L: usize> Lanes<L> {
     /// `c - self * b` with one rounding.
     #[inline(always)]
+    #[must_use]
     pub fn fnma(self, b: Self, c: Self) -> Self {
         Self(vector::fnma(self.0, b.0, c.0))
     }
 
     /// The larger of `|self|` and `b`; `b` where either is NaN.
     #[inline(always)]
+    #[must_use]
     pub fn magnitude_or(self, b: Self) -> Self {
         Self(vector::larger(vector::magnitude(self.0), b.0))
     }

@@ -33,17 +33,23 @@ pub trait Register:
     /// Into the first places of a slice.
     fn store(self, to: &mut [f64]);
     /// `self * b + c` with one rounding.
+    #[must_use]
     fn fma(self, b: Self, c: Self) -> Self;
     /// `c - self * b` with one rounding.
+    #[must_use]
     fn fnma(self, b: Self, c: Self) -> Self;
     /// Reciprocal.
+    #[must_use]
     fn recip(self) -> Self;
     /// The larger of `|self|` and `b`; `b` where either is NaN.
+    #[must_use]
     fn magnitude_or(self, b: Self) -> Self;
     /// `a` where `self > 0`, `b` elsewhere, also where `self` is NaN.
+    #[must_use]
     fn if_positive(self, a: Self, b: Self) -> Self;
     /// The power of two at or below a positive number, inverted; other numbers give zero,
     /// infinity or NaN.
+    #[must_use]
     fn inverse_power_of_two(self) -> Self;
     /// Real and imaginary parts of the numbers `step` apart.
     fn split(from: &[C], step: usize) -> (Self, Self);

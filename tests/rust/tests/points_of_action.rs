@@ -126,11 +126,13 @@ fn with(
     Plant::with_kernels(robot, kernels).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// What an odometer must return from a state `[phi, q, ..]`.
+type Seen<'a> = Box<dyn Fn(&[f64]) -> f64 + 'a>;
+
 #[test]
 fn odometers_return_the_angle_they_see() {
     let robot = weightless();
     let m = 3;
-    // (info, place, what the odometer must return from a state [phi, q, ..])
     let ratio = |axis: usize| {
         robot
             .driven()
@@ -138,7 +140,7 @@ fn odometers_return_the_angle_they_see() {
             .map_or(0.0, |(_, _, d)| d.gear_ratio)
     };
     let joint = |axis: usize| robot.driven().nth(axis).map_or(0, |(j, _, _)| j);
-    let cases: Vec<(&'static EffectInfo, Place, Box<dyn Fn(&[f64]) -> f64>)> = vec![
+    let cases: Vec<(&'static EffectInfo, Place, Seen<'_>)> = vec![
         (&MOTOR, Place::Axis(1), Box::new(|x: &[f64]| x[1])),
         (
             &GEAR,

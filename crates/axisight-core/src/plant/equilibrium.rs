@@ -80,7 +80,7 @@ pub fn equilibrium<S: Scalar>(
         // One more iteration once the value is settled, for the derivatives.
         settled_for = if change < 1e-16 { settled_for + 1 } else { 0 };
         if settled_for == 3 {
-            return hold(plant, q, &load);
+            return hold(plant, &q, &load);
         }
     }
     Err(EquilibriumError::NotSettled { change })
@@ -126,15 +126,15 @@ const PAIR_PASSES: usize = 20;
 
 fn hold<S: Scalar>(
     plant: &Plant<S>,
-    q: Vec<S>,
+    q: &[S],
     load: &[S],
 ) -> Result<Equilibrium<S>, EquilibriumError> {
     let mut added = vec![AxisTorque::zero(); plant.axes.len()];
-    let mut motors = hold_axes(plant, &q, load, &added)?;
+    let mut motors = hold_axes(plant, q, load, &added)?;
     if !plant.on_pairs.is_empty() {
         for _ in 0..PAIR_PASSES {
-            added = pair_torques(plant, &q, &motors.0);
-            motors = hold_axes(plant, &q, load, &added)?;
+            added = pair_torques(plant, q, &motors.0);
+            motors = hold_axes(plant, q, load, &added)?;
         }
     }
     let (motor_angle, motor_torque) = motors;

@@ -100,6 +100,7 @@ fn axis_number(
 ) -> Result<usize, RobotError> {
     let expected = format!("an axis from 1 to {}", robot.n_axes());
     let number = entry.number(Bound::Any, "1")?;
+    #[allow(clippy::float_cmp)] // a count is a whole number or none
     let found = (0..robot.n_axes()).find(|i| (*i + 1) as f64 == number);
     let index = found.ok_or_else(|| entry.refuse(expected))?;
     let rigid = |i: usize| {
