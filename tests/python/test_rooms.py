@@ -13,7 +13,6 @@ LOOSE = {
     "__init__.py",
     "_core.pyi",
     "arguments.py",
-    "effects.py",
     "errors.py",
     "palette.py",
     "storage.py",

@@ -92,7 +92,8 @@ def effect_table() -> Mapping[str, EffectInfo]:
     table = {}
     for row in _core.effect_table():
         # The core's words are those of the class: a test compares them.
-        rest: dict[str, Any] = {k: tuple(v) if k in _TUPLES else v for k, v in row.items()}  # type: ignore[literal-required]
+        rest: dict[str, Any] = dict(row)
+        rest |= {k: tuple(rest[k]) for k in _TUPLES}
         rest["parameters"] = tuple(EffectParameter(**p) for p in row["parameters"])
         table[row["name"]] = EffectInfo(**rest)
     return MappingProxyType(table)
