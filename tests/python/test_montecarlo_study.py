@@ -56,7 +56,8 @@ def changed(path: str, value) -> dict:
     ("path", "value", "message"),
     [
         ("excitation.multisine.peek_rad_s", 8, r"peek_rad_s: unknown key"),
-        ("effect.0.axes", 1, r"effect\.0\.axes: unknown key"),
+        ("effect.0.axle", 1, r"effect\.0\.axle: unknown key"),
+        ("effect.0.axes", [1, 2], "torque_ripple.*axes: expected none"),
         ("schema", "axisight.montecarlo/2", "schema"),
         ("seed", -1, "seed"),
         ("runs", 0, "runs"),
