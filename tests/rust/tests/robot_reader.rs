@@ -465,16 +465,17 @@ fn truncated_text_is_refused_on_its_last_line() {
 fn empty_text_is_refused() {
     refused(
         "",
-        "line 1: missing key `schema`; expected \"axisight.robot/1\"",
+        "line 1: missing key `schema`; expected \"axisight.robot/1\" or \"axisight.robot/2\"",
     );
 }
 
 #[test]
 fn unknown_schema_is_refused_before_its_keys() {
-    let text = small_with("robot/1\"", "robot/2\"\nnew_key = 1");
+    let text = small_with("robot/1\"", "robot/3\"\nnew_key = 1");
     refused(
         &text,
-        "line 1: `schema`: expected \"axisight.robot/1\", got \"axisight.robot/2\"",
+        "line 1: `schema`: expected \"axisight.robot/1\" or \"axisight.robot/2\", got \
+         \"axisight.robot/3\"",
     );
 }
 
