@@ -20,6 +20,7 @@ __all__ = [
     "CancelToken",
     "FitResult",
     "FrequencyFitResult",
+    "Linearization",
     "MonteCarloEnsemble",
     "MonteCarloStudy",
     "Robot",
@@ -32,6 +33,8 @@ __all__ = [
     "directions",
     "effect_table",
     "energy_regressor",
+    "evaluate_inverse_dynamics",
+    "evaluate_simulation",
     "failure_kinds",
     "fit_frequency_responses",
     "fit_inverse_dynamics",
@@ -52,6 +55,7 @@ __all__ = [
     "right_divide_matrices",
     "simulate_batch",
     "square_period",
+    "status_advice",
     "torque_regressor",
 ]
 
