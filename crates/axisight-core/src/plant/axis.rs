@@ -1,6 +1,6 @@
 //! One driven axis: motor, transmission, and the effects on them.
 
-use super::equations::Own;
+use super::own::Own;
 use crate::effects::{Joint, Kernel, Spring};
 use crate::robot::{Parameter, RobotDescription};
 use axisight_scalar::Scalar;

@@ -1,7 +1,8 @@
 //! A plant from a robot, changed parameters and effects.
 
 use super::axis::axes;
-use super::equations::{OnPair, Own, Plant};
+use super::equations::Plant;
+use super::own::{OnPair, Own};
 use crate::effects::{self, Acts, EffectError, EffectInfo, Kernel, PlantParameters, Scope};
 use crate::robot::{
     Chain, ChainJoint, Dynamics, EffectSetting, MOST_JOINTS, Parameter, Place, RobotDescription,

@@ -6,26 +6,11 @@
 //! A rigid gear has `phi = q / r` and no state of its own.
 
 use super::axis::Axis;
-use super::equilibrium::Equilibrium;
-use crate::effects::{Arm, CoupledAxis, Kernel, Motor, Pair};
+use super::own::{OnPair, Own};
+use crate::effects::{Arm, CoupledAxis, Motor, Pair};
 use crate::robot::{Chain, Dynamics, DynamicsScratch};
 use axisight_scalar::Scalar;
 use std::ops::Range;
-use std::sync::Arc;
-
-/// An effect, and its own states among those of all effects.
-#[derive(Clone)]
-pub(super) struct Own<S> {
-    pub(super) kernel: Arc<dyn Kernel<S>>,
-    pub(super) internal: Range<usize>,
-}
-
-/// An effect between two axes.
-#[derive(Clone)]
-pub(super) struct OnPair<S> {
-    pub(super) axes: [usize; 2],
-    pub(super) own: Own<S>,
-}
 
 /// A robot with its effects, ready to be integrated.
 #[derive(Clone)]
@@ -100,21 +85,6 @@ impl<S: Scalar> Plant<S> {
     /// Angles of the robot's joints in state `x`.
     pub fn joint_angles<'x>(&self, x: &'x [S]) -> &'x [S] {
         &x[self.joint_slots()]
-    }
-
-    /// State at rest.
-    pub fn state_at_rest(&self, rest: &Equilibrium<S>) -> Vec<S> {
-        let mut x = vec![S::zero(); self.n_states()];
-        for (axis, angle) in self.axes.iter().zip(&rest.motor_angle) {
-            if let Some(gear) = &axis.gear {
-                x[gear.slot] = *angle;
-            }
-        }
-        let joints = rest.base_angle.iter().chain(&rest.joint_angle);
-        for (x, angle) in x[self.n_motors..].iter_mut().zip(joints) {
-            *x = *angle;
-        }
-        x
     }
 
     /// `dx = f(x, tau)`: `applied` is the torque the drives deliver, `command`

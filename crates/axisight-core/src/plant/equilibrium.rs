@@ -45,6 +45,23 @@ pub enum EquilibriumError {
     },
 }
 
+impl<S: Scalar> Plant<S> {
+    /// State at rest.
+    pub fn state_at_rest(&self, rest: &Equilibrium<S>) -> Vec<S> {
+        let mut x = vec![S::zero(); self.n_states()];
+        for (axis, angle) in self.axes.iter().zip(&rest.motor_angle) {
+            if let Some(gear) = &axis.gear {
+                x[gear.slot] = *angle;
+            }
+        }
+        let joints = rest.base_angle.iter().chain(&rest.joint_angle);
+        for (x, angle) in x[self.n_motors..].iter_mut().zip(joints) {
+            *x = *angle;
+        }
+        x
+    }
+}
+
 const MAX_ITERATIONS: usize = 200;
 
 /// Equilibrium with the driven joints at `driven` [rad].

@@ -6,6 +6,7 @@ mod build;
 mod equations;
 mod equilibrium;
 mod linearization;
+mod own;
 mod zoh_response;
 
 pub use axis::{Axis, Gear};
