@@ -16,7 +16,9 @@ CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 BIN := $(VENV)/bin
+# Byte code is made when a module is first imported, not for all that is installed.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+INSTALL := $(PIP) install --no-compile
 WHEELS := $(TARGET)/wheels
 STAMPS := $(VENV)/.stamps
 
@@ -88,7 +90,7 @@ $(STAMPS)/venv:
 	touch $@
 
 $(STAMPS)/build-tools: $(STAMPS)/venv
-	$(PIP) install 'maturin>=1.9,<2' 'flit_core>=3.11,<4'
+	$(INSTALL) 'maturin>=1.9,<2' 'flit_core>=3.11,<4'
 	touch $@
 
 # Written anew only when a file was added or removed, so that the wheel notices that too.
@@ -96,11 +98,14 @@ $(WHEELS)/.sources: force
 	@mkdir -p $(WHEELS)
 	@printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
 
-# Dated from the start of the build: a source edited meanwhile counts as newer.
+# Dated from the start of the build: a source edited meanwhile counts as newer. What the wheel
+# depends on is fetched while the compiler works.
 $(WHEELS)/.built: $(WHEELS)/.sources $(SOURCES) | $(STAMPS)/build-tools
 	@rm -f $(WHEELS)/axisight-*.whl
 	@touch $@.begun
-	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS)
+	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")' > $@.requirements
+	$(INSTALL) --requirement $@.requirements & fetched=$$!; \
+	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS) && wait $$fetched
 	@mv $@.begun $@
 
 # An editable install (`maturin develop`) is replaced: tests and demo use the wheel.
@@ -108,13 +113,13 @@ ifneq ($(wildcard $(VENV)/lib/python*/site-packages/axisight.pth),)
 $(STAMPS)/installed: force
 endif
 $(STAMPS)/installed: $(WHEELS)/.built
-	$(PIP) install $(WHEELS)/axisight-*.whl
-	$(PIP) install --force-reinstall --no-deps $(WHEELS)/axisight-*.whl
+	$(INSTALL) $(WHEELS)/axisight-*.whl
+	$(INSTALL) --force-reinstall --no-deps $(WHEELS)/axisight-*.whl
 	touch $@
 
 # Needs nothing that the wheel does not bring.
 $(STAMPS)/study: $(STUDY) | $(STAMPS)/installed
-	$(PIP) install --force-reinstall --no-deps --no-build-isolation ./thesis
+	$(INSTALL) --force-reinstall --no-deps --no-build-isolation ./thesis
 	touch $@
 
 # The dependencies of an extra change only with pyproject.toml.
@@ -125,5 +130,5 @@ $(STAMPS)/bench-tools: $(STAMPS)/bench-extra $(STAMPS)/installed
 	touch $@
 
 $(STAMPS)/%-extra: pyproject.toml | $(STAMPS)/installed
-	$(PIP) install "$$(ls $(WHEELS)/axisight-*.whl)[$*]"
+	$(INSTALL) "$$(ls $(WHEELS)/axisight-*.whl)[$*]"
 	touch $@

@@ -7,7 +7,7 @@
 //! Then the time per sample of other chains, which only the fit has.
 #![allow(clippy::panic)] // a bench that cannot start says so
 
-use axisight_core::plant::Plant;
+use axisight_core::plant::assemble;
 use axisight_core::robot::{EffectSetting, Parameter, Place, RobotDescription};
 use axisight_core::robot_file::read_robot;
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
@@ -101,7 +101,7 @@ fn through_plant<S: Scalar>(robot: &RobotDescription, torque: &[f64]) -> Respons
         effect("coulomb_friction", friction),
     ];
     let plant =
-        Plant::<S>::new(robot, &overrides, &settings).unwrap_or_else(|error| panic!("{error}"));
+        assemble::<S>(robot, &overrides, &settings).unwrap_or_else(|error| panic!("{error}"));
     let inputs = [torque];
     let run = Run {
         controller: &robot.controller,

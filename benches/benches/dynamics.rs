@@ -3,7 +3,7 @@
 //! Times of lane types are per call, that is for all lanes together.
 
 use axisight_benches::{preset, reference};
-use axisight_core::plant::{Plant, equilibrium};
+use axisight_core::plant::{assemble, equilibrium};
 use axisight_core::robot::RigidBody;
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
 use axisight_scalar::{Dual, Lanes, Scalar};
@@ -25,7 +25,7 @@ fn rigid_body(c: &mut Criterion) {
 
 fn right_hand_side<S: Scalar>(c: &mut Criterion, label: &str) {
     let robot = preset();
-    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else {
+    let Ok(plant) = assemble::<S>(&robot, &[], &[]) else {
         return;
     };
     let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5]) else {
@@ -63,7 +63,7 @@ fn right_hand_sides(c: &mut Criterion) {
 /// One second at 2 kHz, one Runge-Kutta step per sample.
 fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
     let robot = preset();
-    let Ok(plant) = Plant::<S>::new(&robot, &[], &[]) else {
+    let Ok(plant) = assemble::<S>(&robot, &[], &[]) else {
         return;
     };
     let input = reference(2000, robot.n_axes(), robot.sample_time);

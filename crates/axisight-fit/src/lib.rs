@@ -1,13 +1,10 @@
-//! Fits of models to data: whole robots to logs, torque regressors of a chain, axis models in
-//! the time domain, linearized robots to frequency responses.
+//! Fits that know no effect by name: axis models in the time domain, torque regressors of a
+//! chain.
 //!
-//! A crate of its own because nothing in the core needs it and the core, generic over its
-//! scalars, takes long to compile.
+//! They stand on the plant alone, so that a new effect leaves them as they are.
 
 // Kernels are generic over the scalar and must be inlined to become vector code.
 #![allow(clippy::inline_always)]
 
 pub mod axis;
-pub mod frequency;
-pub mod identification;
 pub mod regressor;

@@ -234,8 +234,7 @@ fn one_run(
     let jobs: Vec<Job> = (0..n).map(|experiment| Job { run, experiment }).collect();
     let outcomes: Vec<Outcome> = match n {
         1 => group.run::<f64>(&jobs),
-        2 => group.run::<Lanes<2>>(&jobs),
-        3 | 4 => group.run::<Lanes<4>>(&jobs),
+        2..=4 => group.run::<Lanes<4>>(&jobs),
         _ => jobs
             .chunks(8)
             .flat_map(|c| group.run::<Lanes<8>>(c))

@@ -2,7 +2,7 @@
 
 use super::record::Recorder;
 use super::study::{Study, StudyError};
-use axisight_core::plant::{Plant, equilibrium};
+use axisight_core::plant::{assemble, equilibrium, stepper};
 use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{
     Drive, LinearPlant, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
@@ -52,7 +52,7 @@ impl GroupPlant {
         effects: &[EffectSetting<f64>],
         start: &[f64],
     ) -> Result<Self, StudyError> {
-        let plant = Plant::<f64>::new(robot, &[], effects)?;
+        let plant = assemble::<f64>(robot, &[], effects)?;
         equilibrium(&plant, start)?;
         match model {
             Model::Linear { substeps } => Ok(Self::Linear {
@@ -77,11 +77,11 @@ impl GroupPlant {
             Self::Linear { plant, .. } => simulate_linear(plant, run, &mut observe),
             Self::Nonlinear { robot, effects, .. } => {
                 let lifted: Vec<_> = effects.iter().map(EffectSetting::lifted).collect();
-                let Ok(plant) = Plant::<S>::new(robot, &[], &lifted) else {
+                let Ok(plant) = assemble::<S>(robot, &[], &lifted) else {
                     return Ok(Status::Diverged(0));
                 };
                 let mut stepper = if run.method.may_be_implicit() {
-                    match Stepper::with_jacobian(&plant, robot, effects) {
+                    match stepper(&plant, robot, effects) {
                         Ok(stepper) => stepper,
                         Err(_) => return Ok(Status::Diverged(0)),
                     }

@@ -4,8 +4,9 @@
 //! `k / (N T)`. Ljung (1999), section 2.2; Wernholt (2004), (3.16), which counts samples
 //! from one: a common phase that cancels in every response.
 
+use crate::plan::plan;
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection};
 use std::sync::Arc;
 
 /// Plans for records of one length; cheap to clone, shared between threads.
@@ -31,10 +32,9 @@ impl std::fmt::Debug for Dft {
 impl Dft {
     /// For records of `n` samples.
     pub fn new(n: usize) -> Self {
-        let mut planner = FftPlanner::new();
         Self {
-            forward: planner.plan_fft_forward(n),
-            inverse: planner.plan_fft_inverse(n),
+            forward: plan(n, FftDirection::Forward),
+            inverse: plan(n, FftDirection::Inverse),
         }
     }
 

@@ -21,6 +21,7 @@ mod line_plans;
 mod line_transform;
 mod lockstep_lu;
 mod pair;
+mod plan;
 mod pseudo_inverse;
 mod weighting;
 

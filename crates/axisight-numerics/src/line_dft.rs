@@ -11,11 +11,12 @@
 
 use super::lane_fft::{LaneFft, Rows, TwoReal, cost_per_row};
 use super::pair::Pair;
+use crate::plan::plan;
 #[cfg(target_arch = "x86_64")]
 use axisight_scalar::wide::{self, Wide};
 use axisight_scalar::{Lanes, MOST_LANES, Register};
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -240,7 +241,7 @@ impl<R: Register> Plan<R> {
             channels,
             columns,
             transform: LaneFft::new(m).map_or_else(
-                || Transform::LaneByLane(FftPlanner::new().plan_fft_forward(m)),
+                || Transform::LaneByLane(plan(m, FftDirection::Forward)),
                 Transform::Lanes,
             ),
             places: lines.iter().map(|k| (k % m, (m - k % m) % m)).collect(),

@@ -4,9 +4,10 @@
 //! that one complex transform of half the length does each way; only the lines asked for are
 //! packed and unpacked. A line `k` with coefficient `d_k` is `Re(d_k exp(2 pi i k j / n))`.
 
+use crate::plan::plan;
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::Float;
-use rustfft::{Fft, FftNum, FftPlanner};
+use rustfft::{Fft, FftDirection, FftNum};
 use std::sync::Arc;
 
 /// A number that grids are made of. Its transforms are compiled here, once, and not wherever
@@ -20,8 +21,10 @@ macro_rules! grid_number {
     ($number:ty) => {
         impl GridNumber for $number {
             fn transforms(n: usize) -> (Arc<dyn Fft<Self>>, Arc<dyn Fft<Self>>) {
-                let mut planner = FftPlanner::new();
-                (planner.plan_fft_forward(n), planner.plan_fft_inverse(n))
+                (
+                    plan(n, FftDirection::Forward),
+                    plan(n, FftDirection::Inverse),
+                )
             }
         }
     };

@@ -5,8 +5,9 @@
 //! White input of variance `s^2` weighted by `1/s` comes out with variance one,
 //! whatever the decimation. Cost: two transforms, `O(n log n)`.
 
+use crate::plan::plan;
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection};
 use std::sync::Arc;
 
 /// A weight over frequency for one signal.
@@ -115,7 +116,6 @@ impl Weighting {
     pub fn plan(&self, n_samples: usize, sample_time: f64) -> Weighter {
         let kept = self.output_len(n_samples);
         let (long, short) = (2 * kept * self.decimation, 2 * kept);
-        let mut planner = FftPlanner::new();
         let scale = (self.decimation as f64).sqrt() / long.max(1) as f64;
         let resolution = 1.0 / (long.max(1) as f64 * sample_time);
         // The bin at the new Nyquist frequency is ambiguous and is dropped when decimating.
@@ -133,8 +133,8 @@ impl Weighting {
             kept,
             decimation: self.decimation,
             gain,
-            forward: planner.plan_fft_forward(long),
-            backward: planner.plan_fft_inverse(short),
+            forward: plan(long, FftDirection::Forward),
+            backward: plan(short, FftDirection::Inverse),
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
-use axisight_fit::identification::{
+use axisight_identification::logs::{
     BlockGram, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
     MotionRecord, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
     SimulationOutput, Target, fit,

@@ -5,11 +5,11 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::robot::Parameter;
-use axisight_fit::frequency::{
+use axisight_identification::frequency::{
     Criterion, DesignOptions, FrequencyFit, FrequencyFitError, FrequencyOptions,
     FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, Uncertainty, minimize,
 };
-use axisight_fit::identification::Loss;
+use axisight_identification::logs::Loss;
 use numpy::{
     Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };
@@ -293,7 +293,7 @@ pub fn frequency_response<'py>(
     frequency_hz: Vec<f64>,
     sampled: bool,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    use axisight_fit::frequency::{Linearizer, SecondOrderError, evaluate};
+    use axisight_identification::frequency::{Linearizer, SecondOrderError, evaluate};
     let sample_time = robot.description.sample_time;
     let hold = if sampled {
         Hold::ZeroOrder(sample_time)
@@ -330,7 +330,7 @@ pub fn design_poses<'py>(
     gap_tolerance: f64,
     max_iterations: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
-    use axisight_fit::frequency::{InformationMatrix, design};
+    use axisight_identification::frequency::{InformationMatrix, design};
     let view = information.as_array();
     let p = view.shape()[1];
     let square = |values: Vec<f64>| InformationMatrix::from_row_slice(p, p, &values);

@@ -3,10 +3,12 @@
 use crate::convert::{array1, array2, array3, matrix, rows};
 use crate::effects::{EffectTuple, settings, tuple};
 use crate::entry::{AxisightError, RobotError, input_error};
-use axisight_core::plant::{Linearization, Plant, equilibrium, linearize, zoh_frequency_response};
+use axisight_core::plant::{
+    Linearization, assemble, equilibrium, linearize, zoh_frequency_response,
+};
 use axisight_core::robot::{Controller, Joint, Motion, Parameter, RigidBody, RobotDescription};
 use axisight_core::robot_file::read_robot;
-use axisight_fit::frequency::modes;
+use axisight_identification::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -126,7 +128,7 @@ impl Robot {
     fn with_effects(&self, effects: Vec<EffectTuple>) -> PyResult<Self> {
         let mut description = self.description.clone();
         description.effects = settings(effects);
-        Plant::<f64>::new(&description, &[], &[]).map_err(input_error)?;
+        assemble::<f64>(&description, &[], &[]).map_err(input_error)?;
         Ok(Self {
             body: RigidBody::new(&description),
             description,
@@ -371,7 +373,7 @@ impl Robot {
     ) -> PyResult<Bound<'py, PyDict>> {
         let at = joint_angle.unwrap_or_else(|| self.description.operating_point.clone());
         let plant =
-            Plant::<f64>::new(&self.description, &[], &settings(effects)).map_err(input_error)?;
+            assemble::<f64>(&self.description, &[], &settings(effects)).map_err(input_error)?;
         let rest = equilibrium(&plant, &at).map_err(input_error)?;
         let out = PyDict::new(py);
         out.set_item("joint_angle", array1(py, rest.joint_angle))?;

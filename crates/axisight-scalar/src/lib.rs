@@ -79,7 +79,7 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Sine and cosine of every entry.
     #[inline(always)]
-    fn sin_cos_each<const N: usize>(x: &[Self; N], out: &mut [(Self, Self); N]) {
+    fn sin_cos_each(x: &[Self], out: &mut [(Self, Self)]) {
         for (x, out) in x.iter().zip(out) {
             *out = x.sin_cos();
         }
@@ -155,7 +155,7 @@ impl Scalar for f64 {
         elementary::sin_cos(self)
     }
     #[inline(always)]
-    fn sin_cos_each<const N: usize>(x: &[Self; N], out: &mut [(Self, Self); N]) {
+    fn sin_cos_each(x: &[Self], out: &mut [(Self, Self)]) {
         // Four at a time cost as much as one, and give the same bits.
         for (x, out) in x.chunks(4).zip(out.chunks_mut(4)) {
             let (s, c) = Lanes::<4>::from_lanes(|i| x.get(i).copied().unwrap_or(0.0)).sin_cos();

@@ -2,7 +2,7 @@
 // A helper that cannot go on is a failed test.
 #![allow(clippy::panic, missing_docs)]
 
-use axisight_core::plant::Plant;
+use axisight_core::plant::{Plant, assemble};
 use axisight_core::robot::{EffectSetting, Place, RobotDescription};
 use axisight_core::robot_file::read_robot;
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
@@ -85,7 +85,7 @@ pub fn robot(text: &str) -> RobotDescription {
 
 /// The plant of `robot` with `settings` that must be good.
 pub fn plant<S: Scalar>(robot: &RobotDescription, settings: &[EffectSetting<S>]) -> Plant<S> {
-    Plant::new(robot, &[], settings).unwrap_or_else(|error| panic!("{error}"))
+    assemble(robot, &[], settings).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// One effect at constant parameters.

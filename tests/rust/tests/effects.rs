@@ -3,7 +3,7 @@
 //! The tests walk the table, so that a new effect is tested without being named here.
 
 use axisight_core::effects::{Acts, EFFECTS, EffectInfo, Role, Scope, build};
-use axisight_core::plant::{Plant, equilibrium};
+use axisight_core::plant::{assemble, equilibrium};
 use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Status};
 use axisight_scalar::{Dual, Scalar};
@@ -184,7 +184,7 @@ fn timing_effects_have_a_derivative_at_zero() {
 }
 
 fn refusal(robot: &RobotDescription, setting: &EffectSetting<f64>) -> String {
-    match Plant::new(robot, &[], std::slice::from_ref(setting)) {
+    match assemble(robot, &[], std::slice::from_ref(setting)) {
         Ok(_) => "accepted".to_owned(),
         Err(error) => error.to_string(),
     }

@@ -3,7 +3,7 @@
 use axisight_core::plant::{Plant, linearize};
 use axisight_core::robot::{RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
-use axisight_fit::frequency::modes;
+use axisight_identification::frequency::modes;
 use axisight_tests::{ARM, PRESET, largest, plant, robot, trace};
 
 const SAMPLES: usize = 500;

@@ -3,7 +3,7 @@
 use axisight_core::plant::equilibrium;
 use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method, measurement_noise};
-use axisight_fit::identification::{
+use axisight_identification::logs::{
     Fit, FitOptions, FitParameter, InverseDynamics, Linearization, Loss, MotionRecord, Problem,
     ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };

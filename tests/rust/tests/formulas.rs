@@ -4,7 +4,7 @@ use axisight_core::effects::formulas::{
     dead_zone, dead_zone_inverse, harmonic, harmonic_slope, smoothed_sign, spring_torque,
     stribeck_level,
 };
-use axisight_core::plant::Plant;
+use axisight_core::plant::assemble;
 use axisight_core::robot::Parameter;
 use axisight_core::robot::{EffectSetting, Place};
 use axisight_core::simulation::{Drive, Method, Run, Status, Stepper, simulate};
@@ -136,7 +136,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
         setting("nonlinear_stiffness", &[value(3)]),
         ripple,
     ];
-    let plant = Plant::new(&robot, &overrides, &settings).expect("a plant");
+    let plant = assemble(&robot, &overrides, &settings).expect("a plant");
     let run = Run {
         controller: &robot.controller,
         sample_time: SAMPLE_TIME,

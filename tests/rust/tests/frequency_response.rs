@@ -2,7 +2,7 @@
 
 use axisight_core::plant::{linearize, zoh_frequency_response};
 use axisight_core::robot::{Parameter, RobotDescription};
-use axisight_fit::frequency::{Columns, Hold, Linearizer, evaluate};
+use axisight_identification::frequency::{Columns, Hold, Linearizer, evaluate};
 use axisight_tests::{PRESET, robot};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;

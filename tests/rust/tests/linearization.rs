@@ -3,7 +3,7 @@
 use axisight_core::plant::{equilibrium, linearize, zoh_frequency_response};
 use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
-use axisight_fit::frequency::modes;
+use axisight_identification::frequency::modes;
 use axisight_tests::{ARM, PRESET, effect, plant, robot, trace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;

@@ -123,7 +123,7 @@ fn with(
     kernel: impl Kernel<f64> + 'static,
 ) -> Plant<f64> {
     let kernels = vec![(info, place, Arc::new(kernel) as Arc<dyn Kernel<f64>>)];
-    Plant::with_kernels(robot, kernels).unwrap_or_else(|error| panic!("{error}"))
+    Plant::with_kernels(robot, &[], kernels).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// What an odometer must return from a state `[phi, q, ..]`.
@@ -350,6 +350,7 @@ fn rest_is_rest_with_effects_at_every_point() {
     let kernels = |i: &'static EffectInfo, p| (i, p, Arc::new(Hold) as Arc<dyn Kernel<f64>>);
     let plant = Plant::with_kernels(
         &robot,
+        &[],
         vec![kernels(&ARM, Place::Arm), kernels(&PAIR, Place::Axes(1, 2))],
     )
     .unwrap_or_else(|error| panic!("{error}"));
@@ -368,6 +369,7 @@ fn what_a_point_cannot_hold_is_refused() {
     let refusal =
         |info: &'static EffectInfo, place, kernel: Arc<dyn Kernel<f64>>| match Plant::with_kernels(
             &robot,
+            &[],
             vec![(info, place, kernel)],
         ) {
             Ok(_) => "accepted".to_owned(),

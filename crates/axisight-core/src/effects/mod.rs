@@ -5,20 +5,14 @@
 //! ([`EffectInfo`]). A new effect is a new file and one line in the table below. Equations that
 //! other models share are in [`formulas`].
 
-mod error;
-pub mod formulas;
 mod harmonics;
-mod info;
-mod kernel;
 
-pub use error::EffectError;
-pub use info::{
-    Absorber, Acts, Change, EffectInfo, Experiment, Family, Linear, ParameterInfo, Role, Scope,
-    StandsFor,
+pub use axisight_plant::effect::{
+    Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, EffectError, EffectInfo,
+    Experiment, Family, Joint, Kernel, Linear, Motor, Pair, ParameterInfo, PlantParameters, Role,
+    Scope, Spring, StandsFor,
 };
-pub use kernel::{
-    Arm, AxisTorque, BaseJoint, CoupledAxis, Joint, Kernel, Motor, Pair, PlantParameters, Spring,
-};
+pub use axisight_plant::formulas;
 
 use axisight_scalar::Scalar;
 
@@ -44,7 +38,7 @@ macro_rules! effect_table {
             }
             match name {
                 $(stringify!($module) => Ok($module::kernel(p)),)*
-                _ => Err(EffectError::unknown(name)),
+                _ => Err(unknown(name)),
             }
         }
     };
@@ -85,5 +79,13 @@ pub fn info(name: &str) -> Result<&'static EffectInfo, EffectError> {
         .iter()
         .copied()
         .find(|e| e.name == name)
-        .ok_or_else(|| EffectError::unknown(name))
+        .ok_or_else(|| unknown(name))
+}
+
+fn unknown(name: &str) -> EffectError {
+    let names: Vec<_> = EFFECTS.iter().map(|e| e.name).collect();
+    EffectError::Unknown {
+        name: name.to_owned(),
+        expected: names.join(", "),
+    }
 }

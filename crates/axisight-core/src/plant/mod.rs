@@ -1,17 +1,9 @@
-//! The plant: motors, gears and the elastic arm with the effects on them, as equations of
-//! motion; its equilibrium and its linearization.
+//! Plants of robots with effects by name.
 
-mod axis;
-mod build;
-mod equations;
-mod equilibrium;
-mod linearization;
-mod own;
-mod zoh_response;
+mod assemble;
 
-pub use axis::{Axis, Gear};
-pub use build::PlantError;
-pub use equations::Plant;
-pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
-pub use linearization::{Linearization, LinearizationError, linearize};
-pub use zoh_response::zoh_frequency_response;
+pub use assemble::{assemble, linearize, stepper};
+pub use axisight_plant::plant::{
+    Axis, Equilibrium, EquilibriumError, Gear, Linearization, LinearizationError, PlacedKernel,
+    Plant, PlantError, equilibrium, zoh_frequency_response,
+};

@@ -6,11 +6,12 @@
 //! step any of its runs asks for, and a run differs from itself alone by less than the
 //! tolerance allows.
 
-use super::closed_loop::{Drive, Run, Sample, SimulationError, Status, simulate};
 use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
-use super::method::{Effort, Method, Stepper};
-use crate::plant::{Plant, PlantError};
+use crate::plant::{Plant, PlantError, assemble, stepper};
 use crate::robot::{EffectSetting, RobotDescription};
+use axisight_plant::simulation::{
+    Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
+};
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -196,7 +197,7 @@ impl Group<'_> {
                 self.linear::<Lanes<LANES>>(batch, plant, &lanes)?
             } else {
                 let lifted: Vec<_> = batch.settings.iter().map(EffectSetting::lifted).collect();
-                let plant = Plant::<Lanes<LANES>>::new(batch.robot, &[], &lifted)?;
+                let plant = assemble::<Lanes<LANES>>(batch.robot, &[], &lifted)?;
                 self.nonlinear(batch, &plant, Stepper::new(&plant), &lanes)?
             };
             if matches!(outcome.status, Status::Completed | Status::Cancelled(_)) {
@@ -216,9 +217,9 @@ impl Group<'_> {
         let outcome = if let Some(plant) = linear {
             self.linear::<f64>(batch, plant, &[lane])?
         } else {
-            let plant = Plant::<f64>::new(batch.robot, &[], batch.settings)?;
+            let plant = assemble(batch.robot, &[], batch.settings)?;
             let stepper = if batch.method.may_be_implicit() {
-                Stepper::with_jacobian(&plant, batch.robot, batch.settings)?
+                stepper(&plant, batch.robot, batch.settings)?
             } else {
                 Stepper::new(&plant)
             };

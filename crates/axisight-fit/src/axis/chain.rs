@@ -5,9 +5,7 @@
 //! Friction, backlash, springs and ripple are the formulas of the core's effects.
 
 use super::layout::AxisModel;
-use axisight_core::effects::formulas::{
-    dead_zone, harmonic, smoothed_sign, spring_torque, stribeck_level,
-};
+use axisight_plant::formulas::{dead_zone, harmonic, smoothed_sign, spring_torque, stribeck_level};
 use axisight_scalar::Scalar;
 use std::array::from_fn;
 

@@ -8,7 +8,7 @@
 //! multiply-adds each, so that one sample costs what its columns are many, not a multiple
 //! of inverse dynamics.
 
-use axisight_core::robot::{Joint, Mat3, Motion, RobotDescription, Vec3};
+use axisight_plant::robot::{Joint, Mat3, Motion, RobotDescription, Vec3};
 use axisight_scalar::Scalar;
 
 /// Parameters of a link: m, m c (x y z), inertia about the link frame xx yy zz xy xz yz.

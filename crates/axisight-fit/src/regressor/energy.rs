@@ -3,7 +3,7 @@
 use super::chain::LINK_PARAMETERS;
 use super::evaluate::{LANES, Lane, Regressor};
 use super::{RegressorError, check_rows};
-use axisight_core::robot::Vec3;
+use axisight_plant::robot::Vec3;
 use axisight_scalar::Scalar;
 use rayon::prelude::*;
 

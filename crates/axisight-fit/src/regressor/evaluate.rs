@@ -3,7 +3,7 @@
 use super::chain::{Geometry, JointMotion, LINK_PARAMETERS, Sweep};
 use super::extra::Extra;
 use super::{RegressorError, check_rows};
-use axisight_core::robot::RobotDescription;
+use axisight_plant::robot::RobotDescription;
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! The parameters of the regressor in a robot description.
 
-use axisight_core::robot::{Link, RobotDescription};
+use axisight_plant::robot::{Link, RobotDescription};
 
 /// Mass, first moments and inertia about the link frame of every loaded link, in chain
 /// order, ten each: m, mx, my, mz, xx, yy, zz, xy, xz, yz.

@@ -3,7 +3,7 @@
 use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
 use crate::effects::{self, Change, EffectError, EffectInfo, Kernel, Linear, Role};
-use crate::plant::{Linearization, LinearizationError, Plant, PlantError, linearize};
+use crate::plant::{Linearization, LinearizationError, PlantError, assemble, linearize};
 use crate::robot::{EffectSetting, Place, RobotDescription};
 use axisight_scalar::Scalar;
 use std::ops::Range;
@@ -79,7 +79,7 @@ impl LinearPlant {
         settings: &[EffectSetting<f64>],
         start: &[f64],
     ) -> Result<Self, LinearPlantError> {
-        let whole = Plant::<f64>::new(robot, &[], settings).map_err(LinearizationError::from)?;
+        let whole = assemble::<f64>(robot, &[], settings).map_err(LinearizationError::from)?;
         let (robot, settings) = &robot.with_all_effects(settings);
         let mut smooth = Vec::new();
         for setting in settings {
@@ -88,7 +88,7 @@ impl LinearPlant {
             }
         }
         let linear = linearize(robot, &smooth, start)?;
-        let plain = Plant::<f64>::new(robot, &[], &smooth).map_err(LinearizationError::from)?;
+        let plain = assemble::<f64>(robot, &[], &smooth).map_err(LinearizationError::from)?;
         let axes = (0..whole.axes.len())
             .map(|i| LinearAxis::new(i, settings, &linear))
             .collect::<Result<Vec<_>, _>>()?;

@@ -4,12 +4,10 @@ use super::harmonics::Ripple;
 use super::plant::LinearPlant;
 use super::propagator::Propagator;
 use super::tiles::Tiles;
-use crate::simulation::closed_loop::{
-    Run, Sample, Signals, SimulationError, Status, check, lane_value,
+use axisight_plant::simulation::{
+    ControlLoop, Line, Method, Run, Sample, SampleTorque, Signals, SimulationError, Status,
+    TorqueBuffers, TorquePath, check, lane_value,
 };
-use crate::simulation::controller::ControlLoop;
-use crate::simulation::method::Method;
-use crate::simulation::torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};
 use axisight_scalar::Scalar;
 use std::borrow::Cow;
 use std::sync::atomic::Ordering;
@@ -26,10 +24,11 @@ use std::sync::atomic::Ordering;
 /// [`SimulationError`] for misuse; trouble during the run is a [`Status`]. Ripple too steep
 /// for its step is [`Status::StepSizeCollapsed`] at the first such sample; what was observed
 /// after it is void.
+#[inline(never)]
 pub fn simulate_linear<S: Scalar>(
     plant: &LinearPlant,
     run: &Run<'_>,
-    observe: &mut impl FnMut(&Sample<'_, S>),
+    observe: &mut dyn FnMut(&Sample<'_, S>),
 ) -> Result<Status, SimulationError> {
     let n_samples = check(run, plant.n_axes(), S::LANES)?;
     #[allow(clippy::float_cmp)] // the same numbers, not nearby ones
@@ -51,7 +50,7 @@ fn samples<S: Scalar>(
     paths: &mut [TorquePath<S>],
     run: &Run<'_>,
     n_samples: usize,
-    observe: &mut impl FnMut(&Sample<'_, S>),
+    observe: &mut dyn FnMut(&Sample<'_, S>),
 ) -> Status {
     let mut buffers = TorqueBuffers::new(paths.len());
     let mut collapsed = None;

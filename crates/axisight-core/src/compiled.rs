@@ -1,0 +1,32 @@
+//! The numbers that effects by name and the linear plant are compiled for, so that crates above
+//! use these copies; see [`axisight_plant::compiled`].
+
+use crate::plant::{assemble, stepper};
+use crate::simulation::simulate_linear;
+use axisight_plant::simulation::Sample;
+use axisight_scalar::{Dual, Lanes, Scalar};
+use std::hint::black_box;
+
+/// The scalars of [`axisight_plant::compiled`]; the linear plant carries no derivatives.
+#[inline(never)] // or it would be compiled above, where it is not called
+pub fn compiled() {
+    effects::<f64>();
+    effects::<Lanes<4>>();
+    effects::<Lanes<8>>();
+    effects::<Dual<f64, 8>>();
+    effects::<Dual<Lanes<4>, 1>>();
+    effects::<Dual<Lanes<4>, 2>>();
+    effects::<Dual<Lanes<4>, 4>>();
+    linear::<f64>();
+    linear::<Lanes<4>>();
+    linear::<Lanes<8>>();
+}
+
+fn effects<S: Scalar>() {
+    black_box(assemble::<S> as fn(_, _, _) -> _);
+}
+
+fn linear<S: Scalar>() {
+    black_box(stepper::<S> as fn(_, _, _) -> _);
+    black_box(simulate_linear::<S> as fn(_, _, &mut dyn FnMut(&Sample<'_, S>)) -> _);
+}

@@ -1,0 +1,102 @@
+//! From the names of effects to a plant, and what needs more than one of them.
+
+use crate::effects::{self, EffectError, EffectInfo};
+use crate::robot::{EffectSetting, Parameter, RobotDescription};
+use crate::simulation::Stepper;
+use axisight_plant::plant::{
+    self, Linearization, LinearizationError, PlacedKernel, Plant, PlantError,
+};
+use axisight_scalar::Scalar;
+
+/// The plant of `robot` with some parameters replaced and some effects added.
+///
+/// Effects of the robot itself act too, but for those that `settings` replace: same effect,
+/// same place.
+///
+/// # Errors
+/// [`PlantError`] when an effect is unknown, misplaced or has the wrong parameters.
+#[inline(never)]
+pub fn assemble<S: Scalar>(
+    robot: &RobotDescription,
+    overrides: &[(Parameter, S)],
+    settings: &[EffectSetting<S>],
+) -> Result<Plant<S>, PlantError> {
+    let mut kernels = Vec::new();
+    for own in robot.effects_beside(settings) {
+        kernels.push(placed(&own.lifted())?);
+    }
+    for setting in settings {
+        kernels.push(placed(setting)?);
+    }
+    Plant::with_kernels(robot, overrides, kernels)
+}
+
+fn placed<S: Scalar>(setting: &EffectSetting<S>) -> Result<PlacedKernel<S>, EffectError> {
+    let info = effects::info(&setting.name)?;
+    check_bounds(info, &setting.parameters)?;
+    let kernel = effects::build(&setting.name, &setting.parameters)?;
+    Ok((info, setting.place, kernel.into()))
+}
+
+/// Linearize `robot` with `settings` at rest with the driven joints at `driven` [rad].
+///
+/// # Errors
+/// [`LinearizationError`] if the plant cannot be built or does not settle.
+pub fn linearize(
+    robot: &RobotDescription,
+    settings: &[EffectSetting<f64>],
+    driven: &[f64],
+) -> Result<Linearization, LinearizationError> {
+    let plain = assemble(robot, &[], settings)?;
+    plant::linearize(&plain, &seeded(robot, settings)?, driven)
+}
+
+/// Integrator of `plant`, which is that of `robot` with `settings`, for any method.
+///
+/// Implicit methods take one run at a time and carry no derivatives; for other scalars this is
+/// [`Stepper::new`].
+///
+/// # Errors
+/// [`PlantError`] as for the plant itself.
+#[inline(never)]
+pub fn stepper<S: Scalar>(
+    plant: &Plant<S>,
+    robot: &RobotDescription,
+    settings: &[EffectSetting<f64>],
+) -> Result<Stepper<S>, PlantError> {
+    if S::LANES == 1 && S::PARTIALS == 0 {
+        let plain = assemble(robot, &[], settings)?;
+        return Ok(Stepper::with_jacobian(
+            plant,
+            plain,
+            seeded(robot, settings)?,
+        ));
+    }
+    Ok(Stepper::new(plant))
+}
+
+fn seeded(
+    robot: &RobotDescription,
+    settings: &[EffectSetting<f64>],
+) -> Result<Plant<plant::Seeded>, PlantError> {
+    let lifted: Vec<_> = settings.iter().map(EffectSetting::lifted).collect();
+    assemble(robot, &[], &lifted)
+}
+
+fn check_bounds<S: Scalar>(info: &'static EffectInfo, values: &[S]) -> Result<(), EffectError> {
+    for (parameter, value) in info.parameters.iter().zip(values) {
+        for lane in 0..S::LANES {
+            let got = value.lane(lane);
+            if !(parameter.lower..=parameter.upper).contains(&got) {
+                return Err(EffectError::Bounds {
+                    effect: info.name,
+                    parameter: parameter.name,
+                    lower: parameter.lower,
+                    upper: parameter.upper,
+                    got,
+                });
+            }
+        }
+    }
+    Ok(())
+}

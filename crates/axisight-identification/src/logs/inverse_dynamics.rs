@@ -1,0 +1,241 @@
+//! Inverse-dynamics error: torque predicted from a measured motion.
+//!
+//! Gears count as rigid (`q = r phi`) and elastic joints as standing still, so
+//! the prediction holds below the first resonance; effects of the transmission,
+//! the sensor and of timing have no place in it.
+
+use super::gram::{Block, cut};
+use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
+use axisight_core::effects::Motor;
+use axisight_core::plant::assemble;
+use axisight_core::robot::{EffectSetting, RobotDescription};
+use axisight_numerics::Weighting;
+use axisight_scalar::{Dual, Scalar};
+use rayon::prelude::*;
+
+/// Derivatives per pass.
+const SEEDS: usize = 8;
+
+/// A measured motion; arrays are row-major `(n_samples, n_axes)`, motor side.
+#[derive(Debug, Clone)]
+pub struct MotionRecord {
+    /// Motor position [rad].
+    pub position: Vec<f64>,
+    /// Motor velocity [rad/s].
+    pub velocity: Vec<f64>,
+    /// Motor acceleration [rad/s^2].
+    pub acceleration: Vec<f64>,
+    /// Motor torque [Nm].
+    pub torque: Vec<f64>,
+}
+
+/// An inverse-dynamics problem.
+#[derive(Debug, Clone)]
+pub struct InverseDynamics {
+    /// The robot.
+    pub robot: RobotDescription,
+    /// Effects in the model.
+    pub effects: Vec<EffectSetting<f64>>,
+    /// Parameters, in the order of `theta`.
+    pub parameters: Vec<FitParameter>,
+    /// The motions.
+    pub records: Vec<MotionRecord>,
+    /// One weighting per axis.
+    pub weighting: Vec<Weighting>,
+    /// Length of a block [s].
+    pub block_s: f64,
+}
+
+impl InverseDynamics {
+    /// Check shapes.
+    ///
+    /// # Errors
+    /// [`ProblemError::Invalid`] naming the field.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        let n_axes = self.robot.n_axes();
+        let invalid = |field: String, expected: String, got: String| {
+            Err(ProblemError::Invalid {
+                field,
+                expected,
+                got,
+            })
+        };
+        if self.records.is_empty() {
+            return invalid("records".into(), "at least one log".into(), "none".into());
+        }
+        if self.weighting.len() != n_axes {
+            let got = self.weighting.len().to_string();
+            return invalid(
+                "weighting".into(),
+                format!("one for each of {n_axes} axes"),
+                got,
+            );
+        }
+        for weighting in &self.weighting {
+            if let Err(e) = weighting.validate() {
+                return invalid(e.field.into(), e.expected.into(), e.got);
+            }
+        }
+        for (i, r) in self.records.iter().enumerate() {
+            let n = r.position.len();
+            for (name, x) in [
+                ("position", &r.position),
+                ("velocity", &r.velocity),
+                ("acceleration", &r.acceleration),
+                ("torque", &r.torque),
+            ] {
+                if x.len() != n || n == 0 || n % n_axes != 0 {
+                    let expected = format!("{n} numbers, {n_axes} axes");
+                    return invalid(
+                        format!("records[{i}].{name}"),
+                        expected,
+                        x.len().to_string(),
+                    );
+                }
+                if let Some(k) = x.iter().position(|v| !v.is_finite()) {
+                    let got = format!("{} at sample {}", x[k], k / n_axes);
+                    return invalid(format!("records[{i}].{name}"), "finite numbers".into(), got);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Predicted torque of one record: `[quantity][axis][sample]`, value first.
+    fn predict<S: Scalar>(
+        &self,
+        record: &MotionRecord,
+        theta: &[f64],
+        seeds: &[usize],
+    ) -> Result<Vec<Vec<Vec<f64>>>, ProblemError> {
+        let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
+        let plant = assemble(&self.robot, &overrides, &settings)
+            .map_err(|e| ProblemError::Failed(e.to_string()))?;
+        let (n, n_axes) = (plant.chain.len(), plant.axes.len());
+        let n_samples = record.position.len() / n_axes;
+        let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; seeds.len() + 1];
+        let mut motion = vec![vec![S::zero(); n]; 3];
+        for k in 0..n_samples {
+            let row = k * n_axes..(k + 1) * n_axes;
+            let sources = [&record.position, &record.velocity, &record.acceleration];
+            for (target, source) in motion.iter_mut().zip(sources) {
+                for (axis, x) in plant.axes.iter().zip(&source[row.clone()]) {
+                    target[axis.joint] = S::constant(x * axis.ratio);
+                }
+            }
+            let state = plant.dynamics.evaluate(&motion[0], &motion[1]);
+            for (i, axis) in plant.axes.iter().enumerate() {
+                let at = |x: &[f64]| S::constant(x[k * n_axes + i]);
+                let passive = state.bias[axis.joint]
+                    - axis.joint_torque_of(motion[0][axis.joint], motion[1][axis.joint]);
+                let joint_force = (0..n).fold(passive, |sum, j| {
+                    state.inertia[axis.joint * n + j].fma(motion[2][j], sum)
+                });
+                let speed = at(&record.velocity);
+                let motor = Motor {
+                    angle: at(&record.position),
+                    speed,
+                    command: at(&record.torque),
+                    load: joint_force * axis.ratio,
+                    internal: &[],
+                };
+                let mut torque = joint_force * axis.ratio
+                    + axis.motor_inertia * at(&record.acceleration)
+                    + axis.viscous_friction * speed;
+                for kernel in &axis.kernels {
+                    torque -= kernel.motor_torque(&motor);
+                }
+                let command = axis
+                    .kernels
+                    .iter()
+                    .rev()
+                    .fold(torque, |t, k| k.drive_inverse(t));
+                out[0][i].push(command.lane(0));
+                for seed in 0..seeds.len() {
+                    out[seed + 1][i].push(command.partial(seed, 0));
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// Whitened residual and derivative series of one record, axes in a row.
+    fn pass(
+        &self,
+        record: &MotionRecord,
+        theta: &[f64],
+        seeds: &[usize],
+    ) -> Result<Vec<Vec<f64>>, ProblemError> {
+        let mut series = match seeds.len() {
+            0 => self.predict::<f64>(record, theta, seeds)?,
+            _ => self.predict::<Dual<f64, SEEDS>>(record, theta, seeds)?,
+        };
+        let n_axes = self.robot.n_axes();
+        for (axis, model) in series[0].iter_mut().enumerate() {
+            for (k, y) in model.iter_mut().enumerate() {
+                *y -= record.torque[k * n_axes + axis];
+            }
+        }
+        let n_samples = record.torque.len() / n_axes;
+        let mut out = vec![Vec::new(); series.len()];
+        for (axis, weighting) in self.weighting.iter().enumerate() {
+            let plan = weighting.plan(n_samples, self.robot.sample_time);
+            for (quantity, target) in series.iter().zip(&mut out) {
+                target.extend(plan.apply_pair(&quantity[axis], &quantity[axis]).0);
+            }
+        }
+        Ok(out)
+    }
+}
+
+impl Problem for InverseDynamics {
+    fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
+        let mut chunks: Vec<&[usize]> = columns.chunks(SEEDS).collect();
+        if chunks.is_empty() {
+            chunks.push(&[]);
+        }
+        let tasks: Vec<(&MotionRecord, usize, &[usize])> = self
+            .records
+            .iter()
+            .flat_map(|r| chunks.iter().enumerate().map(move |(i, c)| (r, i, *c)))
+            .collect();
+        let done: Vec<_> = tasks
+            .par_iter()
+            .map(|(record, _, seeds)| self.pass(record, theta, seeds))
+            .collect::<Result<_, ProblemError>>()?;
+        let mut residual = Vec::new();
+        let mut derivatives = vec![Vec::new(); columns.len()];
+        for ((_, chunk, seeds), series) in tasks.iter().zip(done) {
+            let mut series = series.into_iter();
+            let first = series.next().unwrap_or_default();
+            if *chunk == 0 {
+                residual.extend(first);
+            }
+            for (i, column) in series.take(seeds.len()).enumerate() {
+                derivatives[chunk * SEEDS + i].extend(column);
+            }
+        }
+        Ok(Evaluation {
+            residual,
+            columns: derivatives,
+        })
+    }
+
+    fn blocks(&self) -> Vec<Block> {
+        let n_axes = self.robot.n_axes();
+        let mut start = 0;
+        let mut out = Vec::new();
+        for (record, motion) in self.records.iter().enumerate() {
+            for (axis, weighting) in self.weighting.iter().enumerate() {
+                let len = weighting.output_len(motion.torque.len() / n_axes);
+                let step = self.robot.sample_time * weighting.decimation as f64;
+                // Truncation is fine: block lengths are approximate.
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let block_len = (self.block_s / step) as usize;
+                out.extend(cut(record, axis, start, len, block_len));
+                start += len;
+            }
+        }
+        out
+    }
+}

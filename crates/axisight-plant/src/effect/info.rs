@@ -1,0 +1,201 @@
+//! What an effect is: the whole of what is known of it, in one table entry.
+//!
+//! Whoever has to treat effects differently asks for a property here; no other place knows
+//! them by name, but for the start values of a search.
+
+/// What an effect belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// One driven axis.
+    Axis,
+    /// Two driven axes, in order.
+    Axes,
+    /// The whole arm.
+    Arm,
+}
+
+/// Where in the signal path an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Acts {
+    /// Between commanded and applied motor torque.
+    TorquePath,
+    /// Torque on the motor shaft.
+    Motor,
+    /// Between motor and joint.
+    Transmission,
+    /// Torque on the driven joint.
+    Joint,
+    /// Masses and springs of the arm, forces on its joints.
+    Arm,
+    /// What the arm stands on: gravity seen from it, springs below the first joint.
+    Base,
+    /// Between true and measured motor position.
+    Sensor,
+}
+
+/// What kind of cause an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// Against the motion.
+    Friction,
+    /// Springs, dampers and play of the gear.
+    Transmission,
+    /// Repeats with the angle.
+    Periodic,
+    /// Late or slow torque.
+    Timing,
+    /// Wrong or limited torque.
+    TorquePath,
+    /// Inertia and load.
+    Load,
+    /// The arm beyond its modelled joints.
+    Arm,
+    /// Wrong readings.
+    Sensor,
+}
+
+/// How a change is stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// In the unit of what changes.
+    Absolute,
+    /// As a share of what changes, which must not be zero.
+    Relative,
+}
+
+/// A parameter of the robot that an effect stands in for: with the effect free, the
+/// parameter is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StandsFor {
+    /// Quantity of the joint, as in parameter names.
+    pub quantity: &'static str,
+    /// What the first parameter of the effect says of it.
+    pub change: Change,
+}
+
+/// How a linear model holds an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linear {
+    /// Changed parameters of the robot: wherever the robot goes, linear or not.
+    Parameters,
+    /// Its slope at rest describes it in motion too.
+    Slope,
+    /// It comes before the plant: gain, delay, lag.
+    Path,
+    /// Waves over the motor angle beside the linear plant; numbers of its parameters, in
+    /// order, that are terms of constant torque, torque in proportion to the command, reading.
+    Waves {
+        /// Terms of constant torque.
+        constant: usize,
+        /// Terms in proportion to the command.
+        proportional: usize,
+        /// Terms of the reading.
+        reading: usize,
+    },
+    /// Not at all.
+    No,
+}
+
+/// What identification may have found from data that hold the effect: the effect, or part of
+/// it, is then in what was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Absorber {
+    /// Masses and inertias of the links.
+    Links,
+    /// Inertia of the motor.
+    MotorInertia,
+    /// Friction in proportion to the speed.
+    ViscousFriction,
+    /// Friction that the speed only turns.
+    DryFriction,
+    /// Constant torque.
+    TorqueOffset,
+    /// Stiffness of the gear.
+    Stiffness,
+    /// Damping of the gear.
+    Damping,
+    /// Play of the gear.
+    Backlash,
+    /// The unit of torque.
+    Torque,
+}
+
+/// An experiment that tells an effect from others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Experiment {
+    /// The same excitation at several amplitudes and preloads.
+    Amplitudes,
+    /// A wide band.
+    WideBand,
+    /// Constant speeds in both directions, with and without load.
+    Speeds,
+    /// Slow motion at two speeds, and a sensor on the joint.
+    SlowTurns,
+    /// Poses, with and without a known load.
+    Poses,
+}
+
+/// What a parameter does to an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The effect vanishes when every amplitude is at its neutral value.
+    Amplitude,
+    /// Shapes the effect; any value is neutral once the amplitudes are.
+    Shape,
+}
+
+/// One parameter of an effect.
+#[derive(Debug, Clone, Copy)]
+pub struct ParameterInfo {
+    /// Name with its unit as suffix, e.g. `coulomb_nm`.
+    pub name: &'static str,
+    /// Unit, e.g. `Nm`; `1` when dimensionless.
+    pub unit: &'static str,
+    /// Amplitude or shape.
+    pub role: Role,
+    /// Value at which the effect vanishes (amplitude) or the usual value (shape).
+    pub neutral: f64,
+    /// Smallest admissible value.
+    pub lower: f64,
+    /// Largest admissible value.
+    pub upper: f64,
+    /// Typical magnitude: natural scale of a search and width of a plausible range.
+    pub typical: f64,
+}
+
+/// Description of an effect.
+#[derive(Debug)]
+pub struct EffectInfo {
+    /// Name as in the verdict vocabulary.
+    pub name: &'static str,
+    /// One line for people.
+    pub summary: &'static str,
+    /// Equation in the notation of the thesis.
+    pub equation: &'static str,
+    /// Where the equation comes from.
+    pub source: &'static str,
+    /// Axis, two axes or arm.
+    pub scope: Scope,
+    /// Point of action.
+    pub acts: Acts,
+    /// Kind of cause.
+    pub family: Family,
+    /// Effects that this one becomes at some value of its parameters.
+    pub contains: &'static [&'static str],
+    /// Simpler effects that together do what this one does.
+    pub parts: &'static [&'static str],
+    /// Parameter of the robot it is a change of.
+    pub stands_for: Option<StandsFor>,
+    /// How a linear model holds it.
+    pub linear: Linear,
+    /// Whether torque predicted from measured motion can hold it.
+    pub inverse_dynamics: bool,
+    /// Whether it is stiff at usual sizes: explicit integration, as in fits, is no use.
+    pub stiff: bool,
+    /// What it is part of once identified.
+    pub absorbed_by: &'static [Absorber],
+    /// Experiments that show it, the best first.
+    pub shown_by: &'static [Experiment],
+    /// Parameters in kernel order.
+    pub parameters: &'static [ParameterInfo],
+}

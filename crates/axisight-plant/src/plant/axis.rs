@@ -1,0 +1,194 @@
+//! One driven axis: motor, transmission, and the effects on them.
+
+use super::own::Own;
+use crate::effect::{Joint, Kernel, Spring};
+use crate::robot::{Parameter, RobotDescription};
+use axisight_scalar::Scalar;
+use std::sync::Arc;
+
+/// A compliant transmission.
+#[derive(Debug, Clone, Copy)]
+pub struct Gear<S> {
+    /// Stiffness k [Nm/rad].
+    pub stiffness: S,
+    /// Damping d [Nm s/rad].
+    pub damping: S,
+    /// Index of the motor angle among the motor states.
+    pub(super) slot: usize,
+}
+
+/// One driven axis.
+#[derive(Clone)]
+pub struct Axis<S> {
+    /// Index of the joint the axis drives.
+    pub joint: usize,
+    /// Gear ratio r, joint angle per motor angle.
+    pub ratio: f64,
+    /// Motor inertia [kg m^2].
+    pub motor_inertia: S,
+    /// Viscous friction of the motor [Nm s/rad].
+    pub viscous_friction: S,
+    pub(super) inverse_motor_inertia: S,
+    /// Compliant transmission; `None` is rigid.
+    pub gear: Option<Gear<S>>,
+    /// Everything that acts on this axis.
+    pub kernels: Vec<Arc<dyn Kernel<S>>>,
+    pub(super) on_motor: Vec<Own<S>>,
+    pub(super) on_gear: Vec<Own<S>>,
+    pub(super) on_joint: Vec<Own<S>>,
+}
+
+impl<S: Scalar> Axis<S> {
+    /// Torque of the effects on the driven joint [Nm] without states of their own: at rest,
+    /// or where motion is measured and nothing is integrated.
+    pub fn joint_torque_of(&self, angle: S, speed: S) -> S {
+        let state = Joint {
+            angle,
+            speed,
+            internal: &[],
+        };
+        let torques = self
+            .on_joint
+            .iter()
+            .map(|on| on.kernel.joint_torque(&state));
+        torques.fold(S::zero(), |a, b| a + b)
+    }
+
+    /// Torque of the effects on the driven joint [Nm]; `own` and `own_rates` run over the
+    /// states of all effects.
+    pub(super) fn joint_torque(&self, angle: S, speed: S, own: &[S], own_rates: &mut [S]) -> S {
+        let mut torque = S::zero();
+        for Own { kernel, internal } in &self.on_joint {
+            let state = Joint {
+                angle,
+                speed,
+                internal: &own[internal.clone()],
+            };
+            torque += kernel.joint_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.joint_rates(&state, rates);
+            }
+        }
+        torque
+    }
+
+    /// Torque of the gear at deflection `delta` [rad] that changes at `rate` [Nm, joint side].
+    #[inline]
+    pub(super) fn gear_torque(
+        &self,
+        gear: &Gear<S>,
+        delta: S,
+        rate: S,
+        own: &[S],
+        own_rates: &mut [S],
+    ) -> S {
+        let (mut loaded, mut slope) = (delta, S::one());
+        for on_gear in &self.on_gear {
+            let (next, factor) = on_gear.kernel.deflection(loaded);
+            (loaded, slope) = (next, slope * factor);
+        }
+        let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
+        for Own { kernel, internal } in &self.on_gear {
+            let state = Spring {
+                loaded,
+                rate: slope * rate,
+                internal: &own[internal.clone()],
+            };
+            torque += kernel.gear_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.gear_rates(&state, rates);
+            }
+        }
+        torque
+    }
+
+    /// Motor angle at rest for a joint angle and a static load [Nm, joint side].
+    ///
+    /// Fixed-point iteration over the transmission error, whose slope is a small
+    /// share of the gear ratio.
+    pub(super) fn motor_angle_at_rest(&self, joint_angle: S, load: S) -> S {
+        let wanted = joint_angle + self.static_deflection(load);
+        let mut angle = wanted * (1.0 / self.ratio);
+        for _ in 0..60 {
+            let errors = self
+                .on_gear
+                .iter()
+                .filter_map(|on| on.kernel.transmission_error(angle));
+            let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
+                break;
+            };
+            angle = (wanted - error) * (1.0 / self.ratio);
+        }
+        angle
+    }
+
+    /// Motor torque that carries a static load [Nm, joint side] at a motor angle.
+    pub(super) fn motor_torque_at_rest(&self, angle: S, load: S) -> S {
+        let slopes = self
+            .on_gear
+            .iter()
+            .filter_map(|on| on.kernel.transmission_error(angle));
+        load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
+    }
+
+    /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
+    ///
+    /// Fixed-point iteration on the secant stiffness, halfway at a time: for a hardening
+    /// spring the error at least halves each time, however hard it gets.
+    fn static_deflection(&self, load: S) -> S {
+        let Some(gear) = &self.gear else {
+            return S::zero();
+        };
+        let mut loaded = load / gear.stiffness;
+        for _ in 0..60 {
+            let mut extra = S::zero();
+            for on_gear in &self.on_gear {
+                let state = Spring {
+                    loaded,
+                    rate: S::zero(),
+                    internal: &[],
+                };
+                extra += on_gear.kernel.gear_torque(&state);
+            }
+            let secant = loaded.abs().if_positive(extra / loaded, S::zero());
+            loaded = (loaded + load / (gear.stiffness + secant)) * 0.5;
+        }
+        self.on_gear
+            .iter()
+            .rev()
+            .fold(loaded, |d, on| on.kernel.deflection_inverse(d))
+    }
+}
+
+/// The driven axes of `robot`, without effects.
+pub(super) fn axes<S: Scalar>(
+    robot: &RobotDescription,
+    value_of: &impl Fn(Parameter) -> S,
+) -> Vec<Axis<S>> {
+    let mut slot = 0;
+    robot
+        .driven()
+        .map(|(joint, description, drive)| {
+            let gear = description.compliance.map(|_| {
+                slot += 1;
+                Gear {
+                    stiffness: value_of(Parameter::Stiffness(joint)),
+                    damping: value_of(Parameter::Damping(joint)),
+                    slot: slot - 1,
+                }
+            });
+            Axis {
+                joint,
+                ratio: drive.gear_ratio,
+                motor_inertia: value_of(Parameter::MotorInertia(joint)),
+                inverse_motor_inertia: value_of(Parameter::MotorInertia(joint)).recip(),
+                viscous_friction: value_of(Parameter::ViscousFriction(joint)),
+                gear,
+                kernels: Vec::new(),
+                on_motor: Vec::new(),
+                on_gear: Vec::new(),
+                on_joint: Vec::new(),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,272 @@
+//! A plant from a robot, changed parameters and the kernels of effects.
+
+use super::axis::axes;
+use super::equations::Plant;
+use super::own::{OnPair, Own};
+use crate::effect::{Acts, BaseJoint, EffectError, EffectInfo, Kernel, PlantParameters, Scope};
+use crate::robot::{Chain, ChainJoint, Dynamics, MOST_JOINTS, Parameter, Place, RobotDescription};
+use axisight_scalar::Scalar;
+use std::sync::Arc;
+
+/// Why a plant cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// Effects or fitted parameters leave a link without mass.
+    #[error("mass of the link of joint {joint}: expected more than 0 kg, got {got}")]
+    Mass {
+        /// Joint, from 1.
+        joint: usize,
+        /// Mass [kg].
+        got: f64,
+    },
+    /// The chain is longer than the compiled sizes.
+    #[error("joints: expected at most {MOST_JOINTS}, got {0}")]
+    TooManyJoints(usize),
+    /// An effect is misused.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+/// The kernel of an effect, what is known of the effect, and where it acts.
+pub type PlacedKernel<S> = (&'static EffectInfo, Place, Arc<dyn Kernel<S>>);
+
+impl<S: Scalar> Plant<S> {
+    /// The plant of `robot` with some parameters replaced and without any effect but `kernels`.
+    ///
+    /// # Errors
+    /// [`PlantError`] when a kernel is misplaced or asks for what its point of action has not.
+    #[inline(never)]
+    pub fn with_kernels(
+        robot: &RobotDescription,
+        overrides: &[(Parameter, S)],
+        kernels: Vec<PlacedKernel<S>>,
+    ) -> Result<Self, PlantError> {
+        let mut plant = Self::bare(robot, overrides)?;
+        for (info, place, kernel) in kernels {
+            plant.add_kernel(info, place, kernel)?;
+        }
+        plant.finish()?;
+        Ok(plant)
+    }
+
+    fn bare(robot: &RobotDescription, overrides: &[(Parameter, S)]) -> Result<Self, PlantError> {
+        if robot.joints.len() > MOST_JOINTS {
+            return Err(PlantError::TooManyJoints(robot.joints.len()));
+        }
+        let mut chain = Chain::new(robot);
+        for (parameter, value) in overrides {
+            parameter.apply_to_chain(*value, &mut chain);
+        }
+        let value_of = |p: Parameter| {
+            let found = overrides.iter().rev().find(|(q, _)| *q == p);
+            found.map_or_else(|| S::constant(p.nominal(robot)), |(_, v)| *v)
+        };
+        let compliant = |j: &crate::robot::Joint| j.drive.is_some() && j.compliance.is_some();
+        Ok(Self {
+            dynamics: Dynamics::new(&chain),
+            chain,
+            axes: axes(robot, &value_of),
+            elastic: elastic_joints(robot, &value_of),
+            on_pairs: Vec::new(),
+            on_arm: Vec::new(),
+            n_motors: robot.joints.iter().filter(|j| compliant(j)).count(),
+            n_base: 0,
+            n_internal: 0,
+        })
+    }
+
+    /// Effects may have changed masses, inertias and the chain itself.
+    fn finish(&mut self) -> Result<(), PlantError> {
+        self.check_masses()?;
+        if self.chain.len() > MOST_JOINTS {
+            return Err(PlantError::TooManyJoints(self.chain.len()));
+        }
+        self.dynamics = Dynamics::new(&self.chain);
+        for axis in &mut self.axes {
+            axis.inverse_motor_inertia = axis.motor_inertia.recip();
+        }
+        Ok(())
+    }
+
+    /// Effects may take mass away, but not all of it.
+    fn check_masses(&self) -> Result<(), PlantError> {
+        for (i, joint) in self.chain.joints.iter().skip(self.n_base).enumerate() {
+            let Some(body) = &joint.body else { continue };
+            let lightest = (0..S::LANES)
+                .map(|lane| body.mass.lane(lane))
+                .fold(f64::INFINITY, f64::min);
+            if lightest <= 0.0 {
+                return Err(PlantError::Mass {
+                    joint: i + 1,
+                    got: lightest,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Put a kernel where it acts.
+    fn add_kernel(
+        &mut self,
+        info: &'static EffectInfo,
+        place: Place,
+        kernel: Arc<dyn Kernel<S>>,
+    ) -> Result<(), PlantError> {
+        check_states(info, kernel.n_internal())?;
+        check_base(info, kernel.base_joints().len())?;
+        let first = self.n_internal;
+        let own = Own {
+            kernel,
+            internal: first..first,
+        };
+        match (info.scope, place) {
+            (Scope::Arm, Place::Arm) => self.add_to_arm(own),
+            (Scope::Axis, Place::Axis(axis)) if axis < self.axes.len() => {
+                self.add_to_axis(info, axis, own)?;
+            }
+            (Scope::Axes, Place::Axes(a, b)) if a != b && a.max(b) < self.axes.len() => {
+                let own = self.with_states(own);
+                self.on_pairs.push(OnPair { axes: [a, b], own });
+            }
+            _ => return Err(misplaced(info, self.axes.len(), place).into()),
+        }
+        Ok(())
+    }
+
+    /// The kernel with its states among those of the plant.
+    fn with_states(&mut self, own: Own<S>) -> Own<S> {
+        let first = self.n_internal;
+        self.n_internal += own.kernel.n_internal();
+        Own {
+            kernel: own.kernel,
+            internal: first..self.n_internal,
+        }
+    }
+
+    fn add_to_arm(&mut self, own: Own<S>) {
+        own.kernel.prepare(&mut PlantParameters {
+            chain: &mut self.chain,
+            stiffness: None,
+            damping: None,
+            motor_inertia: None,
+        });
+        self.insert_base(own.kernel.base_joints());
+        let own = self.with_states(own);
+        self.on_arm.push(own);
+    }
+
+    /// Put joints below the first one; all others move up.
+    fn insert_base(&mut self, joints: Vec<BaseJoint<S>>) {
+        let count = joints.len();
+        for axis in &mut self.axes {
+            axis.joint += count;
+        }
+        for (joint, ..) in &mut self.elastic {
+            *joint += count;
+        }
+        for (i, joint) in joints.into_iter().enumerate() {
+            let place = self.n_base + i;
+            self.elastic.push((place, joint.stiffness, joint.damping));
+            let link = ChainJoint {
+                motion: joint.motion,
+                origin: None,
+                axis: joint.axis,
+                body: joint.body,
+            };
+            self.chain.joints.insert(place, link);
+        }
+        self.n_base += count;
+    }
+
+    fn add_to_axis(
+        &mut self,
+        info: &'static EffectInfo,
+        index: usize,
+        own: Own<S>,
+    ) -> Result<(), PlantError> {
+        let own = self.with_states(own);
+        let axis = &mut self.axes[index];
+        if info.acts == Acts::Transmission && axis.gear.is_none() {
+            let got = format!("{} (rigid)", Place::Axis(index));
+            let expected = "an axis with a compliant transmission".to_owned();
+            return Err(EffectError::Axis {
+                effect: info.name,
+                expected,
+                got,
+            }
+            .into());
+        }
+        let (stiffness, damping) = match &mut axis.gear {
+            Some(gear) => (Some(&mut gear.stiffness), Some(&mut gear.damping)),
+            None => (None, None),
+        };
+        own.kernel.prepare(&mut PlantParameters {
+            chain: &mut self.chain,
+            stiffness,
+            damping,
+            motor_inertia: Some(&mut axis.motor_inertia),
+        });
+        axis.kernels.push(Arc::clone(&own.kernel));
+        match info.acts {
+            Acts::Motor => axis.on_motor.push(own),
+            Acts::Transmission => axis.on_gear.push(own),
+            Acts::Joint => axis.on_joint.push(own),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+fn misplaced(info: &'static EffectInfo, n_axes: usize, place: Place) -> EffectError {
+    let expected = match info.scope {
+        Scope::Axis => format!("an axis from 1 to {n_axes}"),
+        Scope::Axes => format!("two different axes from 1 to {n_axes}"),
+        Scope::Arm => "no axis (it acts on the whole arm)".to_owned(),
+    };
+    EffectError::Axis {
+        effect: info.name,
+        expected,
+        got: place.to_string(),
+    }
+}
+
+/// What is integrated can have states; the torque path and the sensor work from sample to sample.
+fn check_states(info: &'static EffectInfo, states: usize) -> Result<(), EffectError> {
+    let integrated = !matches!(info.acts, Acts::TorquePath | Acts::Sensor);
+    if integrated || states == 0 {
+        return Ok(());
+    }
+    Err(EffectError::Unsupported {
+        effect: info.name,
+        expected: "no states of its own",
+        got: format!("{states}"),
+    })
+}
+
+fn check_base(info: &'static EffectInfo, joints: usize) -> Result<(), EffectError> {
+    if info.acts == Acts::Base || joints == 0 {
+        return Ok(());
+    }
+    Err(EffectError::Unsupported {
+        effect: info.name,
+        expected: "no joints below the first one",
+        got: format!("{joints}"),
+    })
+}
+
+fn elastic_joints<S: Scalar>(
+    robot: &RobotDescription,
+    value_of: &impl Fn(Parameter) -> S,
+) -> Vec<(usize, S, S)> {
+    let is_elastic = |i: &usize| robot.joints[*i].drive.is_none();
+    (0..robot.joints.len())
+        .filter(is_elastic)
+        .map(|i| {
+            (
+                i,
+                value_of(Parameter::Stiffness(i)),
+                value_of(Parameter::Damping(i)),
+            )
+        })
+        .collect()
+}

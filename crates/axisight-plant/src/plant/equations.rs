@@ -1,0 +1,316 @@
+//! The continuous-time plant: motors, gears, elastic arm and the effects on them.
+//!
+//! With motor angles `phi` (compliant gears only), joint angles `q`, deflection
+//! `delta = r phi - q` and gear torque `tau_g`:
+//! `J_m phi'' = tau - F_v phi' - r tau_g`, `M(q) q'' + c + g = B tau_g - K_e q_e - D_e q_e'`.
+//! A rigid gear has `phi = q / r` and no state of its own.
+
+use super::axis::Axis;
+use super::own::{OnPair, Own};
+use crate::effect::{Arm, CoupledAxis, Motor, Pair};
+use crate::robot::{Chain, Dynamics, DynamicsScratch};
+use axisight_scalar::Scalar;
+use std::ops::Range;
+
+/// A robot with its effects, ready to be integrated.
+#[derive(Clone)]
+pub struct Plant<S> {
+    /// Rigid-body chain, with the joints below the first one that effects put there.
+    pub chain: Chain<S>,
+    /// Equations of motion of the chain.
+    pub dynamics: Dynamics<S>,
+    /// Driven axes in chain order.
+    pub axes: Vec<Axis<S>>,
+    /// Elastic joints: index, stiffness, damping.
+    pub elastic: Vec<(usize, S, S)>,
+    pub(super) on_pairs: Vec<OnPair<S>>,
+    pub(super) on_arm: Vec<Own<S>>,
+    pub(super) n_motors: usize,
+    pub(super) n_base: usize,
+    pub(super) n_internal: usize,
+}
+
+impl<S: Scalar> Plant<S> {
+    /// Number of states: `[phi, q, phi', q']`, then those of the effects.
+    pub fn n_states(&self) -> usize {
+        2 * self.n_angles() + self.n_internal
+    }
+
+    /// Number of angles, motors' and joints', at the front of the state; as many rates follow.
+    pub fn n_angles(&self) -> usize {
+        self.n_motors + self.chain.len()
+    }
+
+    /// Number of motor angles among the states (compliant gears).
+    pub fn n_motors(&self) -> usize {
+        self.n_motors
+    }
+
+    /// Motor angle of an axis in state `x` [rad].
+    pub fn motor_angle(&self, axis: &Axis<S>, x: &[S]) -> S {
+        match &axis.gear {
+            Some(gear) => x[gear.slot],
+            None => x[self.n_motors + axis.joint] * (1.0 / axis.ratio),
+        }
+    }
+
+    /// Motor speed of an axis in state `x` [rad/s].
+    pub fn motor_speed(&self, axis: &Axis<S>, x: &[S]) -> S {
+        let rates = &x[self.n_motors + self.chain.len()..];
+        match &axis.gear {
+            Some(gear) => rates[gear.slot],
+            None => rates[self.n_motors + axis.joint] * (1.0 / axis.ratio),
+        }
+    }
+
+    /// Index of an axis's motor angle among the states; `None` for a rigid transmission.
+    pub fn motor_slot(&self, axis: usize) -> Option<usize> {
+        self.axes.get(axis)?.gear.as_ref().map(|gear| gear.slot)
+    }
+
+    /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
+    pub fn motor_slots(&self) -> Vec<(usize, f64)> {
+        let slot = |axis: &Axis<S>| match &axis.gear {
+            Some(gear) => (gear.slot, 1.0),
+            None => (self.n_motors + axis.joint, 1.0 / axis.ratio),
+        };
+        self.axes.iter().map(slot).collect()
+    }
+
+    /// The states that are angles of the robot's joints.
+    pub fn joint_slots(&self) -> Range<usize> {
+        self.n_motors + self.n_base..self.n_motors + self.chain.len()
+    }
+
+    /// Angles of the robot's joints in state `x`.
+    pub fn joint_angles<'x>(&self, x: &'x [S]) -> &'x [S] {
+        &x[self.joint_slots()]
+    }
+
+    /// `dx = f(x, tau)`: `applied` is the torque the drives deliver, `command`
+    /// the commanded torque of the sample (torque ripple scales with it) [Nm].
+    #[inline]
+    pub fn derivative(
+        &self,
+        x: &[S],
+        applied: &[S],
+        command: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        dx: &mut [S],
+    ) {
+        let (m, n) = (self.n_motors, self.chain.len());
+        self.dynamics.place(&x[m..m + n], scratch);
+        self.factorize_inertia(scratch);
+        self.derivative_in_place(x, applied, command, scratch, dx);
+    }
+
+    /// [`Plant::derivative`] where only rates, torques and the effects' own states have
+    /// changed since the last evaluation with this `scratch`; about half the work.
+    #[inline]
+    pub fn derivative_in_place(
+        &self,
+        x: &[S],
+        applied: &[S],
+        command: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        dx: &mut [S],
+    ) {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let (state, own) = x.split_at(2 * (m + n));
+        let (angles, rates) = state.split_at(m + n);
+        let (q, v) = (&angles[m..], &rates[m..]);
+        self.dynamics.add_rates(v, scratch);
+        // The force becomes the acceleration below.
+        let force = scratch.forces();
+        for f in force.iter_mut() {
+            *f = -*f;
+        }
+        let (place, own_rates) = dx.split_at_mut(2 * (m + n));
+        place[..m + n].copy_from_slice(rates);
+        for (axis, (applied, command)) in self.axes.iter().zip(applied.iter().zip(command)) {
+            let torque = self.driven(axis, x, *applied, *command, own_rates);
+            let joint = axis.joint;
+            force[joint] += axis.joint_torque(q[joint], v[joint], own, own_rates);
+            if let Some(gear) = &axis.gear {
+                force[joint] += torque.gear;
+                place[m + n + gear.slot] =
+                    (torque.motor - torque.load) * axis.inverse_motor_inertia;
+            } else {
+                force[joint] += torque.motor * (1.0 / axis.ratio);
+            }
+        }
+        for pair in &self.on_pairs {
+            self.couple(pair, x, force, &mut place[m + n..], own_rates);
+        }
+        for on_arm in &self.on_arm {
+            self.load_arm(on_arm, x, &mut force[self.n_base..n], own_rates);
+        }
+        for (joint, stiffness, damping) in &self.elastic {
+            force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
+        }
+        self.dynamics.solve(scratch);
+        place[m + n + m..].copy_from_slice(&scratch.forces()[..n]);
+    }
+
+    /// Whether the torques of the drives enter the motors' accelerations only, and as they are:
+    /// then [`Plant::change_torque`] replaces an evaluation.
+    pub fn torque_acts_on_motors_alone(&self) -> bool {
+        self.axes.iter().all(|axis| {
+            let plain = |on: &Own<S>| !on.kernel.uses_command();
+            axis.gear.is_some() && axis.on_motor.iter().all(plain)
+        })
+    }
+
+    /// Turn a derivative under torques `from` into that under `to` in the same state, where
+    /// [`Plant::torque_acts_on_motors_alone`].
+    #[inline]
+    pub fn change_torque(&self, from: &[S], to: &[S], dx: &mut [S]) {
+        let first = self.n_motors + self.chain.len();
+        for (axis, (from, to)) in self.axes.iter().zip(from.iter().zip(to)) {
+            if let Some(gear) = &axis.gear {
+                dx[first + gear.slot] += (*to - *from) * axis.inverse_motor_inertia;
+            }
+        }
+    }
+
+    /// Scratch for [`Plant::derivative`].
+    pub fn scratch(&self) -> DynamicsScratch<S> {
+        self.dynamics.scratch()
+    }
+
+    /// Motors behind rigid gears turn with their joints.
+    fn factorize_inertia(&self, scratch: &mut DynamicsScratch<S>) {
+        for axis in self.axes.iter().filter(|axis| axis.gear.is_none()) {
+            let up = 1.0 / axis.ratio;
+            scratch.add_inertia(axis.joint, axis.motor_inertia * (up * up));
+        }
+        self.dynamics.factorize(scratch);
+    }
+
+    /// Torque that effects add on each motor in state `x` [Nm].
+    pub fn motor_disturbances(&self, x: &[S], command: &[S], out: &mut [S]) {
+        for ((axis, command), out) in self.axes.iter().zip(command).zip(out.iter_mut()) {
+            let free = self.driven(axis, x, S::zero(), *command, &mut []).motor;
+            *out = free + axis.viscous_friction * self.motor_speed(axis, x);
+        }
+        for pair in &self.on_pairs {
+            let torque = pair.own.kernel.pair_torque(&self.pair_state(pair, x));
+            for (axis, torque) in pair.axes.iter().zip(torque) {
+                out[*axis] += torque.motor;
+            }
+        }
+    }
+
+    /// Torques of an axis; rates of the effects' own states go where there is room for them.
+    #[inline]
+    fn driven(
+        &self,
+        axis: &Axis<S>,
+        x: &[S],
+        applied: S,
+        command: S,
+        own_rates: &mut [S],
+    ) -> Driven<S> {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let own = &x[2 * (m + n)..];
+        let (angle, speed, gear, load) = if let Some(gear) = &axis.gear {
+            let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
+            let (mut delta, mut slope) = (angle * axis.ratio, S::constant(axis.ratio));
+            for on_gear in &axis.on_gear {
+                if let Some((error, rate)) = on_gear.kernel.transmission_error(angle) {
+                    delta += error;
+                    slope += rate;
+                }
+            }
+            delta -= x[m + axis.joint];
+            let rate = speed * slope - x[m + n + m + axis.joint];
+            let torque = axis.gear_torque(gear, delta, rate, own, own_rates);
+            (angle, speed, torque, torque * slope)
+        } else {
+            let up = 1.0 / axis.ratio;
+            let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
+            (q * up, v * up, S::zero(), S::zero())
+        };
+        let mut motor = applied - axis.viscous_friction * speed;
+        for Own { kernel, internal } in &axis.on_motor {
+            let state = Motor {
+                angle,
+                speed,
+                command,
+                load,
+                internal: &own[internal.clone()],
+            };
+            motor += kernel.motor_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.motor_rates(&state, rates);
+            }
+        }
+        Driven { motor, gear, load }
+    }
+
+    fn pair_state<'x>(&self, pair: &OnPair<S>, x: &'x [S]) -> Pair<'x, S> {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let state = |i: usize| {
+            let axis = &self.axes[i];
+            CoupledAxis {
+                motor_angle: self.motor_angle(axis, x),
+                motor_speed: self.motor_speed(axis, x),
+                joint_angle: x[m + axis.joint],
+                joint_speed: x[m + n + m + axis.joint],
+            }
+        };
+        Pair {
+            axes: pair.axes.map(state),
+            internal: &x[2 * (m + n)..][pair.own.internal.clone()],
+        }
+    }
+
+    /// Add the torques of an effect between two axes.
+    fn couple(
+        &self,
+        pair: &OnPair<S>,
+        x: &[S],
+        force: &mut [S],
+        accelerations: &mut [S],
+        own_rates: &mut [S],
+    ) {
+        let state = self.pair_state(pair, x);
+        for (i, torque) in pair.axes.iter().zip(pair.own.kernel.pair_torque(&state)) {
+            let axis = &self.axes[*i];
+            force[axis.joint] += torque.joint;
+            if let Some(gear) = &axis.gear {
+                accelerations[gear.slot] += torque.motor * axis.inverse_motor_inertia;
+            } else {
+                force[axis.joint] += torque.motor * (1.0 / axis.ratio);
+            }
+        }
+        if let Some(rates) = own_rates.get_mut(pair.own.internal.clone()) {
+            pair.own.kernel.pair_rates(&state, rates);
+        }
+    }
+
+    /// Add the forces of an effect on the arm.
+    fn load_arm(&self, on_arm: &Own<S>, x: &[S], force: &mut [S], own_rates: &mut [S]) {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let slots = self.joint_slots();
+        let arm = Arm {
+            angles: &x[slots.clone()],
+            speeds: &x[slots.start + m + n..slots.end + m + n],
+            internal: &x[2 * (m + n)..][on_arm.internal.clone()],
+        };
+        on_arm.kernel.arm_force(&arm, force);
+        if let Some(rates) = own_rates.get_mut(on_arm.internal.clone()) {
+            on_arm.kernel.arm_rates(&arm, rates);
+        }
+    }
+}
+
+/// Torques of a driven axis.
+struct Driven<S> {
+    /// Torque on the motor, without the gear.
+    motor: S,
+    /// Gear torque on the joint side.
+    gear: S,
+    /// What the motor feels of it.
+    load: S,
+}

@@ -1,0 +1,214 @@
+//! Static equilibrium: elastic joints settled under gravity, motors holding.
+
+use super::equations::Plant;
+use crate::effect::{Arm, AxisTorque, CoupledAxis, Pair};
+use axisight_scalar::Scalar;
+
+/// A plant at rest.
+#[derive(Debug, Clone)]
+pub struct Equilibrium<S> {
+    /// Angles of joints that effects put below the first one [rad].
+    pub base_angle: Vec<S>,
+    /// Angles of the robot's joints [rad].
+    pub joint_angle: Vec<S>,
+    /// Motor angles [rad].
+    pub motor_angle: Vec<S>,
+    /// Torque command that holds the arm, effects of the torque path included [Nm].
+    pub motor_torque: Vec<S>,
+}
+
+/// Why no equilibrium was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EquilibriumError {
+    /// Wrong number of driven joint angles.
+    #[error("joint_angle: expected {expected} driven joint angles, got {got}")]
+    Shape {
+        /// Driven joints.
+        expected: usize,
+        /// Angles given.
+        got: usize,
+    },
+    /// A gear cannot carry its static load, or a parameter is not finite.
+    #[error("axis {axis}: expected a gear that carries its static load, got no finite deflection")]
+    NoDeflection {
+        /// Driven axis, from 1.
+        axis: usize,
+    },
+    /// The elastic joints do not settle.
+    #[error(
+        "elastic joints do not settle under gravity (last change {change:.1e} rad): \
+         expected springs stiffer than the gravity load"
+    )]
+    NotSettled {
+        /// Last change of an elastic joint [rad].
+        change: f64,
+    },
+}
+
+impl<S: Scalar> Plant<S> {
+    /// State at rest.
+    pub fn state_at_rest(&self, rest: &Equilibrium<S>) -> Vec<S> {
+        let mut x = vec![S::zero(); self.n_states()];
+        for (axis, angle) in self.axes.iter().zip(&rest.motor_angle) {
+            if let Some(gear) = &axis.gear {
+                x[gear.slot] = *angle;
+            }
+        }
+        let joints = rest.base_angle.iter().chain(&rest.joint_angle);
+        for (x, angle) in x[self.n_motors..].iter_mut().zip(joints) {
+            *x = *angle;
+        }
+        x
+    }
+}
+
+const MAX_ITERATIONS: usize = 200;
+
+/// Equilibrium with the driven joints at `driven` [rad].
+///
+/// Fixed-point iteration `q_e = -K_e^-1 g_e(q)`; it contracts by the ratio of
+/// gravity stiffness to spring stiffness (1e-3 on the nominal robot), and
+/// derivatives carried by the scalar converge at the same rate.
+///
+/// # Errors
+/// [`EquilibriumError`] for a wrong shape or springs too soft to settle.
+#[inline(never)]
+pub fn equilibrium<S: Scalar>(
+    plant: &Plant<S>,
+    driven: &[f64],
+) -> Result<Equilibrium<S>, EquilibriumError> {
+    if driven.len() != plant.axes.len() {
+        return Err(EquilibriumError::Shape {
+            expected: plant.axes.len(),
+            got: driven.len(),
+        });
+    }
+    let n = plant.chain.len();
+    let rest = vec![S::zero(); n];
+    let mut q = rest.clone();
+    for (axis, angle) in plant.axes.iter().zip(driven) {
+        q[axis.joint] = S::constant(*angle);
+    }
+    let mut settled_for = 0;
+    let mut change = 0.0;
+    for _ in 0..MAX_ITERATIONS {
+        let mut load = plant.dynamics.evaluate(&q, &rest).bias;
+        relieve(plant, &q, &rest, &mut load);
+        change = settle_step(plant, &load, &mut q);
+        // One more iteration once the value is settled, for the derivatives.
+        settled_for = if change < 1e-16 { settled_for + 1 } else { 0 };
+        if settled_for == 3 {
+            return hold(plant, &q, &load);
+        }
+    }
+    Err(EquilibriumError::NotSettled { change })
+}
+
+/// What effects of the arm carry of the load on its joints.
+fn relieve<S: Scalar>(plant: &Plant<S>, q: &[S], rest: &[S], load: &mut [S]) {
+    let mut force = rest.to_vec();
+    for on_arm in &plant.on_arm {
+        let arm = Arm {
+            angles: &q[plant.n_base..],
+            speeds: &rest[plant.n_base..],
+            internal: &[],
+        };
+        on_arm.kernel.arm_force(&arm, &mut force[plant.n_base..]);
+    }
+    for (load, force) in load.iter_mut().zip(force) {
+        *load -= force;
+    }
+}
+
+fn settle_step<S: Scalar>(plant: &Plant<S>, load: &[S], q: &mut [S]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for (joint, stiffness, _) in &plant.elastic {
+        let next = -(load[*joint] / *stiffness);
+        for lane in 0..S::LANES {
+            let change = (next.lane(lane) - q[*joint].lane(lane)).abs();
+            // A NaN must not pass for settled.
+            largest = if change.is_nan() {
+                f64::INFINITY
+            } else {
+                largest.max(change)
+            };
+        }
+        q[*joint] = next;
+    }
+    largest
+}
+
+/// Passes over the effects between axes: what they add moves the motors by the compliance of
+/// the gears alone, so each pass gains several digits.
+const PAIR_PASSES: usize = 20;
+
+fn hold<S: Scalar>(
+    plant: &Plant<S>,
+    q: &[S],
+    load: &[S],
+) -> Result<Equilibrium<S>, EquilibriumError> {
+    let mut added = vec![AxisTorque::zero(); plant.axes.len()];
+    let mut motors = hold_axes(plant, q, load, &added)?;
+    if !plant.on_pairs.is_empty() {
+        for _ in 0..PAIR_PASSES {
+            added = pair_torques(plant, q, &motors.0);
+            motors = hold_axes(plant, q, load, &added)?;
+        }
+    }
+    let (motor_angle, motor_torque) = motors;
+    Ok(Equilibrium {
+        base_angle: q[..plant.n_base].to_vec(),
+        joint_angle: q[plant.n_base..].to_vec(),
+        motor_angle,
+        motor_torque,
+    })
+}
+
+/// Motor angles and torque commands that hold the joints; `added` is what effects between axes
+/// add.
+fn hold_axes<S: Scalar>(
+    plant: &Plant<S>,
+    q: &[S],
+    load: &[S],
+    added: &[AxisTorque<S>],
+) -> Result<(Vec<S>, Vec<S>), EquilibriumError> {
+    let mut motor_angle = Vec::with_capacity(plant.axes.len());
+    let mut motor_torque = Vec::with_capacity(plant.axes.len());
+    for (number, (axis, added)) in plant.axes.iter().zip(added).enumerate() {
+        let joint_angle = q[axis.joint];
+        let own = axis.joint_torque_of(joint_angle, S::zero());
+        let load = load[axis.joint] - own - added.joint;
+        let angle = axis.motor_angle_at_rest(joint_angle, load);
+        if (0..S::LANES).any(|lane| !angle.lane(lane).is_finite()) {
+            return Err(EquilibriumError::NoDeflection { axis: number + 1 });
+        }
+        motor_angle.push(angle);
+        let mut command = axis.motor_torque_at_rest(angle, load) - added.motor;
+        for kernel in axis.kernels.iter().rev() {
+            command = kernel.drive_inverse(command);
+        }
+        motor_torque.push(command);
+    }
+    Ok((motor_angle, motor_torque))
+}
+
+fn pair_torques<S: Scalar>(plant: &Plant<S>, q: &[S], motor_angle: &[S]) -> Vec<AxisTorque<S>> {
+    let mut added = vec![AxisTorque::zero(); plant.axes.len()];
+    let zero = S::zero();
+    for pair in &plant.on_pairs {
+        let state = Pair {
+            axes: pair.axes.map(|i| CoupledAxis {
+                motor_angle: motor_angle[i],
+                motor_speed: zero,
+                joint_angle: q[plant.axes[i].joint],
+                joint_speed: zero,
+            }),
+            internal: &[],
+        };
+        for (i, torque) in pair.axes.iter().zip(pair.own.kernel.pair_torque(&state)) {
+            added[*i].motor += torque.motor;
+            added[*i].joint += torque.joint;
+        }
+    }
+    added
+}

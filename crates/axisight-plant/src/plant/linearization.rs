@@ -1,0 +1,103 @@
+//! Linearization about an operating point, with exact derivatives.
+
+use super::build::PlantError;
+use super::equations::Plant;
+use super::equilibrium::{Equilibrium, EquilibriumError, equilibrium};
+use axisight_scalar::{Dual, Scalar};
+use nalgebra::DMatrix;
+
+/// Seeds per pass; eight partials fill two vector registers.
+pub(crate) const WIDTH: usize = 8;
+/// A number with derivatives along [`WIDTH`] states.
+pub type Seeded = Dual<f64, WIDTH>;
+type D = Seeded;
+
+/// `x' = A x + B u`, `phi = C x` around an equilibrium; states `[phi, q, phi', q']`.
+///
+/// `u` is the torque the drives deliver: effects of the torque path (gain, delay,
+/// lag) come before it and are not in `B`.
+#[derive(Debug, Clone)]
+pub struct Linearization {
+    /// State matrix, `(n_states, n_states)`.
+    pub a: DMatrix<f64>,
+    /// Input matrix from motor torque [Nm], `(n_states, n_axes)`.
+    pub b: DMatrix<f64>,
+    /// Output matrix to motor angle [rad], `(n_axes, n_states)`.
+    pub c: DMatrix<f64>,
+    /// Where the plant was linearized.
+    pub equilibrium: Equilibrium<f64>,
+}
+
+/// Why a robot cannot be linearized.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LinearizationError {
+    /// The plant cannot be built.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// No equilibrium.
+    #[error(transparent)]
+    Equilibrium(#[from] EquilibriumError),
+}
+
+/// Linearize a plant, given as it is and over dual numbers, at rest with the driven joints at
+/// `driven` [rad].
+///
+/// # Errors
+/// [`LinearizationError`] if the plant does not settle.
+pub fn linearize(
+    plain: &Plant<f64>,
+    plant: &Plant<Seeded>,
+    driven: &[f64],
+) -> Result<Linearization, LinearizationError> {
+    let rest = equilibrium(plain, driven)?;
+    let x0 = plain.state_at_rest(&rest);
+    let (nx, nu) = (plant.n_states(), plant.axes.len());
+    let applied: Vec<f64> = plain
+        .axes
+        .iter()
+        .zip(&rest.motor_torque)
+        .map(|(axis, u)| axis.kernels.iter().fold(*u, |t, k| k.drive(t)))
+        .collect();
+    let mut jacobian = DMatrix::zeros(nx, nx + nu);
+    let mut scratch = plant.scratch();
+    let mut dx = vec![D::zero(); nx];
+    for first in (0..nx + nu).step_by(WIDTH) {
+        let seed = |values: &[f64], offset: usize| -> Vec<D> {
+            let lifted = values.iter().enumerate().map(|(i, v)| {
+                let column = offset + i;
+                let inside = (first..first + WIDTH).contains(&column);
+                let constant = D::constant(*v);
+                if inside {
+                    constant.seeded(column - first)
+                } else {
+                    constant
+                }
+            });
+            lifted.collect()
+        };
+        let (x, tau, command) = (
+            seed(&x0, 0),
+            seed(&applied, nx),
+            seed(&rest.motor_torque, nx),
+        );
+        plant.derivative(&x, &tau, &command, &mut scratch, &mut dx);
+        for column in first..(first + WIDTH).min(nx + nu) {
+            for (row, d) in dx.iter().enumerate() {
+                jacobian[(row, column)] = d.partials[column - first];
+            }
+        }
+    }
+    let mut c = DMatrix::zeros(nu, nx);
+    for (row, axis) in plant.axes.iter().enumerate() {
+        match plain.motor_slot(row) {
+            Some(slot) => c[(row, slot)] = 1.0,
+            None => c[(row, plant.n_motors() + axis.joint)] = 1.0 / axis.ratio,
+        }
+    }
+    Ok(Linearization {
+        a: jacobian.columns(0, nx).into_owned(),
+        b: jacobian.columns(nx, nu).into_owned(),
+        c,
+        equilibrium: rest,
+    })
+}

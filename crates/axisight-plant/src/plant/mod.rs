@@ -1,0 +1,18 @@
+//! The plant: motors, gears and the elastic arm with the effects on them, as equations of
+//! motion; its equilibrium and its linearization.
+
+mod axis;
+mod build;
+mod equations;
+mod equilibrium;
+mod linearization;
+mod own;
+mod zoh_response;
+
+pub use axis::{Axis, Gear};
+pub use build::{PlacedKernel, PlantError};
+pub use equations::Plant;
+pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
+pub(crate) use linearization::WIDTH;
+pub use linearization::{Linearization, LinearizationError, Seeded, linearize};
+pub use zoh_response::zoh_frequency_response;

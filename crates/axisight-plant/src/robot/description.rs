@@ -1,0 +1,264 @@
+//! What a robot is: a serial chain of joints, links and drives, in SI units.
+//!
+//! The checks here are physical and know nothing of files; the reader of robot files
+//! runs them and says where in the file the fault lies.
+
+use super::setting::EffectSetting;
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// Turns about its axis; angles in rad, torques in Nm.
+    Revolute,
+    /// Slides along its axis; "angles" in m, "torques" in N.
+    Prismatic,
+}
+
+/// Spring and damper of a gearbox or an elastic joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compliance {
+    /// Stiffness, positive [Nm/rad; N/m if prismatic].
+    pub stiffness: f64,
+    /// Damping, not negative [Nm s/rad; N s/m if prismatic].
+    pub damping: f64,
+}
+
+/// Mass properties of the body that moves with a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    /// Mass, positive [kg].
+    pub mass: f64,
+    /// Centre of mass in the link frame [m].
+    pub com: [f64; 3],
+    /// Inertia about the centre of mass, link axes: Ixx Iyy Izz Ixy Ixz Iyz,
+    /// positive definite [kg m^2].
+    pub inertia: [f64; 6],
+}
+
+/// Motor and gear of a driven joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// Joint angle per motor angle, not zero; negative if the joint turns the
+    /// other way [rad/rad; m/rad if prismatic].
+    pub gear_ratio: f64,
+    /// Motor inertia, motor side; positive, or zero with a rigid transmission [kg m^2].
+    pub motor_inertia: f64,
+    /// Viscous friction, motor side, not negative [Nm s/rad].
+    pub viscous_friction: f64,
+}
+
+/// One joint of the chain and the link it moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Name, unique in the robot.
+    pub name: String,
+    /// How the joint moves.
+    pub motion: Motion,
+    /// Position of the joint in the parent link's frame [m].
+    pub origin: [f64; 3],
+    /// Unit vector of the axis in the parent link's frame [1].
+    pub axis: [f64; 3],
+    /// Gearbox of a driven joint, spring of an elastic one; `None` is a rigid
+    /// transmission, which only a driven joint can have.
+    pub compliance: Option<Compliance>,
+    /// Body that moves with the joint; `None` is massless.
+    pub link: Option<Link>,
+    /// Motor and gear: `Some` exactly for a driven joint.
+    pub drive: Option<Drive>,
+}
+
+/// Controller of the robot, one gain per driven joint, motor side.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Controller {
+    /// `u = u_ff + kp (w_ref - w) + ki (phi_ref - phi)`.
+    PiVelocity {
+        /// Velocity gain [Nm s/rad].
+        kp: Vec<f64>,
+        /// Integral gain of the velocity error [Nm/rad].
+        ki: Vec<f64>,
+    },
+    /// Velocity loop without integral action.
+    PVelocity {
+        /// Velocity gain [Nm s/rad].
+        kp: Vec<f64>,
+    },
+    /// Position P loop around a velocity PI loop.
+    Cascade {
+        /// Position gain [1/s].
+        kv: Vec<f64>,
+        /// Velocity gain [Nm s/rad].
+        kp: Vec<f64>,
+        /// Integral gain of the velocity error, zero for a velocity P loop [Nm/rad].
+        ki: Vec<f64>,
+    },
+    /// No controller: logs are torque-driven only.
+    None,
+}
+
+/// A serial robot, base to tip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotDescription {
+    /// Name for people.
+    pub name: String,
+    /// Gravity in the base frame [m/s^2].
+    pub gravity: [f64; 3],
+    /// Sample time of controller and log, positive [s].
+    pub sample_time: f64,
+    /// Joints in chain order; link `i` moves with joint `i`.
+    pub joints: Vec<Joint>,
+    /// Controller.
+    pub controller: Controller,
+    /// Standard deviation of the white noise on motor positions, per sample [rad].
+    pub position_noise_std: f64,
+    /// Angles of the driven joints at the operating point, in chain order
+    /// [rad; m if prismatic].
+    pub operating_point: Vec<f64>,
+    /// Effects that the simulator of this robot has.
+    pub effects: Vec<EffectSetting<f64>>,
+    /// Relative standard deviation of the robot's own parameters by quantity, where stated.
+    pub tolerances: Vec<(String, f64)>,
+}
+
+impl RobotDescription {
+    /// Number of joints, driven and elastic.
+    pub fn n_joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Driven joints in chain order, each with its 0-based place in the chain
+    /// and its drive.
+    pub fn driven(&self) -> impl Iterator<Item = (usize, &Joint, &Drive)> {
+        self.joints
+            .iter()
+            .enumerate()
+            .filter_map(|(i, joint)| joint.drive.as_ref().map(|drive| (i, joint, drive)))
+    }
+
+    /// The robot's own effects that none of `settings` replaces.
+    pub fn effects_beside<S>(
+        &self,
+        settings: &[EffectSetting<S>],
+    ) -> impl Iterator<Item = &EffectSetting<f64>> {
+        let kept = move |own: &&EffectSetting<f64>| !settings.iter().any(|s| s.replaces(own));
+        self.effects.iter().filter(kept)
+    }
+
+    /// The robot without effects of its own, and all effects that act when `settings` are
+    /// added to its own.
+    #[must_use]
+    pub fn with_all_effects(
+        &self,
+        settings: &[EffectSetting<f64>],
+    ) -> (Self, Vec<EffectSetting<f64>>) {
+        let mut all: Vec<_> = self.effects_beside(settings).cloned().collect();
+        all.extend_from_slice(settings);
+        let bare = Self {
+            effects: Vec::new(),
+            ..self.clone()
+        };
+        (bare, all)
+    }
+
+    /// Number of driven joints.
+    pub fn n_axes(&self) -> usize {
+        self.driven().count()
+    }
+
+    /// The last joint that moves no inertia at all, which would make the
+    /// inertia matrix singular in every pose.
+    pub fn joint_without_inertia(&self) -> Option<usize> {
+        let last_mass = self.joints.iter().rposition(|joint| joint.link.is_some());
+        let singular = self
+            .joints
+            .iter()
+            .rposition(|joint| !joint.carries_inertia());
+        singular.filter(|joint| last_mass.is_none_or(|mass| *joint > mass))
+    }
+
+    /// The first pair of joints (earlier, later) that share a name.
+    pub fn duplicate_name(&self) -> Option<(usize, usize)> {
+        self.joints.iter().enumerate().find_map(|(later, joint)| {
+            let earlier = self.joints.iter().take(later);
+            let earlier = earlier
+                .map(|other| &other.name)
+                .position(|name| *name == joint.name);
+            earlier.map(|earlier| (earlier, later))
+        })
+    }
+}
+
+impl Joint {
+    /// Whether the joint moves a mass of its own, or a rotor through a rigid
+    /// transmission.
+    fn carries_inertia(&self) -> bool {
+        let has_rotor = |drive: &Drive| drive.motor_inertia > 0.0;
+        let rigid = self.compliance.is_none();
+        self.link.is_some() || (rigid && self.drive.as_ref().is_some_and(has_rotor))
+    }
+}
+
+/// What a number may be, beyond finite.
+#[derive(Debug, Clone, Copy)]
+pub enum Bound {
+    /// Any sign.
+    Any,
+    /// Above zero.
+    Positive,
+    /// Zero or above.
+    NotNegative,
+    /// Either sign, not zero.
+    NotZero,
+}
+
+impl Bound {
+    /// Whether `x` is finite and within the bound.
+    pub fn allows(self, x: f64) -> bool {
+        x.is_finite()
+            && match self {
+                Self::Any => true,
+                Self::Positive => x > 0.0,
+                Self::NotNegative => x >= 0.0,
+                Self::NotZero => x != 0.0,
+            }
+    }
+
+    /// The bound in words, for "expected ...".
+    pub fn describe(self, unit: &str) -> String {
+        let kind = match self {
+            Self::Any => "a finite number",
+            Self::Positive => "a positive number",
+            Self::NotNegative => "a number not below zero",
+            Self::NotZero => "a number other than zero",
+        };
+        format!("{kind} [{unit}]")
+    }
+}
+
+/// Whether a vector is of unit length to `tolerance`; if not, its length.
+///
+/// # Errors
+/// The length that is not one.
+pub fn check_unit(axis: &[f64; 3], tolerance: f64) -> Result<(), f64> {
+    let [x, y, z] = *axis;
+    let norm = x.hypot(y).hypot(z);
+    if (norm - 1.0).abs() <= tolerance {
+        Ok(())
+    } else {
+        Err(norm)
+    }
+}
+
+/// Whether the symmetric matrix xx yy zz xy xz yz is positive definite.
+///
+/// The pivots of its `L D L^T` decomposition must be positive by more than
+/// rounding: a singular matrix with decimal entries has a last pivot of either
+/// sign near 1e-16.
+pub fn is_positive_definite(matrix: &[f64; 6]) -> bool {
+    let [xx, yy, zz, xy, xz, yz] = *matrix;
+    let rounding = 1e-14 * xx.max(yy).max(zz);
+    let second = yy - xy / xx * xy;
+    let coupling = yz - xy / xx * xz;
+    let third = zz - xz / xx * xz - coupling / second * coupling;
+    // Written so that a NaN pivot, from a zero one before it, fails as well.
+    [xx, second, third].iter().all(|pivot| *pivot > rounding)
+}

@@ -1,0 +1,535 @@
+//! The chain's equations of motion in the form the integrators call: hot, and nothing else.
+//!
+//! What depends on the joint angles alone comes first: joint axes, masses and the inertia
+//! matrix (composite rigid bodies). The rates then give bias forces (recursive Newton-Euler),
+//! as often as they change at the same angles. Featherstone (2008), *Rigid Body Dynamics
+//! Algorithms*, chapters 5 and 6. All of it is in base-frame axes about the base origin, so
+//! that sums, crosses and inner products are all that is left of it. Massless links and
+//! coinciding joints, common in elastic robot models, are skipped. The nominal robot
+//! (7 joints, 3 bodies) takes about 1,400 multiply-adds, 350 of them for the rates.
+//!
+//! Code is made for a few numbers of joints, so that its loops become straight lines; a chain
+//! just below one of them is padded with joints that move nothing. Longer chains, and numbers
+//! with derivatives, whose arithmetic hides the loops, share the code for any number.
+
+use super::chain::{Body, Chain, ChainJoint};
+use super::description::Motion;
+use super::linear_algebra::{factorize, solve_factorized};
+use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};
+use axisight_scalar::Scalar;
+use std::array::from_fn;
+
+/// How a joint moves its link, coordinate axes told apart because they cost a third.
+#[derive(Debug, Clone, Copy)]
+enum Turn {
+    X { reversed: bool },
+    Y { reversed: bool },
+    Z { reversed: bool },
+    About([f64; 3]),
+    Along([f64; 3]),
+}
+
+impl Turn {
+    fn new(motion: Motion, axis: [f64; 3]) -> Self {
+        match (motion, axis) {
+            (Motion::Prismatic, _) => Self::Along(axis),
+            (Motion::Revolute, [x, 0.0, 0.0]) => Self::X { reversed: x < 0.0 },
+            (Motion::Revolute, [0.0, y, 0.0]) => Self::Y { reversed: y < 0.0 },
+            (Motion::Revolute, [0.0, 0.0, z]) => Self::Z { reversed: z < 0.0 },
+            (Motion::Revolute, _) => Self::About(axis),
+        }
+    }
+}
+
+/// Mass, first and second moment of links about a point [kg, kg m, kg m^2].
+#[derive(Debug, Clone, Copy)]
+struct Moments<S> {
+    mass: S,
+    first: Vec3<S>,
+    second: [S; 6],
+}
+
+impl<S: Scalar> Moments<S> {
+    fn zero() -> Self {
+        Self {
+            mass: S::zero(),
+            first: Vec3::zero(),
+            second: [S::zero(); 6],
+        }
+    }
+
+    /// Of a link about its joint, in link axes.
+    fn of(body: &Body<S>) -> Self {
+        let com = Vec3(body.com);
+        let mut second = body.inertia;
+        shift_inertia(&mut second, &com, &Vec3::zero(), body.mass);
+        Self {
+            mass: body.mass,
+            first: com.scale(body.mass),
+            second,
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.first += other.first;
+        for (a, b) in self.second.iter_mut().zip(&other.second) {
+            *a += *b;
+        }
+    }
+
+    /// Wrench that accelerates the links by a unit motion.
+    #[inline(always)]
+    fn wrench(&self, motion: &Screw<S>) -> Screw<S> {
+        let spun = Mat3::symmetric(&self.second).apply(&motion.angular);
+        let pushed = motion.linear.scale(self.mass);
+        Screw {
+            angular: self.first.cross_add(&motion.linear, &spun),
+            linear: motion.angular.cross_add(&self.first, &pushed),
+        }
+    }
+
+    /// Refer the moments to a point that lies at `-d` from the present one.
+    #[inline(always)]
+    fn shift(&mut self, d: &Vec3<S>) {
+        shift_inertia(&mut self.second, d, &self.first, self.mass);
+        self.first = d.scale_add(self.mass, &self.first);
+    }
+}
+
+/// One joint and the link it moves, ready for the sweeps.
+#[derive(Debug, Clone)]
+struct Segment<S> {
+    turn: Turn,
+    origin: Option<[f64; 3]>,
+    body: Option<Moments<S>>,
+}
+
+impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
+    fn from(joint: &ChainJoint<S>) -> Self {
+        Self {
+            turn: Turn::new(joint.motion, joint.axis),
+            origin: joint.origin,
+            body: joint.body.as_ref().map(Moments::of),
+        }
+    }
+}
+
+/// Equations of motion of a chain at its present mass properties.
+#[derive(Debug, Clone)]
+pub struct Dynamics<S> {
+    gravity: [S; 3],
+    segments: Vec<Segment<S>>,
+}
+
+/// A motion (turn, shift) or a wrench (moment, force) about the base origin.
+#[derive(Debug, Clone, Copy)]
+struct Screw<S> {
+    angular: Vec3<S>,
+    linear: Vec3<S>,
+}
+
+impl<S: Scalar> Screw<S> {
+    fn zero() -> Self {
+        Self {
+            angular: Vec3::zero(),
+            linear: Vec3::zero(),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.angular += other.angular;
+        self.linear += other.linear;
+    }
+
+    #[inline(always)]
+    fn scale(&self, s: S) -> Self {
+        Self {
+            angular: self.angular.scale(s),
+            linear: self.linear.scale(s),
+        }
+    }
+
+    /// `sum +=` the rate at which a motion fixed in a body that moves with `self` turns.
+    #[inline(always)]
+    fn turn_add(&self, motion: &Self, sum: &mut Self) {
+        sum.angular = self.angular.cross_add(&motion.angular, &sum.angular);
+        sum.linear = self.angular.cross_add(&motion.linear, &sum.linear);
+        sum.linear = self.linear.cross_add(&motion.angular, &sum.linear);
+    }
+
+    /// `sum +=` the same of a momentum or wrench.
+    #[inline(always)]
+    fn turn_momentum_add(&self, momentum: &Self, sum: &mut Self) {
+        sum.angular = self.angular.cross_add(&momentum.angular, &sum.angular);
+        sum.angular = self.linear.cross_add(&momentum.linear, &sum.angular);
+        sum.linear = self.angular.cross_add(&momentum.linear, &sum.linear);
+    }
+
+    /// Power of a wrench along a motion.
+    #[inline(always)]
+    fn dot(&self, other: &Self) -> S {
+        let angular = self.angular.dot(&other.angular);
+        self.linear.dot_add(&other.linear, angular)
+    }
+}
+
+/// Scratch and results of one evaluation, padded to a compiled size.
+#[derive(Debug, Clone)]
+pub struct DynamicsScratch<S> {
+    /// Inertia matrix M(q): entry (i, j) for `i <= j`, row-major. Padding has unit inertia.
+    inertia: Vec<S>,
+    /// Coriolis, centrifugal and gravity forces `c(q, q') + g(q)`; zero for padding.
+    bias: Vec<S>,
+    angles: Vec<S>,
+    trigonometry: Vec<(S, S)>,
+    axes: Vec<Screw<S>>,
+    /// Of the links, about the base origin in base axes.
+    moments: Vec<Moments<S>>,
+    wrenches: Vec<Screw<S>>,
+}
+
+/// The scratch at the size of the code that uses it.
+struct Sized<'a, S> {
+    /// Number of joints with padding: a constant where the code is made for it.
+    size: usize,
+    inertia: &'a mut [S],
+    bias: &'a mut [S],
+    angles: &'a mut [S],
+    trigonometry: &'a mut [(S, S)],
+    axes: &'a mut [Screw<S>],
+    moments: &'a mut [Moments<S>],
+    wrenches: &'a mut [Screw<S>],
+}
+
+impl<S: Scalar> DynamicsScratch<S> {
+    /// Forces on the joints, padding included: bias forces after [`Dynamics::add_rates`],
+    /// accelerations after [`Dynamics::solve`].
+    pub fn forces(&mut self) -> &mut [S] {
+        &mut self.bias
+    }
+
+    /// Add the inertia of a rotor that turns with a joint, before [`Dynamics::factorize`].
+    pub fn add_inertia(&mut self, joint: usize, inertia: S) {
+        let n = self.bias.len();
+        if let Some(entry) = self.inertia.get_mut(joint * n + joint) {
+            *entry += inertia;
+        }
+    }
+
+    #[inline(always)]
+    fn sized<const N: usize>(&mut self) -> Sized<'_, S> {
+        let size = if N == ANY { self.bias.len() } else { N };
+        Sized {
+            size,
+            inertia: &mut self.inertia[..size * size],
+            bias: &mut self.bias[..size],
+            angles: &mut self.angles[..size],
+            trigonometry: &mut self.trigonometry[..size],
+            axes: &mut self.axes[..size],
+            moments: &mut self.moments[..size],
+            wrenches: &mut self.wrenches[..size],
+        }
+    }
+}
+
+/// Inertia matrix and bias forces for callers that are in no hurry.
+#[derive(Debug, Clone)]
+pub struct DynamicsState<S> {
+    /// Inertia matrix M(q), row-major `n * n`.
+    pub inertia: Vec<S>,
+    /// Coriolis, centrifugal and gravity forces `c(q, q') + g(q)`.
+    pub bias: Vec<S>,
+}
+
+/// Longest chain that can be simulated.
+pub const MOST_JOINTS: usize = 32;
+
+/// Code for any number of joints.
+const ANY: usize = 0;
+
+/// Call `$method::<N>($arguments)` for the smallest compiled size that holds `$n` joints.
+macro_rules! sized {
+    ($n:expr, $object:ident . $method:ident ( $($argument:expr),* )) => {
+        if const { S::PARTIALS > 0 } {
+            $object.$method::<ANY>($($argument),*)
+        } else {
+            match $n {
+                0..=1 => $object.$method::<1>($($argument),*),
+                2..=3 => $object.$method::<3>($($argument),*),
+                4..=7 => $object.$method::<7>($($argument),*),
+                _ => $object.$method::<ANY>($($argument),*),
+            }
+        }
+    };
+}
+
+/// Where a link is.
+struct Frame<S> {
+    columns: [Vec3<S>; 3],
+    position: Vec3<S>,
+}
+
+impl<S: Scalar> Dynamics<S> {
+    /// Equations of motion of `chain`.
+    pub fn new(chain: &Chain<S>) -> Self {
+        Self {
+            gravity: chain.gravity,
+            segments: chain.joints.iter().map(Segment::from).collect(),
+        }
+    }
+
+    /// Number of joints.
+    pub fn len(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// Whether the chain has no joints.
+    pub fn is_empty(&self) -> bool {
+        self.segments.is_empty()
+    }
+
+    /// Inertia matrix and bias forces at joint angles `q` [rad or m] and rates `v`.
+    #[inline(never)]
+    pub fn evaluate(&self, q: &[S], v: &[S]) -> DynamicsState<S> {
+        let n = self.len();
+        let mut scratch = self.scratch();
+        self.place(q, &mut scratch);
+        self.add_rates(v, &mut scratch);
+        let padded = scratch.bias.len();
+        let entry = |i: usize, j: usize| scratch.inertia[i.min(j) * padded + i.max(j)];
+        DynamicsState {
+            inertia: (0..n * n).map(|k| entry(k / n, k % n)).collect(),
+            bias: scratch.bias[..n].to_vec(),
+        }
+    }
+
+    /// Accelerations of the joints under forces `tau` [Nm or N].
+    pub fn accelerate(&self, q: &[S], v: &[S], tau: &[S]) -> Vec<S> {
+        let mut scratch = self.scratch();
+        self.place(q, &mut scratch);
+        self.add_rates(v, &mut scratch);
+        self.factorize(&mut scratch);
+        for (i, f) in scratch.bias.iter_mut().enumerate() {
+            *f = tau.get(i).map_or_else(S::zero, |t| *t - *f);
+        }
+        self.solve(&mut scratch);
+        scratch.bias[..self.len()].to_vec()
+    }
+
+    /// Scratch for an evaluation.
+    pub fn scratch(&self) -> DynamicsScratch<S> {
+        let n = sized!(self.len(), self.padded_size());
+        DynamicsScratch {
+            inertia: vec![S::zero(); n * n],
+            bias: vec![S::zero(); n],
+            angles: vec![S::zero(); n],
+            trigonometry: vec![(S::zero(), S::zero()); n],
+            axes: vec![Screw::zero(); n],
+            moments: vec![Moments::zero(); n],
+            wrenches: vec![Screw::zero(); n],
+        }
+    }
+
+    fn padded_size<const N: usize>(&self) -> usize {
+        if N == ANY { self.len() } else { N }
+    }
+
+    /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
+    pub fn place(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.place_sized(q, scratch));
+    }
+
+    /// Bias forces at rates `v` and the angles last placed.
+    pub fn add_rates(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.add_rates_sized(v, scratch));
+    }
+
+    /// Factors of the inertia matrix, in its place.
+    pub fn factorize(&self, scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.factorize_sized(scratch));
+    }
+
+    /// Forces to accelerations, with the factors of the inertia matrix.
+    pub fn solve(&self, scratch: &mut DynamicsScratch<S>) {
+        sized!(self.len(), self.solve_sized(scratch));
+    }
+
+    #[inline(never)]
+    #[allow(clippy::unused_self)] // called like the other sized methods
+    fn factorize_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
+        let sized = scratch.sized::<N>();
+        factorize(sized.inertia, sized.size);
+    }
+
+    #[inline(never)]
+    #[allow(clippy::unused_self)]
+    fn solve_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
+        let sized = scratch.sized::<N>();
+        solve_factorized(sized.inertia, sized.bias, sized.size);
+    }
+
+    #[inline(never)]
+    fn place_sized<const N: usize>(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
+        for (angle, q) in scratch.angles.iter_mut().zip(q) {
+            *angle = *q;
+        }
+        let mut sized = scratch.sized::<N>();
+        self.sweep_out(&mut sized);
+        self.compose(&mut sized);
+    }
+
+    #[inline(never)]
+    fn add_rates_sized<const N: usize>(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+        let sized = scratch.sized::<N>();
+        let mut velocity = Screw::zero();
+        // Gravity is an acceleration of the base.
+        let mut acceleration = Screw {
+            angular: Vec3::zero(),
+            linear: Vec3(self.gravity.map(|g| -g)),
+        };
+        for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(sized.size) {
+            let motion = sized.axes[i].scale(*v);
+            velocity.turn_add(&motion, &mut acceleration);
+            velocity.add(&motion);
+            if segment.body.is_some() {
+                let moments = &sized.moments[i];
+                let mut wrench = moments.wrench(&acceleration);
+                velocity.turn_momentum_add(&moments.wrench(&velocity), &mut wrench);
+                sized.wrenches[i] = wrench;
+            }
+        }
+        let mut tip = Screw::zero();
+        for (i, segment) in self.segments.iter().enumerate().take(sized.size).rev() {
+            if segment.body.is_some() {
+                tip.add(&sized.wrenches[i]);
+            }
+            sized.bias[i] = sized.axes[i].dot(&tip);
+        }
+    }
+
+    #[inline(always)]
+    fn sweep_out(&self, sized: &mut Sized<'_, S>) {
+        S::sin_cos_each(sized.angles, sized.trigonometry);
+        let mut frame = Frame::base();
+        for (i, segment) in self.segments.iter().enumerate().take(sized.size) {
+            if let Some(origin) = &segment.origin {
+                frame.position += frame.apply_constant(origin);
+            }
+            let (turned, screw) = (sized.trigonometry[i], &mut sized.axes[i]);
+            match segment.turn {
+                Turn::X { reversed } => frame.turn::<0>(reversed, turned, screw),
+                Turn::Y { reversed } => frame.turn::<1>(reversed, turned, screw),
+                Turn::Z { reversed } => frame.turn::<2>(reversed, turned, screw),
+                Turn::About(axis) => frame.turn_about(&axis, turned, screw),
+                Turn::Along(axis) => frame.slide(&axis, sized.angles[i], screw),
+            }
+            if let Some(body) = &segment.body {
+                sized.moments[i] = frame.moments(body);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn compose(&self, sized: &mut Sized<'_, S>) {
+        let mut tip = Moments::zero();
+        // The wrench on everything outwards for a unit acceleration of each joint.
+        for (i, segment) in self.segments.iter().enumerate().take(sized.size).rev() {
+            if segment.body.is_some() {
+                tip.add(&sized.moments[i]);
+            }
+            sized.wrenches[i] = tip.wrench(&sized.axes[i]);
+        }
+        let n = sized.size;
+        for i in 0..n {
+            for j in i..n {
+                sized.inertia[i * n + j] = sized.axes[i].dot(&sized.wrenches[j]);
+            }
+        }
+        for i in self.len()..n {
+            sized.inertia[i * n + i] = S::one();
+        }
+    }
+}
+
+impl<S: Scalar> Frame<S> {
+    #[inline(always)]
+    fn base() -> Self {
+        let (zero, one) = (S::zero(), S::one());
+        Self {
+            columns: [
+                Vec3([one, zero, zero]),
+                Vec3([zero, one, zero]),
+                Vec3([zero, zero, one]),
+            ],
+            position: Vec3::zero(),
+        }
+    }
+
+    /// Turn about column `K`; `screw` becomes the axis.
+    #[inline(always)]
+    fn turn<const K: usize>(&mut self, reversed: bool, (s, c): (S, S), screw: &mut Screw<S>) {
+        let (axis, s) = if reversed {
+            (self.columns[K].negate(), -s)
+        } else {
+            (self.columns[K], s)
+        };
+        let (a, b) = (self.columns[(K + 1) % 3], self.columns[(K + 2) % 3]);
+        self.columns[(K + 1) % 3] = b.scale_add(s, &a.scale(c));
+        self.columns[(K + 2) % 3] = a.scale_sub(s, &b.scale(c));
+        screw.angular = axis;
+        screw.linear = self.position.cross(&axis);
+    }
+
+    #[inline(never)]
+    fn turn_about(&mut self, axis: &[f64; 3], (s, c): (S, S), screw: &mut Screw<S>) {
+        let turned = rotation(axis, s, c);
+        let axis = self.apply_constant(axis);
+        let r = self.matrix();
+        self.columns = from_fn(|j| r.apply(&Vec3(from_fn(|i| turned[i][j]))));
+        screw.angular = axis;
+        screw.linear = self.position.cross(&axis);
+    }
+
+    #[inline(never)]
+    fn slide(&mut self, axis: &[f64; 3], q: S, screw: &mut Screw<S>) {
+        let axis = self.apply_constant(axis);
+        self.position += axis.scale(q);
+        screw.angular = Vec3::zero();
+        screw.linear = axis;
+    }
+
+    /// The vector with constant components in this frame; zero components cost nothing.
+    #[inline(always)]
+    fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
+        let mut out = Vec3::zero();
+        for (column, x) in self.columns.iter().zip(v) {
+            if *x != 0.0 {
+                out = column.scale_add(S::constant(*x), &out);
+            }
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn matrix(&self) -> Mat3<S> {
+        let [x, y, z] = &self.columns;
+        let row = |i: usize| [x.0[i], y.0[i], z.0[i]];
+        Mat3([row(0), row(1), row(2)])
+    }
+
+    /// Moments of a link about the base origin.
+    #[inline(always)]
+    fn moments(&self, body: &Moments<S>) -> Moments<S> {
+        let r = self.matrix();
+        let mut moments = Moments {
+            mass: body.mass,
+            first: r.apply(&body.first),
+            second: rotate_inertia(&r, &body.second),
+        };
+        moments.shift(&self.position);
+        moments
+    }
+}

@@ -1,0 +1,18 @@
+//! The arm: its description, its chain and the rigid-body algorithms on it.
+
+mod chain;
+pub mod description;
+mod dynamics;
+mod linear_algebra;
+mod parameters;
+mod rigid_body;
+mod setting;
+mod vector;
+
+pub use chain::{Body, Chain, ChainJoint, Pose};
+pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
+pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
+pub use parameters::{Parameter, ParameterError};
+pub use rigid_body::{RigidBody, ShapeError};
+pub use setting::{EffectSetting, Place};
+pub use vector::{Mat3, Vec3};

@@ -1,0 +1,356 @@
+//! The sampled loop: measure, command, integrate to the next sample.
+
+use super::controller::ControlLoop;
+use super::method::{Interval, Method, Stepper};
+use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
+use crate::effect::EffectError;
+use crate::plant::{EquilibriumError, Plant, equilibrium};
+use crate::robot::Controller;
+use axisight_scalar::Scalar;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What drives a run; arrays are row-major `(n_samples, n_axes)`, one per lane.
+#[derive(Debug, Clone, Copy)]
+pub enum Drive<'a> {
+    /// Motor-side velocity references through the controller [rad/s].
+    Reference(&'a [&'a [f64]]),
+    /// Commanded torques, no controller [Nm].
+    Torque(&'a [&'a [f64]]),
+    /// A logged run: its commanded torques [Nm], plus what the controller's feedback adds
+    /// to keep the simulation on the logged positions [rad]. In a linear loop the added
+    /// torque is what a run driven by references would be off by; in a nonlinear one the
+    /// simulation also stays in phase with the log (lost motion, stiction).
+    Tracking {
+        /// Logged torque commands.
+        torque: &'a [&'a [f64]],
+        /// Logged motor positions.
+        position: &'a [&'a [f64]],
+    },
+}
+
+/// A run to simulate.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// Controller of the robot.
+    pub controller: &'a Controller,
+    /// Sample time [s].
+    pub sample_time: f64,
+    /// Driven joint angles at the start [rad].
+    pub start: &'a [f64],
+    /// References or torques; a lane shorter than the longest is held at zero.
+    pub drive: Drive<'a>,
+    /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
+    pub noise: &'a [&'a [f64]],
+    /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
+    pub method: Method,
+    /// Step of the position sensor [rad]; zero for none.
+    pub resolution: f64,
+    /// Set by another thread to end the run early.
+    pub cancel: Option<&'a AtomicBool>,
+}
+
+/// One sample as the log sees it, and the truth behind it.
+#[derive(Debug)]
+pub struct Sample<'a, S> {
+    /// Sample number.
+    pub index: usize,
+    /// Commanded motor torque [Nm].
+    pub command: &'a [S],
+    /// Measured motor position [rad].
+    pub measured: &'a [S],
+    /// Torque added on the motor by ripple, friction and other effects [Nm].
+    pub torque_disturbance: &'a [S],
+    /// Error of the position measurement, noise included [rad].
+    pub position_disturbance: &'a [S],
+    /// State `[phi, q, phi', q']`.
+    pub state: &'a [S],
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// All samples were simulated.
+    Completed,
+    /// A state became infinite or NaN at this sample: the loop is unstable.
+    Diverged(usize),
+    /// The error bound could not be met at this sample: the plant is too stiff for an
+    /// explicit method or a parameter is far off.
+    StepSizeCollapsed(usize),
+    /// The run was cancelled before this sample.
+    Cancelled(usize),
+}
+
+/// Misuse of the simulation.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// The arm does not settle.
+    #[error(transparent)]
+    Equilibrium(#[from] EquilibriumError),
+    /// An array has the wrong size.
+    #[error("{field}: expected {expected}, got {got}")]
+    Shape {
+        /// Argument.
+        field: &'static str,
+        /// What it should be.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// An implicit method without the Jacobian of [`Stepper::with_jacobian`].
+    #[error(
+        "method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}"
+    )]
+    NoJacobian(Method),
+    /// A reference-driven run needs a controller.
+    #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
+    NoController,
+    /// An effect is misused.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+/// Simulate until the longest lane ends; `observe` sees every sample.
+///
+/// # Errors
+/// [`SimulationError`] for misuse; trouble during the run is a [`Status`].
+#[inline(never)]
+pub fn simulate<S: Scalar>(
+    plant: &Plant<S>,
+    run: &Run<'_>,
+    stepper: &mut Stepper<S>,
+    observe: &mut dyn FnMut(&Sample<'_, S>),
+) -> Result<Status, SimulationError> {
+    let n_axes = plant.axes.len();
+    let n_samples = check(run, n_axes, S::LANES)?;
+    if run.method.may_be_implicit() && !stepper.has_jacobian() {
+        return Err(SimulationError::NoJacobian(run.method));
+    }
+    let rest = equilibrium(plant, run.start)?;
+    stepper.begin();
+    let mut x = plant.state_at_rest(&rest);
+    let mut controller = ControlLoop::new(
+        run.controller,
+        run.sample_time,
+        &rest.motor_angle,
+        &rest.motor_torque,
+    );
+    let mut paths: Vec<_> = plant
+        .axes
+        .iter()
+        .zip(&rest.motor_torque)
+        .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
+        .collect();
+    let mut signals = Signals::new(n_axes);
+    let mut buffers = TorqueBuffers::new(n_axes);
+    for k in 0..n_samples {
+        if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            return Ok(Status::Cancelled(k));
+        }
+        signals.measure(plant, run, k, &x);
+        signals.command(run, k, &mut controller);
+        signals.disturb(plant, &x);
+        observe(&signals.sample(k, &x));
+        let interval = Interval {
+            plant,
+            command: &signals.command,
+            sample_time: run.sample_time,
+        };
+        let mut torque = SampleTorque::new(&mut paths, &signals.command, &mut buffers);
+        let met = interval.advance(run.method, &mut x, stepper, &mut torque);
+        torque.finish();
+        if x.iter()
+            .any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite()))
+        {
+            return Ok(Status::Diverged(k));
+        }
+        if !met {
+            return Ok(Status::StepSizeCollapsed(k));
+        }
+    }
+    Ok(Status::Completed)
+}
+
+/// Signals of the current sample.
+pub struct Signals<S> {
+    /// Measured motor positions [rad].
+    pub measured: Vec<S>,
+    /// Commanded torques [Nm].
+    pub command: Vec<S>,
+    reference: Vec<S>,
+    /// Torque that effects add on the motors [Nm].
+    pub torque_disturbance: Vec<S>,
+    /// Error of the measured positions, noise included [rad].
+    pub position_disturbance: Vec<S>,
+}
+
+impl<S: Scalar> Signals<S> {
+    /// All zero.
+    pub fn new(n_axes: usize) -> Self {
+        let zeros = vec![S::zero(); n_axes];
+        Self {
+            measured: zeros.clone(),
+            command: zeros.clone(),
+            reference: zeros.clone(),
+            torque_disturbance: zeros.clone(),
+            position_disturbance: zeros,
+        }
+    }
+
+    fn measure(&mut self, plant: &Plant<S>, run: &Run<'_>, k: usize, x: &[S]) {
+        for (i, axis) in plant.axes.iter().enumerate() {
+            let angle = plant.motor_angle(axis, x);
+            let mut error = lane_value(run.noise, k, i, plant.axes.len());
+            for kernel in &axis.kernels {
+                error += kernel.sensor(angle);
+            }
+            self.read(i, angle, error, run.resolution);
+        }
+    }
+
+    /// Reading of an axis at motor angle `angle`, to the nearest step of the sensor.
+    #[inline(always)]
+    pub fn read(&mut self, axis: usize, angle: S, mut error: S, resolution: f64) {
+        if resolution > 0.0 {
+            let exact = angle + error;
+            // Rounding is flat between its jumps: derivatives pass as if it were not there.
+            error += S::from_lanes(|lane| {
+                let x = exact.lane(lane);
+                (x / resolution).round_ties_even() * resolution - x
+            });
+        }
+        self.position_disturbance[axis] = error;
+        self.measured[axis] = angle + error;
+    }
+
+    /// The command of sample `k`, from what was measured.
+    #[inline(always)]
+    pub fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
+        let n = self.command.len();
+        match run.drive {
+            Drive::Torque(torque) => {
+                for i in 0..n {
+                    self.command[i] = lane_value(torque, k, i, n);
+                }
+            }
+            Drive::Tracking { torque, position } => {
+                for i in 0..n {
+                    self.reference[i] = lane_value(position, k, i, n);
+                    self.command[i] = lane_value(torque, k, i, n);
+                }
+                controller.follow(&self.measured, &self.reference, &mut self.command);
+            }
+            Drive::Reference(reference) => {
+                for i in 0..n {
+                    self.reference[i] = lane_value(reference, k, i, n);
+                }
+                controller.command(&self.measured, &self.reference, &mut self.command);
+            }
+        }
+    }
+
+    /// Torque that effects add on the motors in the present state.
+    fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
+        plant.motor_disturbances(x, &self.command, &mut self.torque_disturbance);
+    }
+
+    /// What an observer sees at sample `index` in state `x`.
+    pub fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
+        Sample {
+            index,
+            command: &self.command,
+            measured: &self.measured,
+            torque_disturbance: &self.torque_disturbance,
+            position_disturbance: &self.position_disturbance,
+            state: x,
+        }
+    }
+}
+
+/// Entry `(k, axis)` of each lane's array; zero beyond its end or without arrays.
+#[inline(always)]
+pub fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
+    S::from_lanes(|lane| {
+        let array = arrays.get(lane).or_else(|| arrays.last());
+        array
+            .and_then(|a| a.get(k * n_axes + axis))
+            .copied()
+            .unwrap_or(0.0)
+    })
+}
+
+/// Number of samples of a run of `n_axes` axes in at most `lanes` lanes.
+///
+/// # Errors
+/// [`SimulationError`] naming the field that is wrong.
+pub fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
+    let shape = |field, expected: String, got: String| SimulationError::Shape {
+        field,
+        expected,
+        got,
+    };
+    let (field, arrays) = match run.drive {
+        Drive::Reference(_) | Drive::Tracking { .. } if *run.controller == Controller::None => {
+            return Err(SimulationError::NoController);
+        }
+        Drive::Tracking { torque, position } => {
+            let same = torque
+                .iter()
+                .map(|t| t.len())
+                .eq(position.iter().map(|p| p.len()));
+            if !same {
+                let got = format!("{} runs", position.len());
+                return Err(shape("position", "the shape of torque".to_owned(), got));
+            }
+            ("torque", torque)
+        }
+        Drive::Reference(r) => ("velocity_ref", r),
+        Drive::Torque(t) => ("torque", t),
+    };
+    if !(run.sample_time.is_finite() && run.sample_time > 0.0) {
+        let got = run.sample_time.to_string();
+        return Err(shape(
+            "sample_time",
+            "a positive time in seconds".to_owned(),
+            got,
+        ));
+    }
+    if !(run.resolution.is_finite() && run.resolution >= 0.0) {
+        let got = run.resolution.to_string();
+        return Err(shape(
+            "resolution",
+            "a step in radians, or zero".to_owned(),
+            got,
+        ));
+    }
+    if arrays.is_empty() || arrays.len() > lanes {
+        return Err(shape(
+            field,
+            format!("1 to {lanes} runs"),
+            arrays.len().to_string(),
+        ));
+    }
+    let positions = match run.drive {
+        Drive::Tracking { position, .. } => position,
+        _ => &[],
+    };
+    for (name, set) in [
+        (field, arrays),
+        ("noise", run.noise),
+        ("position", positions),
+    ] {
+        for array in set {
+            if array.len() % n_axes != 0 || array.is_empty() {
+                let expected = format!("samples of {n_axes} axes");
+                return Err(shape(name, expected, format!("{} numbers", array.len())));
+            }
+            // The whole array first: without an early exit the scan is vector code.
+            let all_finite = array.iter().fold(true, |all, v| all & v.is_finite());
+            let bad = || array.iter().position(|v| !v.is_finite());
+            if let Some(i) = (!all_finite).then(bad).flatten() {
+                let got = format!("{} at sample {}", array[i], i / n_axes);
+                return Err(shape(name, "finite numbers".to_owned(), got));
+            }
+        }
+    }
+    Ok(arrays.iter().map(|a| a.len() / n_axes).max().unwrap_or(0))
+}

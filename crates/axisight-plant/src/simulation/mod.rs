@@ -1,0 +1,17 @@
+//! Sampled-data simulation: controller at the sample time, plant in between.
+
+mod closed_loop;
+mod controller;
+mod dormand_prince;
+mod implicit;
+mod method;
+mod nystrom4;
+mod runge_kutta4;
+mod torque_path;
+
+pub use closed_loop::{
+    Drive, Run, Sample, Signals, SimulationError, Status, check, lane_value, simulate,
+};
+pub use controller::ControlLoop;
+pub use method::{Effort, Method, Stepper};
+pub use torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};

@@ -1,0 +1,311 @@
+//! From commanded torque to the torque the drive delivers inside a sample.
+//!
+//! Command -> limit -> transport delay -> current-loop lag -> torque constant and offset.
+//! Delay and lag make the torque vary inside a sample. It is handed to the
+//! integrator as the straight line with the same mean and first moment over
+//! each sub-step: velocity and position at the end of the step, which depend
+//! on those two moments only, are then exact for the motor inertia, whatever
+//! the delay or lag, and the result is smooth in both parameters.
+
+use crate::effect::Kernel;
+use crate::plant::Axis;
+use axisight_scalar::Scalar;
+use std::sync::Arc;
+
+/// Torque over a sub-step: `mean + slope (s - 1/2)` for `s` from 0 to 1.
+#[derive(Debug, Clone, Copy)]
+pub struct Line<S> {
+    mean: S,
+    slope: S,
+}
+
+impl<S: Scalar> Line<S> {
+    /// Torque at fraction `s` of the sub-step.
+    #[inline(always)]
+    pub fn at(&self, s: f64) -> S {
+        self.mean + self.slope * (s - 0.5)
+    }
+
+    /// The line of the first lane in plain numbers.
+    pub fn first_lane(&self) -> Line<f64> {
+        Line {
+            mean: self.mean.lane(0),
+            slope: self.slope.lane(0),
+        }
+    }
+
+    /// Change of the torque over the sub-step.
+    #[inline(always)]
+    pub fn rise(&self) -> S {
+        self.slope
+    }
+}
+
+/// Keeps a lag of zero from dividing by zero; far below any time that matters.
+const SHORTEST_LAG_S: f64 = 1e-18;
+
+/// Torque path of one axis.
+pub struct TorquePath<S> {
+    sample_time: f64,
+    kernels: Vec<Arc<dyn Kernel<S>>>,
+    delay: Option<Delay<S>>,
+    lag: Option<Lag<S>>,
+}
+
+struct Delay<S> {
+    /// Fraction of a sample at which the command changes.
+    fraction: S,
+    /// The commands the drive still has to apply, oldest first: the one in force at
+    /// the start of the sample, the one it switches to, and those to come.
+    history: Vec<S>,
+}
+
+struct Lag<S> {
+    time_constant: S,
+    state: S,
+}
+
+/// Zeroth and first moment of a torque over part of a sub-step.
+struct Moments<S> {
+    zeroth: S,
+    first: S,
+}
+
+impl<S: Scalar> TorquePath<S> {
+    /// Path of `axis`, settled at the command `rest`.
+    pub fn new(axis: &Axis<S>, rest: S, sample_time: f64) -> Self {
+        Self::through(axis.kernels.clone(), rest, sample_time)
+    }
+
+    /// Path through `kernels`, settled at the command `rest`.
+    pub fn through(kernels: Vec<Arc<dyn Kernel<S>>>, rest: S, sample_time: f64) -> Self {
+        let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);
+        let delay = total(kernels.iter().filter_map(|k| k.delay()).collect());
+        let lag = total(kernels.iter().filter_map(|k| k.lag()).collect());
+        Self {
+            sample_time,
+            kernels,
+            delay: delay.map(|d| Delay::new(d * (1.0 / sample_time), rest)),
+            lag: lag.map(|time_constant| Lag {
+                time_constant: time_constant + SHORTEST_LAG_S,
+                state: rest,
+            }),
+        }
+    }
+
+    /// Take the command of a new sample; returns what the drive makes of it.
+    pub fn push(&mut self, command: S) -> S {
+        let command = self.kernels.iter().fold(command, |u, k| k.command(u));
+        if let Some(delay) = &mut self.delay {
+            delay.history.rotate_left(1);
+            if let Some(newest) = delay.history.last_mut() {
+                *newest = command;
+            }
+        }
+        command
+    }
+
+    /// Whether the torque varies inside a sample.
+    fn varies(&self) -> bool {
+        self.delay.is_some() || self.lag.is_some()
+    }
+
+    /// Delivered torque after the lag, which starts the sample or step in `state`.
+    fn lag_state(&self) -> Option<S> {
+        self.lag.as_ref().map(|lag| lag.state)
+    }
+
+    fn delivered(&self, torque: S) -> S {
+        self.kernels.iter().fold(torque, |t, k| k.drive(t))
+    }
+
+    /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
+    fn line(&self, command: S, from: f64, to: f64, state: &mut S) -> Line<S> {
+        let width = to - from;
+        let mut zeroth = S::zero();
+        let mut first = S::zero();
+        for (torque, start, end) in self.pieces(command, from, to) {
+            let m = self.moments(torque, start - from, end - start, state);
+            zeroth += m.zeroth;
+            first += m.first;
+        }
+        let mean = zeroth * (1.0 / width);
+        // First moment about the middle of the sub-step, for unit width.
+        let tilt = first * (1.0 / (width * width)) - mean * 0.5;
+        // Drive kernels are affine (gain and offset), so they commute with the moments.
+        let (low, high) = (
+            self.delivered(mean - tilt * 6.0),
+            self.delivered(mean + tilt * 6.0),
+        );
+        Line {
+            mean: (low + high) * 0.5,
+            slope: high - low,
+        }
+    }
+
+    /// The commands in force between `from` and `to` (fractions of the sample).
+    fn pieces(&self, command: S, from: f64, to: f64) -> impl Iterator<Item = (S, S, S)> + use<S> {
+        let (start, end) = (S::constant(from), S::constant(to));
+        let pair = match &self.delay {
+            None => [Some((command, start, end)), None],
+            Some(delay) => {
+                let (older, newer) = (delay.history[0], delay.history[1]);
+                let switch = delay.fraction;
+                // A switch at the very start stays in, for its derivative.
+                if switch.lane(0) < from {
+                    [Some((newer, start, end)), None]
+                } else if switch.lane(0) >= to {
+                    [Some((older, start, end)), None]
+                } else {
+                    [Some((older, start, switch)), Some((newer, switch, end))]
+                }
+            }
+        };
+        pair.into_iter().flatten()
+    }
+
+    /// Moments over a piece of length `width` that starts `start` into the
+    /// sub-step (both in samples), command constant at `torque`.
+    fn moments(&self, torque: S, start: S, width: S, state: &mut S) -> Moments<S> {
+        let middle = start + width * 0.5;
+        let held = Moments {
+            zeroth: torque * width,
+            first: torque * width * middle,
+        };
+        let Some(lag) = &self.lag else {
+            return held;
+        };
+        let t_c = lag.time_constant * (1.0 / self.sample_time);
+        let ratio = width / t_c;
+        let decay = (-ratio).exp();
+        let gone = S::one() - decay;
+        let excess = *state - torque;
+        *state = torque + excess * decay;
+        let zeroth = t_c * gone;
+        let own_first = t_c * t_c * (S::one() - decay * (ratio + 1.0));
+        Moments {
+            zeroth: held.zeroth + excess * zeroth,
+            first: held.first + excess * (start * zeroth + own_first),
+        }
+    }
+}
+
+/// Torque of all axes over one sample, handed out span by span.
+pub struct SampleTorque<'a, S> {
+    paths: &'a mut [TorquePath<S>],
+    buffers: &'a mut TorqueBuffers<S>,
+    varies: bool,
+}
+
+/// Memory of [`SampleTorque`] that outlives the samples.
+pub struct TorqueBuffers<S> {
+    commands: Vec<S>,
+    /// Lag states at the start of the span in hand and at its end.
+    at_start: Vec<S>,
+    at_end: Vec<S>,
+    lines: Vec<Line<S>>,
+}
+
+impl<S: Scalar> TorqueBuffers<S> {
+    /// For `n_axes` axes.
+    pub fn new(n_axes: usize) -> Self {
+        let zeros = vec![S::zero(); n_axes];
+        Self {
+            commands: zeros.clone(),
+            at_start: zeros.clone(),
+            at_end: zeros,
+            lines: Vec::with_capacity(n_axes),
+        }
+    }
+}
+
+impl<'a, S: Scalar> SampleTorque<'a, S> {
+    /// Take the commands of a new sample.
+    pub fn new(
+        paths: &'a mut [TorquePath<S>],
+        commands: &[S],
+        buffers: &'a mut TorqueBuffers<S>,
+    ) -> Self {
+        for ((taken, path), u) in buffers.commands.iter_mut().zip(&mut *paths).zip(commands) {
+            *taken = path.push(*u);
+        }
+        let varies = paths.iter().any(TorquePath::varies);
+        let mut torque = Self {
+            paths,
+            buffers,
+            varies,
+        };
+        torque.rewind();
+        torque.buffers.lines.clear();
+        if !varies {
+            let held = torque.paths.iter().zip(&torque.buffers.commands);
+            torque.buffers.lines.extend(held.map(|(path, u)| Line {
+                mean: path.delivered(*u),
+                slope: S::zero(),
+            }));
+        }
+        torque
+    }
+
+    /// Torque lines between the fractions `from` and `to` of the sample.
+    pub fn span(&mut self, from: f64, to: f64) -> &[Line<S>] {
+        if self.varies {
+            let TorqueBuffers {
+                commands,
+                at_start,
+                at_end,
+                lines,
+            } = &mut *self.buffers;
+            at_end.copy_from_slice(at_start);
+            lines.clear();
+            for ((path, u), state) in self.paths.iter().zip(commands).zip(at_end) {
+                lines.push(path.line(*u, from, to, state));
+            }
+        }
+        &self.buffers.lines
+    }
+
+    /// Torque lines of part `i` of `n` equal parts of the sample.
+    pub fn part(&mut self, i: usize, n: usize) -> &[Line<S>] {
+        self.span(i as f64 / n as f64, (i + 1) as f64 / n as f64)
+    }
+
+    /// The span in hand was integrated: the next one starts at its end.
+    pub fn accept(&mut self) {
+        if self.varies {
+            let TorqueBuffers {
+                at_start, at_end, ..
+            } = &mut *self.buffers;
+            at_start.copy_from_slice(at_end);
+        }
+    }
+
+    /// Go back to the start of the sample.
+    pub fn rewind(&mut self) {
+        for (state, path) in self.buffers.at_start.iter_mut().zip(&*self.paths) {
+            *state = path.lag_state().unwrap_or_else(S::zero);
+        }
+    }
+
+    /// The sample is over.
+    pub fn finish(self) {
+        for (path, state) in self.paths.iter_mut().zip(&self.buffers.at_start) {
+            if let Some(lag) = &mut path.lag {
+                lag.state = *state;
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Delay<S> {
+    /// `samples` is the delay in samples; lanes share its whole part.
+    fn new(samples: S, rest: S) -> Self {
+        // Bounds on the delay keep the count small and non-negative.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = samples.lane(0).max(0.0) as usize;
+        Self {
+            fraction: samples - whole as f64,
+            history: vec![rest; whole + 2],
+        }
+    }
+}
