@@ -716,12 +716,14 @@ def fit_inverse_dynamics(
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
+    warm: Sequence[tuple[int, _Array]] = ...,
     cancel: CancelToken | None = None,
 ) -> FitResult:
     """Fit the torque predicted from measured motions, transmissions taken as rigid.
 
     ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm]) of
     shape (n_samples, n_axes), motor side, one per log. ``weighting`` has one entry per axis.
+    ``warm`` holds Jacobian columns from an earlier fit, as for `fit_simulation`.
     ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
     """
 
@@ -751,6 +753,7 @@ def evaluate_inverse_dynamics(
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
+    warm: Sequence[tuple[int, _Array]] = ...,
     cancel: CancelToken | None = None,
 ) -> Linearization:
     """Predict the torque of measured motions at the initial values of the parameters.

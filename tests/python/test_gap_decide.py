@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from axisight.effects import Effect
-from axisight.gap.decide import Trial, block_significance, clearly_worse, inseparable, rank
+from axisight.gap.decide import Standing, Trial, clearly_worse, stand
+from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss, linear_gain
 
@@ -38,7 +39,7 @@ def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 
         prior_matrix=np.zeros((p, p)),
         prior_gradient=np.zeros(p),
         residual=residual,
-        nuisance_columns={},
+        columns={},
     )
 
 
@@ -84,43 +85,116 @@ def a_trial(name: str, n_free: int, held_out: np.ndarray, axis: int = 1) -> Tria
     return Trial(FreeEffect(Effect(name, axis), names), None, held_out)  # type: ignore[arg-type]
 
 
-LOGS = np.repeat(np.arange(4), 10)
 FLOOR = np.full(40, 1.0)
 CURRENT = np.full(40, 11.0)
+ONE_LOG = np.zeros(40, int)
+ONE_AXIS = Layout(ONE_LOG, np.arange(40) // 2, ONE_LOG, np.full(40, 10))
 
 
-def test_the_better_fit_wins_and_probabilities_sum_to_one():
+def standing(trials: list[Trial], current: np.ndarray = CURRENT) -> Standing:
+    found = stand(trials, current, FLOOR, ONE_AXIS, 0, explained_share=0.6)
+    assert found is not None
+    return found
+
+
+def total(found: Standing) -> float:
+    return sum(r.probability for r in found.ranked) + found.p_none + found.p_unknown
+
+
+def test_the_better_fit_wins_and_probabilities_sum_to_one_with_none_and_unknown():
     good = a_trial("viscous_friction", 1, np.full(40, 1.1))
     poor = a_trial("viscous_friction", 1, np.full(40, 6.0), axis=2)
-    ranked = rank([poor, good], CURRENT, FLOOR, LOGS)
-    assert ranked[0].trial is good
-    assert ranked[0].score == pytest.approx(0.99)
-    assert sum(r.probability for r in ranked) == pytest.approx(1.0)
-    assert ranked[0].probability > 0.99
-    assert len(inseparable(ranked)) == 1
+    found = standing([poor, good])
+    assert found.best.trial is good
+    assert found.best.score == pytest.approx(0.99)
+    assert found.best.gain == pytest.approx(0.99)
+    assert total(found) == pytest.approx(1.0)
+    assert found.best.probability > 0.99
+    assert len(found.inseparable()) == 1
+
+
+def test_what_explains_little_is_less_probable_than_something_unknown():
+    # Half of what there is to explain, where a cause has to explain six tenths.
+    found = standing([a_trial("viscous_friction", 1, np.full(40, 6.0))])
+    assert found.p_unknown > 0.9 > found.best.probability
+    assert total(found) == pytest.approx(1.0)
+
+
+def test_where_there_is_nothing_to_explain_no_cause_is_most_probable():
+    current = FLOOR + 0.001
+    found = standing([a_trial("viscous_friction", 1, FLOOR + 0.0009)], current)
+    assert found.p_none > max(found.p_unknown, found.best.probability)
 
 
 def test_of_equal_fits_the_simpler_wins():
     simple = a_trial("coulomb_friction", 2, np.full(40, 1.1))
     elaborate = a_trial("asymmetric_friction", 3, np.full(40, 1.099))
-    ranked = rank([elaborate, simple], CURRENT, FLOOR, LOGS)
-    assert ranked[0].trial is simple
-    assert ranked[0].probability > 0.8
+    found = standing([elaborate, simple])
+    assert found.best.trial is simple
+    assert found.best.probability > 0.8
+    assert found.family_probability(found.best) > 0.999
 
 
 def test_equal_fits_of_equal_cost_cannot_be_told_apart():
     one = a_trial("viscous_friction", 1, np.full(40, 1.10))
     two = a_trial("viscous_friction", 1, np.full(40, 1.11), axis=2)
     poor = a_trial("viscous_friction", 1, np.full(40, 9.0), axis=3)
-    ranked = rank([one, two, poor], CURRENT, FLOOR, LOGS)
-    assert {r.trial.label for r in inseparable(ranked)} == {one.label, two.label}
+    found = standing([one, two, poor])
+    assert {r.trial.label for r in found.inseparable()} == {one.label, two.label}
 
 
 def test_differences_within_formula_error_do_not_decide():
     # One leaves nothing of ten, the other 0.2 % of it: two formulas of one thing.
     one = a_trial("viscous_friction", 1, np.full(40, 1.00))
     two = a_trial("viscous_friction", 1, np.full(40, 1.02), axis=2)
-    assert len(inseparable(rank([one, two], CURRENT, FLOOR, LOGS))) == 2
+    assert len(standing([one, two]).inseparable()) == 2
+
+
+def test_an_axis_is_ranked_by_its_own_loss():
+    # Two axes; the first candidate explains the quiet one, the second the loud one.
+    layout = Layout(np.repeat([0, 1], 20), np.tile(np.arange(20) // 2, 2), ONE_LOG, np.full(40, 10))
+    current = np.where(layout.axis == 0, 3.0, 101.0)
+    quiet = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 1.0, 101.0))
+    loud = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 3.0, 1.0), axis=2)
+    for axis, mine in enumerate((quiet, loud)):
+        found = stand([quiet, loud], current, FLOOR, layout, axis, explained_share=0.6)
+        assert found is not None
+        assert [r.trial for r in found.ranked] == [mine]
+        assert found.best.score == pytest.approx(1.0)
+
+
+def blocks(n_logs: int, n_axes: int, n_times: int) -> Evidence:
+    """Evidence of nothing, with blocks as the core orders them: log, axis, time."""
+    log, axis, _ = (x.ravel() for x in np.mgrid[:n_logs, :n_axes, :n_times])
+    n = len(log)
+    empty = linear_evidence(np.zeros((20, 1)), np.zeros(20), np.zeros(20, int))
+    where = {"log": log, "axis": axis, "start": 100 * np.arange(n), "size": np.full(n, 100)}
+    return Evidence(**(empty.__dict__ | where))
+
+
+@pytest.mark.parametrize("n_logs", [1, 2, 5])
+def test_an_effect_on_one_of_six_axes_is_as_significant_as_on_a_single_axis(n_logs: int):
+    rng = np.random.default_rng(3)
+    arm, single = blocks(n_logs, 6, 40), blocks(n_logs, 1, 40)
+    scatter = 0.1 * rng.normal(size=(n_logs, 40))
+    fall = 1.0 + scatter
+    before = np.full(len(arm.log), 3.0).reshape(n_logs, 6, 40)
+    after = before.copy()
+    after[:, 3] -= fall
+    found = layout_of(arm).significance(before.ravel(), after.ravel())
+    alone = layout_of(single).significance(np.full(n_logs * 40, 3.0), (3.0 - fall).ravel())
+    assert found > 6
+    assert layout_of(arm).significance(before.ravel(), after.ravel(), axis=3) == pytest.approx(
+        alone
+    )
+
+
+def test_stretches_are_pieces_of_time_of_all_axes():
+    layout = layout_of(blocks(2, 3, 40))
+    assert len(np.unique(layout.stretch)) == 16
+    by_log = layout.stretch.reshape(2, 3, 40)
+    assert (by_log == by_log[:, :1]).all()
+    assert (np.diff(by_log, axis=2) >= 0).all()
 
 
 def test_significance_counts_scatter_between_stretches():
@@ -128,9 +202,31 @@ def test_significance_counts_scatter_between_stretches():
     steady = before - 1.0 + 0.01 * np.random.default_rng(1).normal(size=40)
     lucky = before.copy()
     lucky[3] = 0.5
-    assert block_significance(before, steady, LOGS) > 30
-    # One quarter of sixteen differs: the mean is one standard error from zero.
-    assert block_significance(before, lucky, LOGS) == pytest.approx(1.0)
+    # A normal deviate of 12 is what a t of a few hundred from twenty stretches is worth.
+    assert ONE_AXIS.significance(before, steady) > 12
+    # One stretch of twenty differs: the mean is one standard error from zero.
+    assert ONE_AXIS.significance(before, lucky) == pytest.approx(1.0, abs=0.05)
+
+
+def test_few_stretches_count_for_less():
+    # A t of 4 from four stretches has the probability of a normal deviate of 2.2.
+    none = np.zeros(4, int)
+    few = Layout(none, np.arange(4), none, np.full(4, 10))
+    fall = 4.0 / np.sqrt(4) + np.array([-1.0, 1.0, -1.0, 1.0]) * np.sqrt(3 / 4)
+    before = np.full(4, 1e9)
+    assert few.significance(before, before - fall) == pytest.approx(2.2, abs=0.05)
+
+
+def test_that_one_log_shows_an_effect_and_another_does_not_is_no_doubt_of_it():
+    log = np.repeat([0, 1, 2], 8)
+    layout = Layout(np.zeros(24, int), np.arange(24), log, np.full(24, 10))
+    rng = np.random.default_rng(2)
+    before = np.full(24, 10.0)
+    fall = np.array([5.0, 0.0, 4.0])[log] + 0.5 * rng.normal(size=24)
+    assert layout.significance(before, before - fall) > 8
+    # The same scatter within a log is doubt.
+    mixed = layout.significance(before, before - rng.permutation(fall))
+    assert mixed < 6
 
 
 def test_clearly_worse_needs_a_likelihood_ratio():

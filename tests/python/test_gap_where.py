@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from axisight.gap.howfar import gap_figures, gap_reduction, stage
+from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
 from axisight.gap.orders import strongest_orders
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Log
@@ -89,7 +89,7 @@ def test_gap_is_the_root_mean_square_over_axes_and_logs(base):
     errors = [np.sqrt(variance) * np.array([0.3, 0.4]) * np.ones((N, 2))]
     given = stage([log], errors, 1.0)
     zero = stage([log], [np.zeros((N, 2))], 1.0)
-    gap = gap_figures(given, given, zero, zero)
+    gap = gap_figures(Stages(given, given, zero, zero))
     assert gap.before == pytest.approx(np.sqrt((0.09 + 0.16) / 2))
     np.testing.assert_allclose(gap.before_per_axis, [0.3, 0.4])
     assert gap.after == 0.0

@@ -28,5 +28,6 @@ fn keep<S: Scalar>() {
     black_box(equilibrium::<S> as fn(_, _) -> _);
     black_box(Plant::<S>::with_kernels as fn(_, _, _) -> _);
     black_box(Dynamics::<S>::evaluate as fn(_, _, _) -> _);
+    black_box(Dynamics::<S>::forces_along as fn(_, _, _, _, _, _));
     black_box(Stepper::<S>::new as fn(_) -> _);
 }

@@ -495,7 +495,7 @@ fn inverse_dynamics(
 
 /// Fit the torque predicted from measured motions.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, cancel=None))]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, warm=Vec::new(), cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn fit_inverse_dynamics(
     py: Python<'_>,
@@ -505,18 +505,19 @@ pub fn fit_inverse_dynamics(
     records: Vec<MotionTuple<'_>>,
     weighting: Vec<WeightingTuple>,
     options: OptionSpec,
+    warm: Vec<WarmColumn<'_>>,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<FitResult> {
     let (robot, block_s) = (&robot.description, options.block_s);
     let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
     let options = self::options(&options)?;
     let parameters = &problem.parameters;
-    solve(py, &flag(cancel), &problem, parameters, options, &[])
+    solve(py, &flag(cancel), &problem, parameters, options, &warm)
 }
 
 /// The torque predicted from measured motions at the initial values of the parameters.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, cancel=None))]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, warm=Vec::new(), cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn evaluate_inverse_dynamics(
     py: Python<'_>,
@@ -526,11 +527,12 @@ pub fn evaluate_inverse_dynamics(
     records: Vec<MotionTuple<'_>>,
     weighting: Vec<WeightingTuple>,
     options: OptionSpec,
+    warm: Vec<WarmColumn<'_>>,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<Linearization> {
     let (robot, block_s) = (&robot.description, options.block_s);
     let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
     let loss = loss(&options)?;
     let parameters = &problem.parameters;
-    linearize(py, &flag(cancel), &problem, parameters, loss, &[])
+    linearize(py, &flag(cancel), &problem, parameters, loss, &warm)
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -106,13 +107,30 @@ def diagnose_command(
             "the robot file or the default."
         ),
     ] = None,
+    cutoff_hz: Annotated[
+        float | None,
+        typer.Option(
+            help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
+        ),
+    ] = None,
+    max_causes: Annotated[
+        int, typer.Option(min=0, help="Stop after so many causes.")
+    ] = Settings.max_causes,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Candidates tried at a time. Default: all cores.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     with _errors():
         given = _tolerances(tolerance or [])
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load_simulator)
-        settings = Settings(seed=seed)
+        settings = Settings(
+            seed=seed,
+            cutoff_hz=cutoff_hz,
+            max_causes=max_causes,
+            threads=threads or os.cpu_count() or 1,
+        )
         settings = replace(settings, tolerances={**settings.tolerances_of(inputs.robot), **given})
         with _progress() as progress:
             found = diagnose(
@@ -138,15 +156,49 @@ def _write(found: Diagnosis, json: Path | None, report: Path | None) -> None:
 
 def _show(found: Diagnosis) -> None:
     _out.print(f"[bold]{found.verdict}[/]: {found.headline}")
+    if found.causes:
+        _out.print(_causes(found))
+    _out.print(_gaps(found))
     if not found.ranking:
         return
     table = Table("effect", "axis", "probability", "held-out score", "significance")
+    table.title = "candidates where there was most to explain"
     for c in found.ranking[:8]:
         axis = "arm" if c.axis is None else str(c.axis)
         table.add_row(
             c.effect, axis, f"{c.probability:.3f}", f"{c.score:.3f}", f"{c.significance:.1f}"
         )
     _out.print(table)
+
+
+def _causes(found: Diagnosis) -> Table:
+    table = Table("cause", "axis", "parameter", "value", "95 % interval", "unit", "probability")
+    for cause in found.causes:
+        axis = "arm" if cause.axis is None else str(cause.axis)
+        first = (cause.effect, axis)
+        for name, p in cause.parameters.items():
+            shown = f"{cause.probability:.3f}" if first[0] else ""
+            interval = f"{p.low:.4g} to {p.high:.4g}"
+            table.add_row(*first, name, f"{p.value:.4g}", interval, cause.units[name], shown)
+            first = ("", "")
+    return table
+
+
+def _gaps(found: Diagnosis) -> Table:
+    table = Table("axis", "verdict", "gap before", "re-fitted", "after", "noise alone")
+    gap = found.gap
+    columns = (
+        gap.before_per_axis,
+        gap.refitted_per_axis,
+        gap.after_per_axis,
+        gap.floor_per_axis,
+    )
+    verdicts = {a.axis: a.verdict for a in found.axes}
+    for i, row in enumerate(zip(*columns, strict=True), start=1):
+        table.add_row(str(i), verdicts.get(i, ""), *(f"{100 * x:.3g} %" for x in row))
+    whole = (gap.before, gap.refitted, gap.after, gap.floor)
+    table.add_row("all", found.verdict, *(f"{100 * x:.3g} %" for x in whole))
+    return table
 
 
 @app.command()

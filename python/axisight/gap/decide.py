@@ -1,20 +1,22 @@
-"""From held-out losses to ranks, probabilities and what cannot be told apart."""
+"""From held-out losses to ranks, probabilities and what cannot be told apart, axis by axis."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
+from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss
 
 Array = NDArray[np.float64]
 
-# Residuals of neighbouring blocks, axes and logs share their causes; this many
-# blocks count as independent in a likelihood ratio.
+# Residuals of neighbouring blocks and logs share their causes; this many blocks count as
+# independent in a likelihood ratio.
 _INDEPENDENT_BLOCKS = 60.0
 # Share of the explained error by which two formulas for one physical effect may
 # differ (tanh or algebraic Coulomb, play or dead zone): differences in fit below
@@ -48,12 +50,58 @@ class Trial:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A trial with its share of the explainable error, its standard errors and probability."""
+    """A trial as it stands on one axis.
+
+    ``score``: share of what is left to explain there that it removes; ``gain``: fall of the mean
+    square of the weighted residual there; ``significance``: how sure that is, in standard
+    deviations; ``probability`` among all candidates there, no cause and an unknown one.
+    """
 
     trial: Trial
     score: float
+    gain: float
     significance: float
     probability: float
+
+    @property
+    def family(self) -> str:
+        """What kind of cause it is."""
+        return effect_info(self.trial.candidate.effect.name).family
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How the candidates stand on one axis (from 0), best first; with the two that are none."""
+
+    axis: int
+    ranked: tuple[Ranked, ...]
+    p_none: float
+    p_unknown: float
+
+    @property
+    def best(self) -> Ranked:
+        """The most probable candidate."""
+        return self.ranked[0]
+
+    def family_probability(self, member: Ranked) -> float:
+        """Return the probability of all candidates of a family at the same place as one of them."""
+        place = member.trial.candidate.effect.axis
+        mine = (
+            r
+            for r in self.ranked
+            if r.family == member.family and r.trial.candidate.effect.axis == place
+        )
+        return float(sum(r.probability for r in mine))
+
+    def inseparable(self) -> list[Ranked]:
+        """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
+        winner = self.best
+        bar = _RIVAL * winner.probability / (1 - _RIVAL)
+        return [winner, *(r for r in self.ranked[1:] if r.probability > bar)]
+
+
+# A rival this likely beside the winner leaves the cause open.
+_RIVAL = 0.2
 
 
 def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
@@ -61,67 +109,58 @@ def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
     return Trial(candidate, evidence, held_out_loss(evidence))
 
 
-def block_significance(current: Array, new: Array, logs: NDArray[np.int64]) -> float:
-    """Return how many standard errors a fall of held-out loss is from zero.
+def falls(trials: Sequence[Trial], current: Array, layout: Layout) -> Array:
+    """Return by how much each trial lowers the held-out loss of each axis, (n_trials, n_axes)."""
+    return np.array([layout.by_axis(current - t.held_out) for t in trials]).reshape(
+        len(trials), layout.n_axes
+    )
 
-    Neighbouring blocks are correlated, quarters of a log nearly not: the fall is
-    averaged over quarters, each relative to its own loss (so that one loud log
-    does not drown the others), and compared with its scatter. An effect may
-    show in a few loud stretches only; the plain mean is tried as well, and the
-    larger of the two counts.
+
+def stand(
+    trials: Sequence[Trial],
+    current: Array,
+    floor: Array,
+    layout: Layout,
+    axis: int,
+    *,
+    explained_share: float,
+) -> Standing | None:
+    """Rank the candidates that lower the loss of ``axis`` (from 0); None if there is none.
+
+    ``current`` and ``floor`` (n_blocks,): held-out loss without the candidates and of a perfect
+    model. Likelihood ratio of the held-out error on the axis with unknown variance, formula error
+    added, one cost per fitted number. *No cause* leaves the loss what it is. *Something unknown*
+    counts as a candidate that explains ``explained_share``: one that explains less is less
+    probable than a cause nobody has thought of.
     """
-    groups = _quarters(logs)
-    before = np.bincount(groups, current) / np.bincount(groups)
-    after = np.bincount(groups, new) / np.bincount(groups)
-    fall = before - after
-    return max(_standard_errors(fall), _standard_errors(fall / np.maximum(before + after, 1e-300)))
-
-
-def _standard_errors(x: Array) -> float:
-    if len(x) < 2:
-        return 0.0
-    spread = float(np.std(x, ddof=1) / np.sqrt(len(x)))
-    return float(x.mean() / max(spread, 1e-12 * abs(x.mean()), 1e-300))
-
-
-def _quarters(logs: NDArray[np.int64]) -> NDArray[np.int64]:
-    out = np.zeros(len(logs), dtype=np.int64)
-    for k, log in enumerate(np.unique(logs)):
-        rows = np.flatnonzero(logs == log)
-        out[rows] = 4 * k + (4 * np.arange(len(rows))) // len(rows)
-    return out
-
-
-def rank(
-    trials: Sequence[Trial], current: Array, floor: Array, logs: NDArray[np.int64]
-) -> list[Ranked]:
-    """Rank candidates, best first.
-
-    ``current`` and ``floor`` (n_blocks,): held-out loss without the candidates
-    and of a perfect model. Probabilities compare the candidates with each other
-    (that one of them is the cause is decided elsewhere): likelihood ratio of
-    the held-out error with unknown variance, formula error added, one cost per
-    fitted number.
-    """
-    explainable = max(float((current - floor).sum()), 1e-12)
-    losses = np.array([t.held_out.sum() for t in trials])
-    if len(losses) == 0:
-        return []
-    tempered = np.maximum(losses, floor.sum()) + _FORMULA_ERROR * explainable
-    cost = np.array([t.cost for t in trials])
+    here = layout.axis == axis
+    before, least = float(current[here].sum()), float(floor[here].sum())
+    explainable = max(before - least, 1e-12)
+    mine = [t for t in trials if t.held_out[here].sum() < before]
+    if not mine:
+        return None
+    losses = np.array([t.held_out[here].sum() for t in mine])
+    hypotheses = np.append(losses, [before, before - explained_share * explainable])
+    tempered = np.maximum(hypotheses, least) + _FORMULA_ERROR * explainable
+    # An unknown cause has as many numbers to it as the known one that explains most.
+    unknown = mine[int(np.argmin(losses))].cost
+    cost = np.array([*(t.cost for t in mine), 0.0, unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - _PARAMETER_COST * cost
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
-    out = [
+    samples = float(layout.samples()[axis])
+    ranked = [
         Ranked(
             t,
-            float((current - t.held_out).sum() / explainable),
-            block_significance(current, t.held_out, logs),
+            float((before - loss) / explainable),
+            float((before - loss) / samples),
+            layout.significance(current, t.held_out, axis),
             float(p),
         )
-        for t, p in zip(trials, probability, strict=True)
+        for t, loss, p in zip(mine, losses, probability, strict=False)
     ]
-    return sorted(out, key=lambda r: (-r.probability, -r.score, r.trial.label))
+    ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
+    return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
 
 
 def clearly_worse(loss: float, than: float) -> bool:
@@ -129,14 +168,8 @@ def clearly_worse(loss: float, than: float) -> bool:
     return bool(0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0)
 
 
-# A rival this likely beside the winner leaves the cause open.
-_RIVAL = 0.2
-
-
-def inseparable(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
-    if not ranked:
-        return []
-    winner = ranked[0]
-    rivals = [r for r in ranked[1:] if r.probability > _RIVAL * winner.probability / (1 - _RIVAL)]
-    return [winner, *rivals]
+def without_composite(standing: Standing, part: Ranked) -> Standing:
+    """Put the first part in the place of its composite, with the probability of both."""
+    merged = replace(part, probability=part.probability + standing.best.probability)
+    rest = tuple(r for r in standing.ranked[1:] if r is not part)
+    return replace(standing, ranked=(merged, *rest))

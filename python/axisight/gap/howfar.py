@@ -42,10 +42,20 @@ def stage(logs: Sequence[Log], errors: Sequence[Array], block_s: float) -> Stage
     return Stage(tuple(blocks))
 
 
-def gap_figures(given: Stage, refitted: Stage, after: Stage, floor: Stage) -> Gap:
+@dataclass(frozen=True)
+class Stages:
+    """The simulator as given, re-fitted, with the causes; and what a perfect one would leave."""
+
+    given: Stage
+    refitted: Stage
+    after: Stage
+    floor: Stage
+
+
+def gap_figures(stages: Stages) -> Gap:
     """Return the gap before, re-fitted and after, and its floor."""
     (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
-        combine(s.per_log()) for s in (given, refitted, after, floor)
+        combine(s.per_log()) for s in (stages.given, stages.refitted, stages.after, stages.floor)
     )
     return Gap(before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes)
 

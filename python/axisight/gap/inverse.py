@@ -10,30 +10,34 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects
+from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import core_spec
+from axisight.gap.cutoff import Motion, chosen_cutoff_hz
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
 from axisight.gap.settings import Settings
-from axisight.gap.torques import Variant
+from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View
 from axisight.logs import Log, differentiate, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
-Motion = tuple[Array, Array, Array, Array]
-
-# Below the first resonance of most machines, above the spectrum of their motions.
-INVERSE_CUTOFF_HZ = 60.0
 
 
 class InverseView(View):
     """Torque predicted from the measured motion."""
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        cutoff = min(INVERSE_CUTOFF_HZ, 0.2 / robot.sample_time_s)
-        self.cutoff_hz = cutoff
+        cutoff = settings.cutoff_hz or chosen_cutoff_hz(
+            logs, motion, lambda m: predicted_torque(robot, AS_GIVEN, m)
+        )
+        if not 0 < cutoff < 0.5 / robot.sample_time_s:
+            raise InputError(
+                f"cutoff_hz: expected between 0 and the Nyquist frequency "
+                f"{0.5 / robot.sample_time_s:g} Hz, got {cutoff:g} Hz"
+            )
         floor = inverse_floor(robot, logs, cutoff, settings)
         fitter = InverseDynamicsFitter(
             robot,
@@ -42,20 +46,21 @@ class InverseView(View):
             settings.tolerances_of(robot),
             settings.block_s,
         )
-        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor)
+        self.cutoff = cutoff
+        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor, cutoff)
 
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque."""
-        return motion(log, self.cutoff_hz)[3]
+        return motion(log, self.cutoff)[3]
 
     def torque(self, variant: Variant, log: Log) -> Array:
         """Return the predicted torque."""
-        return predicted_torque(self.robot, variant, motion(log, self.cutoff_hz))
+        return predicted_torque(self.robot, variant, motion(log, self.cutoff))
 
     def noise(self, log: Log, run: int) -> Array:
         """Return the error that noise of position and torque causes."""
         std = self.floor.position_std_rad
-        return inverse_noise(self.robot, log, std, self.cutoff_hz, self.settings.seed, 2 * run)
+        return inverse_noise(self.robot, log, std, self.cutoff, self.settings.seed, 2 * run)
 
 
 def motion(log: Log, cutoff_hz: float) -> Motion:
@@ -93,8 +98,7 @@ class InverseDynamicsFitter(ModelFitter):
         options: FitOptions,
         warm: list[tuple[int, Array]],
     ) -> _core.FitResult:
-        """Run the fit in the core; sensitivities are cheap here, so none are kept."""
-        del warm
+        """Run the fit in the core."""
         return _core.fit_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
@@ -102,6 +106,7 @@ class InverseDynamicsFitter(ModelFitter):
             self.motions,
             self.weighting.core(),
             options,
+            warm=warm,
             cancel=self.cancel,
         )
 
@@ -113,7 +118,6 @@ class InverseDynamicsFitter(ModelFitter):
         warm: list[tuple[int, Array]],
     ) -> _core.Linearization:
         """Evaluate the model in the core."""
-        del warm
         return _core.evaluate_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
@@ -121,6 +125,7 @@ class InverseDynamicsFitter(ModelFitter):
             self.motions,
             self.weighting.core(),
             options,
+            warm=warm,
             cancel=self.cancel,
         )
 

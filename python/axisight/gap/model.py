@@ -86,7 +86,7 @@ class Evidence(Linearized):
     start: NDArray[np.int64]
     size: NDArray[np.int64]
     residual: Array
-    nuisance_columns: dict[str, Array]
+    columns: dict[tuple[str | None, str], Array]
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,10 @@ class ModelFitter(ABC):
         ``start`` ended, else at their nominal values; ``lazy`` takes their
         sensitivities from ``start`` instead of computing them.
         """
-        setup = self._setup(free, start, robot_values, lazy=lazy)
+        # What a candidate changes of the sensitivities of effects elsewhere can wait.
+        here = free[-1].effect.axis if free else None
+        held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
+        setup = self._setup(free, start, robot_values, held, lazy=lazy)
         options = self._options(max_iterations)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm)
         return _evidence(result, setup, list(free))
@@ -185,7 +188,7 @@ class ModelFitter(ABC):
         robot_values: Mapping[str, float] | None = None,
     ) -> Linearized:
         """Return the model where a lazy `fit` would begin."""
-        setup = self._setup(free, start, robot_values, lazy=True)
+        setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
         result = self.linearize(setup.effects, setup.parameters, self._options(), setup.warm)
         return _linearized(result, setup)
 
@@ -203,9 +206,11 @@ class ModelFitter(ABC):
         free: Sequence[FreeEffect],
         start: Evidence | None,
         robot_values: Mapping[str, float] | None,
+        held: Sequence[bool],
         *,
         lazy: bool,
     ) -> _Setup:
+        """Return parameters and warm columns; ``held``: effects whose columns ``start`` may have."""
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
@@ -222,12 +227,25 @@ class ModelFitter(ABC):
             )
             for p in self.own
         ]
-        added = [_trial_parameter(tried, i, f, name) for i, f in enumerate(free) for name in f.free]
+        columns = start.columns if lazy and start is not None else {}
+        known = (
+            set()
+            if start is None
+            else {f for f, _ in columns} & {e.label for e in start.effects if e in tried}
+        )
+        added = []
+        for i, f in enumerate(free):
+            keep = held[i] and f.effect.label in known
+            added += [
+                replace(_trial_parameter(tried, i, f, name), nuisance=keep) for name in f.free
+            ]
         parameters = own + added
-        warm = []
-        if lazy and start is not None:
-            columns = start.nuisance_columns
-            warm = [(i, columns[p.name]) for i, p in enumerate(own) if p.name in columns]
+        keys: list[tuple[str | None, str]] = [(None, p.name) for p in own]
+        keys += [
+            (tried[p.effect].label if p.nuisance and p.effect is not None else "", p.name)
+            for p in added
+        ]
+        warm = [(i, columns[key]) for i, key in enumerate(keys) if key in columns]
         return _Setup(tried, parameters, own, warm)
 
 
@@ -302,5 +320,8 @@ def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]
         start=blocks[:, 2],
         size=blocks[:, 3],
         residual=result.residual,
-        nuisance_columns={n: jacobian[i] for i, (e, n) in enumerate(at.parameters) if e is None},
+        columns={
+            (None if place is None else fitted[place].label, name): jacobian[i]
+            for i, (place, name) in enumerate(at.parameters)
+        },
     )

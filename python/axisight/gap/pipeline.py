@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
-from axisight.gap.howfar import Stage, gap_figures, gap_reduction, overlays, stage
+from axisight.gap.carried import carried_over
+from axisight.gap.headline import headline
+from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
-from axisight.gap.result import Cause, Diagnosis, Gap, Interval, Overlay
-from axisight.gap.search import Progress, Search, search
+from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
+from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
+from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
@@ -149,28 +152,23 @@ def _stands_out(logs: Sequence[ErrorLog]) -> bool:
 
 @dataclass(frozen=True)
 class Reach:
-    """The gap on the validation logs at each stage of the search."""
+    """The gap on the validation logs before, re-fitted and with the causes one after another."""
 
-    gap: Gap
+    stages: Stages
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
 
 
 def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings: Settings) -> Reach:
     """Measure the gap on validation logs; the first ``named`` causes are in ``after``."""
-    models = [found.baseline, *(r.start for r in found.rounds[1:]), found.model]
-    steps = models[1 : named + 1] if named else []
-    variants = [Variant(m.robot_values, m.effects) for m in steps]
-    if variants:
-        last = found.model
-        variants[-1] = Variant(last.robot_values, last.effects)
+    model = found.model
+    variants = [Variant(model.robot_values, model.effects[: i + 1]) for i in range(named)]
     refit = Variant(found.baseline.robot_values)
 
     def measure(errors: Sequence[Array]) -> Stage:
         return stage(logs, errors, settings.block_s)
 
-    given_errors = _errors(view, AS_GIVEN, logs)
-    given, refitted = measure(given_errors), measure(_errors(view, refit, logs))
+    given, refitted = measure(_errors(view, AS_GIVEN, logs)), measure(_errors(view, refit, logs))
     floor = measure([view.noise(log, run) for run, log in enumerate(logs, start=1)])
     stages = [measure(_errors(view, v, logs)) for v in variants]
     after = stages[-1] if stages else refitted
@@ -186,7 +184,7 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
         [view.torque(AS_GIVEN, log) for log in logs],
         [view.torque(final, log) for log in logs],
     )
-    return Reach(gap_figures(given, refitted, after, floor), reductions, drawn)
+    return Reach(Stages(given, refitted, after, floor), reductions, drawn)
 
 
 def _assemble(
@@ -202,9 +200,21 @@ def _assemble(
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
     reach = _reach(view, held_logs, found, len(conclusion.causes), settings)
+    gap = gap_figures(reach.stages)
+    names = [log.name for log in held_logs]
+    conclusion = carried_over(conclusion, reach.stages, gap, names, settings)
     causes = tuple(
-        Cause(c.effect, c.axis, c.probability, c.parameters, c.units, r)
-        for c, r in zip(conclusion.causes, reach.reductions, strict=True)
+        Cause(
+            c.effect,
+            c.axis,
+            c.probability,
+            c.parameters,
+            c.units,
+            r,
+            c.family,
+            c.family_probability,
+        )
+        for c, r in zip(conclusion.causes, reach.reductions, strict=False)
     )
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     nominal = robot_parameters(robot)
@@ -212,8 +222,8 @@ def _assemble(
         name=name,
         mode=view.mode,
         verdict=conclusion.verdict,
-        headline=conclusion.headline(reach.gap, causes, places, robot.effects),
-        gap=reach.gap,
+        headline=headline(conclusion, gap, causes, places, robot.effects),
+        gap=gap,
         where=places,
         causes=causes,
         alternatives=conclusion.alternatives,
@@ -224,7 +234,10 @@ def _assemble(
         regime_maps=regimes,
         overlays=reach.overlays,
         refit={k: _relative(found.model, k, nominal[k]) for k in found.model.robot_values},
-        checks=conclusion.checks,
+        checks=(*conclusion.checks, *_filtered(view)),
+        axes=conclusion.axes,
+        p_none=conclusion.p_none,
+        p_unknown=conclusion.p_unknown,
         provenance={
             "axisight_version": version("axisight"),
             "seed": settings.seed,
@@ -234,7 +247,18 @@ def _assemble(
             "estimation_logs": [log.name for log in view.logs],
             "validation_logs": [log.name for log in held_logs],
             "position_noise_std_rad": view.floor.position_std_rad.tolist(),
+            "cutoff_hz": view.cutoff_hz,
         },
+    )
+
+
+def _filtered(view: View) -> tuple[str, ...]:
+    """Say what low-pass stands on both sides of the comparison."""
+    if view.cutoff_hz is None:
+        return ()
+    chosen = "as given" if view.settings.cutoff_hz else "chosen as what predicts data left out best"
+    return (
+        f"Motion, torque and their noise are low-passed alike at {view.cutoff_hz:.3g} Hz, {chosen}.",
     )
 
 

@@ -68,6 +68,24 @@ class Cause:
     parameters: dict[str, Interval]
     units: dict[str, str]
     gap_reduction: Interval
+    family: str = ""
+    family_probability: float = 1.0
+
+
+@dataclass(frozen=True)
+class AxisVerdict:
+    """What the estimation logs say of one axis (from 1).
+
+    ``excess``: mean square of the weighted residual of the re-fitted simulator above the floor,
+    in units of noise plus model error; ``explained``: share of it that the causes remove;
+    ``causes``: which of the diagnosis's causes act on the axis.
+    """
+
+    axis: int
+    verdict: VerdictKind
+    excess: float
+    explained: float
+    causes: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -133,6 +151,9 @@ class Diagnosis:
     overlays: tuple[Overlay, ...]
     refit: dict[str, Interval]
     checks: tuple[str, ...]
+    axes: tuple[AxisVerdict, ...] = ()
+    p_none: float = 0.0
+    p_unknown: float = 0.0
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def to_verdict(self) -> dict[str, Any]:
@@ -172,6 +193,24 @@ class Diagnosis:
             ],
             "equivalent": [list(group) for group in self.equivalent],
             "next_experiment": self.next_experiment,
+            "p_none": self.p_none,
+            "p_unknown": self.p_unknown,
+            "axes": [
+                {
+                    "axis": a.axis,
+                    "verdict": a.verdict,
+                    "gap": {
+                        "before": float(gap.before_per_axis[a.axis - 1]),
+                        "after": float(gap.after_per_axis[a.axis - 1]),
+                        "floor": float(gap.floor_per_axis[a.axis - 1]),
+                    },
+                    "explained": a.explained,
+                    "causes": list(a.causes),
+                }
+                for a in self.axes
+            ],
+            "ranking": [_ranked(c) for c in self.ranking],
+            "checks": list(self.checks),
             "provenance": self.provenance,
         }
 
@@ -180,11 +219,24 @@ class Diagnosis:
         write_whole(Path(path), json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n")
 
 
+def _ranked(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "effect": candidate.effect,
+        "axis": candidate.axis,
+        "probability": candidate.probability,
+        "score": candidate.score,
+        "significance": candidate.significance,
+        "status": candidate.status,
+    }
+
+
 def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.effect,
         "axis": cause.axis,
         "probability": cause.probability,
+        "family": cause.family,
+        "family_probability": cause.family_probability,
         "parameters": {
             name: {
                 "value": p.value,

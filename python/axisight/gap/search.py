@@ -1,12 +1,9 @@
-"""Forward search for causes: screen, fit, rank, add, until nothing more is explained."""
+"""Search for causes: try all, take in the best of every axis, drop what is no longer needed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TypeVar
 
 import numpy as np
 import scipy
@@ -14,26 +11,27 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Trial, clearly_worse, rank, trial
+from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
+from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.settings import Settings
+from axisight.gap.trials import Progress, Trials, fresh, interact, kept_beside
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
-# Candidates fitted in full: the best of the screen, and all that come near them.
-_FITTED = 10
-_NEAR = 0.3
+# Each round takes in a cause on every axis that has one; this many on top of one another are
+# no longer causes but a shape.
+_MOST_ROUNDS = 8
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the search: the model it started from and the candidates it ranked."""
+    """One round: the model it started from, how candidates stood, what was taken in."""
 
     start: Evidence
-    ranked: list[Ranked]
-    accepted: Ranked | None
+    standings: tuple[Standing, ...]
+    accepted: tuple[tuple[Ranked, Standing], ...]
 
 
 @dataclass
@@ -41,28 +39,41 @@ class Search:
     """Result of a search.
 
     ``baseline``: the simulator re-fitted without effects; ``model``: with the
-    accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``skipped``:
-    candidates that failed, with the reason.
+    accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
+    blocks lie; ``skipped``: candidates that failed, with the reason.
     """
 
     baseline: Evidence
     model: Evidence
     floor: Array
+    layout: Layout
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
 
     @property
-    def accepted(self) -> list[Ranked]:
-        """The accepted candidates in order of entry."""
-        return [r.accepted for r in self.rounds if r.accepted is not None]
+    def accepted(self) -> list[tuple[Ranked, Standing]]:
+        """The causes in the model and how they stood when they entered, in the model's order."""
+        entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
+        return [entered[f.effect.label] for f in self.model.free]
+
+    def to_explain(self) -> Array:
+        """Return the held-out loss of the re-fitted simulator above the floor, by axis (n_axes,)."""
+        used = predictable(self.model)
+        return self._by_axis(np.where(used, held_out_loss(self.baseline) - self.floor, 0.0))
+
+    def removed(self) -> Array:
+        """Return how much of it the causes remove, by axis (n_axes,)."""
+        used = predictable(self.model)
+        fall = held_out_loss(self.baseline) - held_out_loss(self.model)
+        return self._by_axis(np.where(used, fall, 0.0))
 
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
-        used = predictable(self.model)
-        before = held_out_loss(self.baseline)[used]
-        after = held_out_loss(self.model)[used]
-        explainable = float((before - self.floor[used]).sum())
-        return float((before - after).sum() / explainable) if explainable > 0 else 0.0
+        total = float(self.to_explain().sum())
+        return float(self.removed().sum()) / total if total > 0 else 0.0
+
+    def _by_axis(self, values: Array) -> Array:
+        return self.layout.by_axis(values)
 
 
 def search(
@@ -81,226 +92,167 @@ def search(
     baseline = fitter.fit([])
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.size
-    out = Search(baseline, baseline, floor)
-    for number in range(1, settings.max_causes + 1):
-        options = _new(candidates(out.model), out.model)
-        trials = _round(fitter, out, options, settings, progress, number)
-        current = held_out_loss(out.model)
-        ranked = _polished(fitter, trials, current, floor, out.model, progress, number)
-        accepted = _acceptable(ranked, out, current, settings, len(options))
-        if accepted is not None and not _earns_its_gain(fitter, accepted, out.model):
-            accepted = None
-        if accepted is not None and _parts_do(accepted, ranked, fitter):
-            ranked = _without_composite(ranked)
-            accepted = ranked[0]
-        out.rounds.append(Round(out.model, ranked, accepted))
-        if accepted is None:
+    out = Search(baseline, baseline, floor, layout_of(baseline))
+    refused: set[str] = set()
+    for number in range(1, _MOST_ROUNDS + 1):
+        round_ = Trials(fitter, out.model, floor, out.layout, settings, progress)
+        options = fresh(candidates(out.model), out.model, refused)
+        trials = round_.refined(round_.run(options, number), number)
+        out.skipped |= round_.skipped
+        room = settings.max_causes - len(out.model.free)
+        taken = _taken(round_, trials, out, settings, len(options), room)
+        standings = tuple(round_.standings(trials))
+        out.rounds.append(Round(out.model, standings, taken))
+        if not taken:
             break
-        progress(f"adding {accepted.trial.label}", 0, 1)
-        start = accepted.trial.evidence
-        out.model = fitter.fit(start.free, start, max_iterations=4)
-        progress(f"adding {accepted.trial.label}", 1, 1)
-        if _settled(out, settings):
+        _take_in(fitter, out, taken, progress)
+        refused |= _drop_idle(fitter, out, settings)
+        if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
     return out
 
 
-@dataclass(frozen=True)
-class _Start:
-    """Where the fit of a candidate begins, and the gain it promises."""
-
-    option: FreeEffect
-    robot_values: Mapping[str, float]
-    gain: float
-
-
-def _new(options: Sequence[FreeEffect], model: Evidence) -> list[FreeEffect]:
-    present = {e.label for e in model.effects}
-    return [o for o in options if o.effect.label not in present]
-
-
-def _round(
-    fitter: ModelFitter,
+def _taken(
+    round_: Trials,
+    trials: Sequence[Trial],
     state: Search,
-    options: Sequence[FreeEffect],
     settings: Settings,
-    progress: Progress,
-    number: int,
-) -> list[Trial]:
-    """Screen all candidates by one linear step, fit the promising ones in full."""
-    model = state.model
+    tried: int,
+    room: int,
+) -> tuple[tuple[Ranked, Standing], ...]:
+    """Return the winners of all axes that are causes and do not feel one another."""
+    fall = falls(trials, round_.current, state.layout)
+    place = {t.label: i for i, t in enumerate(trials)}
+    found: list[tuple[Ranked, Standing]] = []
+    standings = round_.standings(trials)
 
-    def attempt(
-        solve: Callable[..., A], option: FreeEffect, start: _Start | None = None
-    ) -> A | None:
-        effects = [*model.free, option if start is None else start.option]
-        values = None if start is None else start.robot_values
-        try:
-            return solve(effects, model, robot_values=values)
-        except InputError as error:
-            # A candidate that cannot be simulated is out, and the result says so.
-            state.skipped[option.effect.label] = str(error)
-            return None
+    def felt_most(s: Standing) -> tuple[float, float]:
+        # One that leads on several axes is judged where it gains most.
+        mine = fall[place[s.best.trial.label]]
+        return -float(mine.sum()), -float(mine[s.axis])
 
-    def screened(option: FreeEffect) -> _Start:
-        evidence = attempt(fitter.evaluate, option)
-        best = _Start(option, model.robot_values, -np.inf)
-        if evidence is not None:
-            gain = model.total - evidence.total + linear_gain(evidence)
-            best = replace(best, gain=gain)
-        for values in option.starts:
-            # A large effect bends the re-fitted simulator: its own starts begin without.
-            start = _Start(option.at(values), {}, -np.inf)
-            evidence = attempt(fitter.evaluate, option, start)
-            if evidence is not None and model.total - evidence.total > best.gain:
-                best = replace(start, gain=model.total - evidence.total)
-        return best
-
-    def fitted(start: _Start) -> Trial | None:
-        evidence = attempt(partial(fitter.fit, lazy=True), start.option, start)
-        return None if evidence is None else trial(start.option, evidence)
-
-    with ThreadPoolExecutor(settings.threads) as pool:
-        try:
-            starts = _each(
-                pool, screened, options, progress, f"screening candidates, round {number}"
-            )
-            keep = _promising(np.array([s.gain for s in starts]))
-            chosen = [starts[i] for i in keep]
-            trials = _each(pool, fitted, chosen, progress, f"fitting candidates, round {number}")
-        except BaseException:
-            fitter.cancel.cancel()
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
-    return [t for t in trials if t is not None]
+    standings.sort(key=felt_most)
+    for standing in standings:
+        mine = place[standing.best.trial.label]
+        felt = any(
+            interact(place[r.trial.label], mine, standing.axis, fall)
+            or interact(mine, place[r.trial.label], s.axis, fall)
+            for r, s in found
+        )
+        if felt or len(found) >= room:
+            continue
+        led = _led_by_a_cause(standing, state, settings, tried)
+        if led is None or not _earns_its_gain(round_.fitter, led.best, state.model):
+            continue
+        simpler = _simpler(led, round_.fitter)
+        found.append((simpler.best, simpler))
+    return tuple(found)
 
 
-A = TypeVar("A")
-B = TypeVar("B")
+# Of candidates that explain nearly as much as the first, one may show more evenly over time.
+_NEARLY = 0.8
 
 
-def _each(
-    pool: ThreadPoolExecutor,
-    work: Callable[[A], B],
-    items: Sequence[A],
-    progress: Progress,
-    label: str,
-) -> list[B]:
-    out = []
-    for k, value in enumerate(pool.map(work, items)):
-        out.append(value)
-        progress(label, k + 1, len(items))
-    return out
+def _led_by_a_cause(
+    standing: Standing, state: Search, settings: Settings, tried: int
+) -> Standing | None:
+    """Return the standing led by its first candidate that is a cause, not far behind the winner."""
+    for r in standing.ranked:
+        near = r.score >= _NEARLY * standing.best.score
+        if near and _is_cause(r, standing, state, settings, tried):
+            rest = (x for x in standing.ranked if x is not r)
+            return replace(standing, ranked=(r, *rest))
+    return None
 
 
-def _promising(gains: Array) -> list[int]:
-    order = np.argsort(-gains, kind="stable")
-    best = gains[order[0]] if len(order) else 0.0
-    keep = [i for k, i in enumerate(order) if k < _FITTED or gains[i] > _NEAR * best]
-    return [int(i) for i in keep if np.isfinite(gains[i])]
+def _is_cause(
+    best: Ranked, standing: Standing, state: Search, settings: Settings, tried: int
+) -> bool:
+    """Whether what a candidate explains on an axis is real and worth naming.
 
-
-def _acceptable(
-    ranked: Sequence[Ranked], state: Search, current: Array, settings: Settings, tried: int
-) -> Ranked | None:
-    """Return the winner if what it explains is real and worth naming.
-
-    The winner is the best of ``tried`` candidates: its significance is held
-    against the level that keeps the false alarms of all of them together at
-    ``settings.false_alarms`` (Bonferroni).
+    It is one of ``tried`` candidates: its significance is held against the level
+    that keeps the false alarms of all of them together at ``settings.false_alarms``
+    (Bonferroni).
     """
-    if not ranked:
-        return None
-    best = ranked[0]
-    gain = float((current - best.trial.held_out).sum())
-    size = float(state.model.size.sum())
-    first = max(float((held_out_loss(state.baseline) - state.floor).sum()), 1e-12)
+    first = float(state.layout.by_axis(held_out_loss(state.baseline) - state.floor)[standing.axis])
     needed = max(
         settings.significance, float(scipy.stats.norm.isf(settings.false_alarms / max(tried, 1)))
     )
-    real = best.significance > needed and gain / size > settings.smallest_gain
-    worth = best.score > settings.smallest_score and gain / first > settings.smallest_share
-    return best if real and worth else None
+    share = best.gain * float(state.layout.samples()[standing.axis]) / max(first, 1e-12)
+    real = best.significance > needed and best.gain > settings.smallest_gain
+    worth = best.score > settings.smallest_score and share > settings.smallest_share
+    return real and worth and standing.best.probability > standing.p_none
 
 
-# Fitted with sensitivities of their own: the leaders of the ranking, unless the
-# first already explains nearly everything.
-_POLISHED = 2
-_GOOD_ENOUGH = 0.95
-
-
-def _polished(
+def _take_in(
     fitter: ModelFitter,
-    trials: list[Trial],
-    current: Array,
-    floor: Array,
-    model: Evidence,
+    state: Search,
+    taken: Sequence[tuple[Ranked, Standing]],
     progress: Progress,
-    number: int,
-) -> list[Ranked]:
-    """Rank the trials, the leaders fitted again with the simulator's sensitivities renewed.
+) -> None:
+    label = "adding " + ", ".join(r.trial.label for r, _ in taken)
+    progress(label, 0, 1)
+    if len(taken) == 1:
+        start = taken[0][0].trial.evidence
+        state.model = fitter.fit(start.free, start, max_iterations=4)
+    else:
+        free = list(state.model.free)
+        for r, _ in taken:
+            new = r.trial.evidence.free[-1]
+            free = [*kept_beside(free, new), new]
+        state.model = fitter.fit(free, state.model, max_iterations=6)
+    progress(label, 1, 1)
 
-    A large effect bends the re-fitted simulator, and the sensitivities taken from
-    it; the leaders deserve better before one of them is believed.
-    """
-    ranked = rank(trials, current, floor, model.log)
-    if not ranked or ranked[0].score > _GOOD_ENOUGH:
-        return ranked
-    done: set[str] = set()
-    label = f"refining the leaders, round {number}"
-    for k in range(_POLISHED):
-        ranked = rank(trials, current, floor, model.log)
-        todo = [r for r in ranked[:_POLISHED] if r.trial.label not in done]
-        if not todo or not _worth_polishing(todo[0], ranked[0]):
+
+def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[str]:
+    """Drop the effects that others have made needless; return their labels."""
+    dropped: set[str] = set()
+    samples = state.layout.samples()
+    while len(state.model.free) > 1:
+        free = state.model.free
+        gains = []
+        for i, f in enumerate(free):
+            without = fitter.evaluate(
+                [*free[:i], *free[i + 1 :]], state.model, robot_values=state.model.robot_values
+            )
+            left = without.total - linear_gain(without) - state.model.total
+            worth = samples[f.effect.axis - 1] if f.effect.axis else samples.min()
+            gains.append(left / float(worth))
+        worst = int(np.argmin(gains))
+        if gains[worst] > settings.smallest_gain:
             break
-        old = todo[0].trial
-        progress(label, k, _POLISHED)
-        better = fitter.fit(old.evidence.free, old.evidence, max_iterations=3)
-        done.add(old.label)
-        if better.total < old.evidence.total:
-            trials = [trial(old.candidate, better) if t is old else t for t in trials]
-    progress(label, _POLISHED, _POLISHED)
-    return rank(trials, current, floor, model.log)
+        dropped.add(free[worst].effect.label)
+        rest = [*free[:worst], *free[worst + 1 :]]
+        state.model = fitter.fit(rest, state.model, max_iterations=4)
+    return dropped
 
 
-def _worth_polishing(candidate: Ranked, leader: Ranked) -> bool:
-    """Whether a candidate explains anything, and is not out of the leader's reach."""
-    return candidate.score > 0.02 and candidate.score > 0.3 * leader.score
-
-
-def _first_part(winner: Ranked, ranked: Sequence[Ranked]) -> Ranked | None:
+def _first_part(standing: Standing) -> Ranked | None:
     """Return the rival that is the first part of a winner which simpler effects imitate."""
-    effect = winner.trial.candidate.effect
+    effect = standing.best.trial.candidate.effect
     parts = effect_info(effect.name).parts
     if not parts:
         return None
     label = Effect(parts[0], effect.axis).label
-    return next((r for r in ranked if r.trial.label == label), None)
+    return next((r for r in standing.ranked if r.trial.label == label), None)
 
 
-def _parts_do(winner: Ranked, ranked: Sequence[Ranked], fitter: ModelFitter) -> bool:
-    """Whether the parts of a composite winner together fit held-out data no worse than it."""
-    part = _first_part(winner, ranked)
+def _simpler(standing: Standing, fitter: ModelFitter) -> Standing:
+    """Return a standing led by the first part of a composite winner whose parts do as well."""
+    part = _first_part(standing)
     if part is None:
-        return False
+        return standing
+    winner = standing.best
     effect = winner.trial.candidate.effect
     second = effect_info(effect.name).parts[1]
     other = FreeEffect(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
     try:
         both = fitter.fit([*part.trial.evidence.free, other], part.trial.evidence, lazy=True)
     except InputError:
-        return False
-    return not clearly_worse(held_out_loss(both).sum(), winner.trial.held_out.sum())
-
-
-def _without_composite(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Put the first part in the place of its composite, with the probability of both."""
-    winner = ranked[0]
-    part = _first_part(winner, ranked)
-    if part is None:
-        return list(ranked)
-    merged = replace(part, probability=part.probability + winner.probability)
-    return [merged, *(r for r in ranked[1:] if r is not part)]
+        return standing
+    if clearly_worse(held_out_loss(both).sum(), winner.trial.held_out.sum()):
+        return standing
+    return without_composite(standing, part)
 
 
 def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> bool:
@@ -319,6 +271,6 @@ def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> boo
 
 
 def _settled(state: Search, settings: Settings) -> bool:
-    """Whether what is left is within formula error or close to the floor."""
-    left = float((held_out_loss(state.model) - state.floor).sum())
-    return left / float(state.model.size.sum()) < settings.smallest_gain
+    """Whether what is left on every axis is within formula error or close to the floor."""
+    left = state.layout.by_axis(held_out_loss(state.model) - state.floor)
+    return bool(np.all(left / state.layout.samples() < settings.smallest_gain))

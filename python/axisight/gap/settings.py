@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from axisight.robot import Robot
@@ -42,24 +43,26 @@ class Settings:
     candidates together would exceed ``false_alarms``. A mean square up to
     ``largest_scatter`` above the floor counts as scatter of the simulator.
     ``explained_share``: below it, the causes found do not explain the gap.
-    ``seed`` rules every random choice.
+    ``cutoff_hz``: of the low-pass on motion and torque in inverse dynamics; None chooses it
+    from the data. ``seed`` rules every random choice.
     """
 
     tolerances: Mapping[str, float] | None = None
     model_error: float = 0.01
     bandwidth_hz: float = 125.0
     block_s: float = 1.0
-    max_causes: int = 3
+    max_causes: int = 40
     smallest_gain: float = 0.05
     largest_scatter: float = 0.3
-    smallest_score: float = 0.3
+    smallest_score: float = 0.1
     smallest_share: float = 0.005
     explained_share: float = 0.6
     significance: float = 3.0
     false_alarms: float = 0.05
+    cutoff_hz: float | None = None
     bootstrap: int = 1000
     seed: int = 0
-    threads: int = 2
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
 
     def tolerances_of(self, robot: Robot) -> Mapping[str, float]:
         """Return the tolerances of a robot's parameters by quantity."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from axisight.effects import Effect, effect_info
+import numpy as np
+
+from axisight.effects import effect_info
 from axisight.gap.advice import separating_experiment
-from axisight.gap.decide import Ranked, inseparable
+from axisight.gap.decide import Ranked, Standing
 from axisight.gap.model import Evidence
-from axisight.gap.result import Candidate, Cause, Gap, Interval, VerdictKind, Where
+from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
@@ -24,6 +26,8 @@ class NamedCause:
     probability: float
     parameters: dict[str, Interval]
     units: dict[str, str]
+    family: str
+    family_probability: float
 
 
 @dataclass(frozen=True)
@@ -36,41 +40,12 @@ class Conclusion:
     equivalent: tuple[tuple[str, ...], ...]
     next_experiment: str | None
     ranking: tuple[Candidate, ...]
+    p_none: float
+    p_unknown: float
+    axes: tuple[AxisVerdict, ...]
     checks: tuple[str, ...]
-
-    def headline(
-        self,
-        gap: Gap,
-        causes: Sequence[Cause],
-        where: Sequence[Where],
-        own: Sequence[Effect] = (),
-    ) -> str:
-        """Return the finding in one or two plain sentences; ``own``: effects of the simulator."""
-        if self.verdict == "none":
-            return (
-                f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
-                f"{_percent(gap.refitted)} of the torque unexplained; sensor noise alone leaves {_percent(gap.floor)}."
-            )
-        place = f" The gap lies mainly on axis {where[0].axis}." if where else ""
-        if self.verdict == "unknown":
-            return (
-                f"The simulator misses something that no known effect explains well: "
-                f"{_percent(gap.before)} of the torque is unexplained, {_percent(gap.floor)} would be noise.{place}"
-            )
-        present = {(e.name, e.axis) for e in own if e.acts}
-        named = " and ".join(
-            ("the machine's values of " if (c.effect, c.axis) in present else "")
-            + _spoken(c.effect, c.axis)
-            for c in causes
-        )
-        shrinks = (
-            f"adding it shrinks the gap on held-out data from {_percent(gap.before)} to {_percent(gap.after)} "
-            f"of the torque (noise alone: {_percent(gap.floor)})."
-        )
-        if self.verdict == "undecidable":
-            rivals = " or ".join(label for label in self.equivalent[0])
-            return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
-        return f"The simulator lacks {named}: {shrinks}"
+    withdrawn: str | None = None
+    """Why the validation logs contradict what the estimation logs say."""
 
 
 def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusion:
@@ -81,45 +56,93 @@ def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusi
     """
     accepted = found.accepted
     explained = found.explained()
-    first = found.rounds[0].ranked
-    ranking = tuple(_candidate(r, found.rounds[0].accepted is not None) for r in first)
-    checks = _checks(found, settings, explained)
+    labels = {r.trial.label for r, _ in accepted}
+    strongest = _strongest(found)
+    ranking = () if strongest is None else tuple(_candidate(r) for r in strongest.ranked)
+    groups = [_open(r, s, labels) for r, s in accepted]
+    open_groups = tuple(g for g in groups if len(g) > 1)
+    gap = stands_out and _significant(found, settings)
     if not accepted:
-        verdict: VerdictKind = "unknown" if stands_out and _significant(found, settings) else "none"
-        advice = _advice_unknown() if verdict == "unknown" else None
-        return Conclusion(verdict, (), ranking[:5], (), advice, ranking, checks)
-    if explained < settings.explained_share:
-        return Conclusion("unknown", (), ranking[:5], (), _advice_unknown(), ranking, checks)
-    groups = [inseparable(r.ranked) for r in found.rounds if r.accepted is not None]
-    open_groups = tuple(tuple(r.trial.label for r in g) for g in groups if len(g) > 1)
-    causes = tuple(_named(r, i, found.model) for i, r in enumerate(accepted))
-    verdict = "undecidable" if open_groups else "explained"
-    labels = {c.trial.label for c in accepted}
-    alternatives = tuple(c for c in ranking if c.label not in labels)[:5]
-    advice = separating_experiment(open_groups[0]) if open_groups else None
-    return Conclusion(verdict, causes, alternatives, open_groups, advice, ranking, checks)
+        verdict: VerdictKind = "unknown" if gap else "none"
+    elif explained < settings.explained_share:
+        verdict = "unknown"
+    else:
+        verdict = "undecidable" if open_groups else "explained"
+    believed = verdict in ("explained", "undecidable")
+    causes = tuple(
+        _named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted) if believed
+    )
+    advice = _advice_unknown() if verdict == "unknown" else None
+    if verdict == "undecidable":
+        advice = separating_experiment(open_groups[0])
+    named = {c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in causes}
+    return Conclusion(
+        verdict=verdict,
+        causes=causes,
+        alternatives=tuple(c for c in ranking if c.label not in named)[:5],
+        equivalent=open_groups if believed else (),
+        next_experiment=advice,
+        ranking=ranking,
+        p_none=1.0 if strongest is None else strongest.p_none,
+        p_unknown=0.0 if strongest is None else strongest.p_unknown,
+        axes=_axes(found, settings, causes, gap=gap),
+        checks=_checks(found, settings, explained),
+    )
+
+
+def _strongest(found: Search) -> Standing | None:
+    """Return how candidates first stood where there was most to explain."""
+    first = found.rounds[0].standings
+    left = found.to_explain() / found.layout.samples()
+    return max(first, key=lambda s: float(left[s.axis]), default=None)
+
+
+def _open(winner: Ranked, standing: Standing, accepted: set[str]) -> tuple[str, ...]:
+    """Return the labels the data cannot tell from a cause; what is a cause itself is told apart."""
+    rivals = [r.trial.label for r in standing.inseparable()]
+    return (winner.trial.label, *(x for x in rivals if x not in accepted))
+
+
+def _axes(
+    found: Search, settings: Settings, causes: Sequence[NamedCause], *, gap: bool
+) -> tuple[AxisVerdict, ...]:
+    """Return what the estimation logs say of each axis."""
+    excess, removed = found.to_explain(), found.removed()
+    samples = found.layout.samples()
+    out = []
+    for i in range(found.layout.n_axes):
+        mine = tuple(k for k, c in enumerate(causes) if c.axis in (i + 1, None))
+        share = float(removed[i] / excess[i]) if excess[i] > 0 else 0.0
+        if not gap or excess[i] / samples[i] <= settings.largest_scatter:
+            verdict: VerdictKind = "explained" if any(causes[k].axis for k in mine) else "none"
+        else:
+            believed = bool(causes) and share >= settings.explained_share
+            verdict = "explained" if believed else "unknown"
+        out.append(AxisVerdict(i + 1, verdict, float(excess[i] / samples[i]), share, mine))
+    return tuple(out)
 
 
 def _significant(found: Search, settings: Settings) -> bool:
     """Whether the re-fitted simulator leaves more than floor and formula error."""
-    excess = held_out_loss(found.baseline) - found.floor
-    return float(excess.sum() / found.baseline.size.sum()) > settings.largest_scatter
+    excess = found.layout.by_axis(held_out_loss(found.baseline) - found.floor)
+    return bool(np.any(excess / found.layout.samples() > settings.largest_scatter))
 
 
-def _candidate(ranked: Ranked, any_accepted: bool) -> Candidate:
+def _candidate(ranked: Ranked) -> Candidate:
     effect = ranked.trial.candidate.effect
     return Candidate(
         effect.name,
         effect.axis,
-        # Without an accepted cause, the probabilities say only which would be least bad.
-        ranked.probability if any_accepted else 0.0,
+        ranked.probability,
         ranked.score,
         ranked.significance,
         ranked.trial.evidence.status,
     )
 
 
-def _named(ranked: Ranked, position: int, model: Evidence) -> NamedCause:
+def _named(
+    ranked: Ranked, standing: Standing, position: int, model: Evidence, accepted: set[str]
+) -> NamedCause:
     effect = model.effects[position]
     values = effect.parameters or {}
     info = effect_info(effect.name)
@@ -132,11 +155,17 @@ def _named(ranked: Ranked, position: int, model: Evidence) -> NamedCause:
         if p.name.startswith("order_") and values.get(p.name):
             intervals[p.name] = Interval(values[p.name], values[p.name], values[p.name])
     units = {p.name: p.unit for p in info.parameters}
-    return NamedCause(effect.name, effect.axis, ranked.probability, intervals, units)
+    # What is a cause beside it is no rival.
+    beside = sum(
+        r.probability for r in standing.ranked if r is not ranked and r.trial.label in accepted
+    )
+    alone = ranked.probability / max(1.0 - beside, 1e-300)
+    family = max(standing.family_probability(ranked), alone)
+    return NamedCause(effect.name, effect.axis, alone, intervals, units, info.family, family)
 
 
 def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, ...]:
-    tried = sum(len(r.ranked) for r in found.rounds)
+    tried = sum(len({r.trial.label for s in x.standings for r in s.ranked}) for x in found.rounds)
     before = held_out_loss(found.baseline)
     size = float(found.baseline.size.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
@@ -158,12 +187,3 @@ def _advice_unknown() -> str:
         "Look at the gap map for the axis, band and regime of the residual; record a run that "
         "repeats the same motion twice, to tell a repeatable effect from a disturbance in time."
     )
-
-
-def _percent(x: float) -> str:
-    return f"{100 * x:.3g} %"
-
-
-def _spoken(effect: str, axis: int | None) -> str:
-    words = effect.replace("_", " ")
-    return words if axis is None else f"{words} on axis {axis}"

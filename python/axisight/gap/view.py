@@ -33,6 +33,8 @@ class View(ABC):
     settings: Settings
     fitter: ModelFitter
     floor: Floor
+    cutoff_hz: float | None = None
+    """Of the low-pass on both sides; None where there is none."""
 
     def candidates(self, model: Evidence) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model."""

@@ -66,14 +66,18 @@ impl BlockGram {
         let n = columns.len();
         let mut matrix = vec![0.0; n * n];
         let mut gradient = vec![0.0; n];
-        let weighted: Vec<Vec<f64>> = columns
+        // Most effects act on one axis and leave the blocks of the others alone.
+        let acting: Vec<(usize, &[f64])> = columns
             .iter()
-            .map(|c| c[range.clone()].iter().zip(w).map(|(x, w)| x * w).collect())
+            .map(|c| &c[range.clone()])
+            .enumerate()
+            .filter(|(_, column)| column.iter().any(|x| *x != 0.0))
             .collect();
-        for i in 0..n {
-            gradient[i] = dot(&weighted[i], r);
-            for j in 0..=i {
-                let entry = dot(&weighted[i], &columns[j][range.clone()]);
+        for (slot, (i, column)) in acting.iter().enumerate() {
+            let weighted: Vec<f64> = column.iter().zip(w).map(|(x, w)| x * w).collect();
+            gradient[*i] = dot(&weighted, r);
+            for (j, other) in &acting[..=slot] {
+                let entry = dot(&weighted, other);
                 matrix[i * n + j] = entry;
                 matrix[j * n + i] = entry;
             }

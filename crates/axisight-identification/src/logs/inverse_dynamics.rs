@@ -7,8 +7,8 @@
 use super::gram::{Block, cut};
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
 use axisight_core::effects::Motor;
-use axisight_core::plant::assemble;
-use axisight_core::robot::{EffectSetting, RobotDescription};
+use axisight_core::plant::{Axis, Plant, PlantError, assemble};
+use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Scalar};
 use rayon::prelude::*;
@@ -102,6 +102,8 @@ impl InverseDynamics {
     }
 
     /// Predicted torque of one record: `[quantity][axis][sample]`, value first.
+    ///
+    /// Where no seed is in the arm, its dynamics (most of the work) are those of plain numbers.
     fn predict<S: Scalar>(
         &self,
         record: &MotionRecord,
@@ -109,54 +111,24 @@ impl InverseDynamics {
         seeds: &[usize],
     ) -> Result<Vec<Vec<Vec<f64>>>, ProblemError> {
         let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
-        let plant = assemble(&self.robot, &overrides, &settings)
-            .map_err(|e| ProblemError::Failed(e.to_string()))?;
-        let (n, n_axes) = (plant.chain.len(), plant.axes.len());
-        let n_samples = record.position.len() / n_axes;
-        let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; seeds.len() + 1];
-        let mut motion = vec![vec![S::zero(); n]; 3];
-        for k in 0..n_samples {
-            let row = k * n_axes..(k + 1) * n_axes;
-            let sources = [&record.position, &record.velocity, &record.acceleration];
-            for (target, source) in motion.iter_mut().zip(sources) {
-                for (axis, x) in plant.axes.iter().zip(&source[row.clone()]) {
-                    target[axis.joint] = S::constant(x * axis.ratio);
-                }
-            }
-            let state = plant.dynamics.evaluate(&motion[0], &motion[1]);
-            for (i, axis) in plant.axes.iter().enumerate() {
-                let at = |x: &[f64]| S::constant(x[k * n_axes + i]);
-                let passive = state.bias[axis.joint]
-                    - axis.joint_torque_of(motion[0][axis.joint], motion[1][axis.joint]);
-                let joint_force = (0..n).fold(passive, |sum, j| {
-                    state.inertia[axis.joint * n + j].fma(motion[2][j], sum)
-                });
-                let speed = at(&record.velocity);
-                let motor = Motor {
-                    angle: at(&record.position),
-                    speed,
-                    command: at(&record.torque),
-                    load: joint_force * axis.ratio,
-                    internal: &[],
-                };
-                let mut torque = joint_force * axis.ratio
-                    + axis.motor_inertia * at(&record.acceleration)
-                    + axis.viscous_friction * speed;
-                for kernel in &axis.kernels {
-                    torque -= kernel.motor_torque(&motor);
-                }
-                let command = axis
-                    .kernels
-                    .iter()
-                    .rev()
-                    .fold(torque, |t, k| k.drive_inverse(t));
-                out[0][i].push(command.lane(0));
-                for seed in 0..seeds.len() {
-                    out[seed + 1][i].push(command.partial(seed, 0));
-                }
-            }
+        let failed = |e: PlantError| ProblemError::Failed(e.to_string());
+        let plant = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
+        if plant.chain.carries_derivatives() {
+            return Ok(predicted(
+                &plant,
+                record,
+                seeds.len(),
+                &mut Arm::new(&plant),
+            ));
         }
-        Ok(out)
+        let (overrides, settings) = seeded::<f64>(&self.parameters, &self.effects, theta, &[]);
+        let plain = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
+        Ok(predicted(
+            &plant,
+            record,
+            seeds.len(),
+            &mut Arm::new(&plain),
+        ))
     }
 
     /// Whitened residual and derivative series of one record, axes in a row.
@@ -180,12 +152,114 @@ impl InverseDynamics {
         let mut out = vec![Vec::new(); series.len()];
         for (axis, weighting) in self.weighting.iter().enumerate() {
             let plan = weighting.plan(n_samples, self.robot.sample_time);
-            for (quantity, target) in series.iter().zip(&mut out) {
-                target.extend(plan.apply_pair(&quantity[axis], &quantity[axis]).0);
+            // What does not depend on a seed needs no filter; the rest goes two at a time.
+            let acting: Vec<usize> = (0..series.len())
+                .filter(|i| series[*i][axis].iter().any(|x| *x != 0.0))
+                .collect();
+            let start = out[0].len();
+            for target in &mut out {
+                target.resize(start + weighting.output_len(n_samples), 0.0);
+            }
+            for pair in acting.chunks(2) {
+                let (first, second) = (pair[0], pair[pair.len() - 1]);
+                let (a, b) = plan.apply_pair(&series[first][axis], &series[second][axis]);
+                out[first].splice(start.., a);
+                if second != first {
+                    out[second].splice(start.., b);
+                }
             }
         }
         Ok(out)
     }
+}
+
+/// The arm along a motion: forces on its driven joints, without effects.
+struct Arm<'a, S> {
+    plant: &'a Plant<S>,
+    scratch: DynamicsScratch<S>,
+    motion: [Vec<S>; 3],
+    force: Vec<S>,
+}
+
+impl<'a, S: Scalar> Arm<'a, S> {
+    fn new(plant: &'a Plant<S>) -> Self {
+        let zeros = vec![S::zero(); plant.chain.len()];
+        Self {
+            plant,
+            scratch: plant.scratch(),
+            motion: [zeros.clone(), zeros.clone(), zeros.clone()],
+            force: zeros,
+        }
+    }
+
+    /// Force on every joint of the chain in sample `k`: `M(q) q'' + c(q, q') + g(q)`.
+    fn forces(&mut self, record: &MotionRecord, k: usize) -> &[S] {
+        let n_axes = self.plant.axes.len();
+        let sources = [&record.position, &record.velocity, &record.acceleration];
+        for (target, source) in self.motion.iter_mut().zip(sources) {
+            for (axis, x) in self.plant.axes.iter().zip(&source[k * n_axes..]) {
+                target[axis.joint] = S::constant(x * axis.ratio);
+            }
+        }
+        let [q, v, a] = &self.motion;
+        self.plant
+            .dynamics
+            .forces_along(q, v, a, &mut self.scratch, &mut self.force);
+        &self.force
+    }
+}
+
+/// Torque of `plant` along a record, `[quantity][axis][sample]`, value first.
+fn predicted<S: Scalar, T: Scalar>(
+    plant: &Plant<S>,
+    record: &MotionRecord,
+    n_seeds: usize,
+    arm: &mut Arm<'_, T>,
+) -> Vec<Vec<Vec<f64>>> {
+    let n_axes = plant.axes.len();
+    let n_samples = record.position.len() / n_axes;
+    let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; n_seeds + 1];
+    for k in 0..n_samples {
+        let forces = arm.forces(record, k);
+        for (i, axis) in plant.axes.iter().enumerate() {
+            let command = drive(axis, record, k * n_axes + i, lifted(&forces[axis.joint]));
+            out[0][i].push(command.lane(0));
+            for (seed, series) in out[1..].iter_mut().enumerate() {
+                series[i].push(command.partial(seed, 0));
+            }
+        }
+    }
+    out
+}
+
+/// The same number over another scalar; derivatives go along where there are any.
+fn lifted<T: Scalar, S: Scalar>(x: &T) -> S {
+    (0..T::PARTIALS).fold(S::constant(x.lane(0)), |sum, seed| {
+        let slope = x.partial(seed, 0);
+        sum + S::zero().seeded(seed) * slope
+    })
+}
+
+/// Torque commanded in entry `i` of a record, where the arm asks for `force` on the joint.
+fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S) -> S {
+    let at = |x: &[f64]| S::constant(x[i]);
+    let (angle, speed) = (at(&record.position), at(&record.velocity));
+    let joint_force = force - axis.joint_torque_of(angle * axis.ratio, speed * axis.ratio);
+    let motor = Motor {
+        angle,
+        speed,
+        command: at(&record.torque),
+        load: joint_force * axis.ratio,
+        internal: &[],
+    };
+    let mut torque = joint_force * axis.ratio
+        + axis.motor_inertia * at(&record.acceleration)
+        + axis.viscous_friction * speed;
+    for kernel in &axis.kernels {
+        torque -= kernel.motor_torque(&motor);
+    }
+    let kernels = axis.kernels.iter().rev();
+    kernels.fold(torque, |t, k| k.drive_inverse(t))
 }
 
 impl Problem for InverseDynamics {

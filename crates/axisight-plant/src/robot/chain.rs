@@ -92,6 +92,16 @@ impl<S: Scalar> Chain<S> {
         self.joints.is_empty()
     }
 
+    /// Whether anything here depends on a seed.
+    pub fn carries_derivatives(&self) -> bool {
+        let depends = |x: &S| {
+            (0..S::PARTIALS).any(|seed| (0..S::LANES).any(|lane| x.partial(seed, lane) != 0.0))
+        };
+        let bodies = self.joints.iter().filter_map(|joint| joint.body.as_ref());
+        let mut numbers = bodies.flat_map(|b| [b.mass].into_iter().chain(b.com).chain(b.inertia));
+        numbers.any(|x| depends(&x)) || self.gravity.iter().any(depends)
+    }
+
     /// Pose of every link frame at joint angles `q`.
     pub fn poses(&self, q: &[S]) -> Vec<Pose<S>> {
         let mut pose = Pose {

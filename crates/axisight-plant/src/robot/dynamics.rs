@@ -192,16 +192,16 @@ pub struct DynamicsScratch<S> {
 }
 
 /// The scratch at the size of the code that uses it.
-struct Sized<'a, S> {
-    /// Number of joints with padding: a constant where the code is made for it.
-    size: usize,
-    inertia: &'a mut [S],
-    bias: &'a mut [S],
-    angles: &'a mut [S],
-    trigonometry: &'a mut [(S, S)],
-    axes: &'a mut [Screw<S>],
-    moments: &'a mut [Moments<S>],
-    wrenches: &'a mut [Screw<S>],
+struct Sized<'a, S, const N: usize> {
+    /// Joints that count, padding included: `N`, unless the code is made for any number.
+    n: usize,
+    inertia: &'a mut [[S; N]; N],
+    bias: &'a mut [S; N],
+    angles: &'a mut [S; N],
+    trigonometry: &'a mut [(S, S); N],
+    axes: &'a mut [Screw<S>; N],
+    moments: &'a mut [Moments<S>; N],
+    wrenches: &'a mut [Screw<S>; N],
 }
 
 impl<S: Scalar> DynamicsScratch<S> {
@@ -219,19 +219,19 @@ impl<S: Scalar> DynamicsScratch<S> {
         }
     }
 
+    /// For a chain of `len` joints; `None` if the scratch was made for another size.
     #[inline(always)]
-    fn sized<const N: usize>(&mut self) -> Sized<'_, S> {
-        let size = if N == ANY { self.bias.len() } else { N };
-        Sized {
-            size,
-            inertia: &mut self.inertia[..size * size],
-            bias: &mut self.bias[..size],
-            angles: &mut self.angles[..size],
-            trigonometry: &mut self.trigonometry[..size],
-            axes: &mut self.axes[..size],
-            moments: &mut self.moments[..size],
-            wrenches: &mut self.wrenches[..size],
-        }
+    fn sized<const N: usize>(&mut self, len: usize) -> Option<Sized<'_, S, N>> {
+        Some(Sized {
+            n: if N == MOST_JOINTS { len } else { N },
+            inertia: self.inertia.as_chunks_mut().0.first_chunk_mut()?,
+            bias: self.bias.first_chunk_mut()?,
+            angles: self.angles.first_chunk_mut()?,
+            trigonometry: self.trigonometry.first_chunk_mut()?,
+            axes: self.axes.first_chunk_mut()?,
+            wrenches: self.wrenches.first_chunk_mut()?,
+            moments: self.moments.first_chunk_mut()?,
+        })
     }
 }
 
@@ -244,23 +244,20 @@ pub struct DynamicsState<S> {
     pub bias: Vec<S>,
 }
 
-/// Longest chain that can be simulated.
+/// Longest chain that can be simulated; code of this size serves any number of joints.
 pub const MOST_JOINTS: usize = 32;
-
-/// Code for any number of joints.
-const ANY: usize = 0;
 
 /// Call `$method::<N>($arguments)` for the smallest compiled size that holds `$n` joints.
 macro_rules! sized {
     ($n:expr, $object:ident . $method:ident ( $($argument:expr),* )) => {
         if const { S::PARTIALS > 0 } {
-            $object.$method::<ANY>($($argument),*)
+            $object.$method::<MOST_JOINTS>($($argument),*)
         } else {
             match $n {
                 0..=1 => $object.$method::<1>($($argument),*),
                 2..=3 => $object.$method::<3>($($argument),*),
                 4..=7 => $object.$method::<7>($($argument),*),
-                _ => $object.$method::<ANY>($($argument),*),
+                _ => $object.$method::<MOST_JOINTS>($($argument),*),
             }
         }
     };
@@ -306,6 +303,26 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
+    /// Forces on the joints along a motion, `M(q) a + c(q, v) + g(q)`, in `force`.
+    #[inline(never)]
+    pub fn forces_along(
+        &self,
+        q: &[S],
+        v: &[S],
+        a: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        force: &mut [S],
+    ) {
+        self.place(q, scratch);
+        self.add_rates(v, scratch);
+        let padded = scratch.bias.len();
+        for (i, force) in force.iter_mut().enumerate() {
+            let entry = |j: usize| scratch.inertia[i.min(j) * padded + i.max(j)];
+            let accelerated = a.iter().enumerate();
+            *force = accelerated.fold(scratch.bias[i], |sum, (j, a)| entry(j).fma(*a, sum));
+        }
+    }
+
     /// Accelerations of the joints under forces `tau` [Nm or N].
     pub fn accelerate(&self, q: &[S], v: &[S], tau: &[S]) -> Vec<S> {
         let mut scratch = self.scratch();
@@ -334,7 +351,7 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     fn padded_size<const N: usize>(&self) -> usize {
-        if N == ANY { self.len() } else { N }
+        N
     }
 
     /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
@@ -360,15 +377,17 @@ impl<S: Scalar> Dynamics<S> {
     #[inline(never)]
     #[allow(clippy::unused_self)] // called like the other sized methods
     fn factorize_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
-        let sized = scratch.sized::<N>();
-        factorize(sized.inertia, sized.size);
+        if let Some(sized) = scratch.sized::<N>(self.len()) {
+            factorize(sized.inertia, sized.n);
+        }
     }
 
     #[inline(never)]
     #[allow(clippy::unused_self)]
     fn solve_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
-        let sized = scratch.sized::<N>();
-        solve_factorized(sized.inertia, sized.bias, sized.size);
+        if let Some(sized) = scratch.sized::<N>(self.len()) {
+            solve_factorized(sized.inertia, sized.bias, sized.n);
+        }
     }
 
     #[inline(never)]
@@ -376,21 +395,24 @@ impl<S: Scalar> Dynamics<S> {
         for (angle, q) in scratch.angles.iter_mut().zip(q) {
             *angle = *q;
         }
-        let mut sized = scratch.sized::<N>();
-        self.sweep_out(&mut sized);
-        self.compose(&mut sized);
+        if let Some(mut sized) = scratch.sized::<N>(self.len()) {
+            self.sweep_out(&mut sized);
+            self.compose(&mut sized);
+        }
     }
 
     #[inline(never)]
     fn add_rates_sized<const N: usize>(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
-        let sized = scratch.sized::<N>();
+        let Some(sized) = scratch.sized::<N>(self.len()) else {
+            return;
+        };
         let mut velocity = Screw::zero();
         // Gravity is an acceleration of the base.
         let mut acceleration = Screw {
             angular: Vec3::zero(),
             linear: Vec3(self.gravity.map(|g| -g)),
         };
-        for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(sized.size) {
+        for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(N) {
             let motion = sized.axes[i].scale(*v);
             velocity.turn_add(&motion, &mut acceleration);
             velocity.add(&motion);
@@ -402,7 +424,7 @@ impl<S: Scalar> Dynamics<S> {
             }
         }
         let mut tip = Screw::zero();
-        for (i, segment) in self.segments.iter().enumerate().take(sized.size).rev() {
+        for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
             if segment.body.is_some() {
                 tip.add(&sized.wrenches[i]);
             }
@@ -411,10 +433,11 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     #[inline(always)]
-    fn sweep_out(&self, sized: &mut Sized<'_, S>) {
-        S::sin_cos_each(sized.angles, sized.trigonometry);
+    fn sweep_out<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
+        let n = sized.n.min(N);
+        S::sin_cos_each(&sized.angles[..n], &mut sized.trigonometry[..n]);
         let mut frame = Frame::base();
-        for (i, segment) in self.segments.iter().enumerate().take(sized.size) {
+        for (i, segment) in self.segments.iter().enumerate().take(N) {
             if let Some(origin) = &segment.origin {
                 frame.position += frame.apply_constant(origin);
             }
@@ -433,23 +456,22 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     #[inline(always)]
-    fn compose(&self, sized: &mut Sized<'_, S>) {
+    fn compose<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
         let mut tip = Moments::zero();
         // The wrench on everything outwards for a unit acceleration of each joint.
-        for (i, segment) in self.segments.iter().enumerate().take(sized.size).rev() {
+        for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
             if segment.body.is_some() {
                 tip.add(&sized.moments[i]);
             }
             sized.wrenches[i] = tip.wrench(&sized.axes[i]);
         }
-        let n = sized.size;
-        for i in 0..n {
-            for j in i..n {
-                sized.inertia[i * n + j] = sized.axes[i].dot(&sized.wrenches[j]);
+        for i in 0..sized.n {
+            for j in i..sized.n {
+                sized.inertia[i][j] = sized.axes[i].dot(&sized.wrenches[j]);
             }
         }
-        for i in self.len()..n {
-            sized.inertia[i * n + i] = S::one();
+        for i in self.len()..sized.n {
+            sized.inertia[i][i] = S::one();
         }
     }
 }

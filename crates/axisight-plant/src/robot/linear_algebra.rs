@@ -2,15 +2,17 @@
 
 use axisight_scalar::Scalar;
 
-/// `L D L^T` of a symmetric positive definite `a`, row-major `(n, n)`, in its upper triangle;
+/// `L D L^T` of the first `n` rows of a symmetric positive definite `a`, in its upper triangle;
 /// about `n^3 / 6` multiplications. The diagonal becomes `1 / d`, entries right of it hold `d l`.
 #[inline(always)]
-pub(super) fn factorize<S: Scalar>(a: &mut [S], n: usize) {
+pub(super) fn factorize<S: Scalar, const N: usize>(a: &mut [[S; N]; N], n: usize) {
     for j in 0..n {
-        let (done, below) = a[..n * n].split_at_mut((j + 1) * n);
-        let pivot_row = &mut done[j * n..];
+        let (done, below) = a.split_at_mut(j + 1);
+        let Some(pivot_row) = done.last_mut() else {
+            return;
+        };
         let inverse = pivot_row[j].recip();
-        for (i, row) in (j + 1..n).zip(below.chunks_exact_mut(n)) {
+        for (i, row) in (j + 1..n).zip(below) {
             let l = -(pivot_row[i] * inverse);
             for k in i..n {
                 row[k] = l.fma(pivot_row[k], row[k]);
@@ -22,20 +24,23 @@ pub(super) fn factorize<S: Scalar>(a: &mut [S], n: usize) {
 
 /// Solve with the matrix that [`factorize`] left.
 #[inline(always)]
-pub(super) fn solve_factorized<S: Scalar>(a: &[S], b: &mut [S], n: usize) {
-    let (a, b) = (&a[..n * n], &mut b[..n]);
+pub(super) fn solve_factorized<S: Scalar, const N: usize>(
+    a: &[[S; N]; N],
+    b: &mut [S; N],
+    n: usize,
+) {
     for j in 0..n {
-        let scaled = -(b[j] * a[j * n + j]);
+        let scaled = -(b[j] * a[j][j]);
         for i in j + 1..n {
-            b[i] = a[j * n + i].fma(scaled, b[i]);
+            b[i] = a[j][i].fma(scaled, b[i]);
         }
     }
     for j in (0..n).rev() {
         let mut sum = b[j];
         for i in j + 1..n {
-            sum = (-a[j * n + i]).fma(b[i], sum);
+            sum = (-a[j][i]).fma(b[i], sum);
         }
-        b[j] = sum * a[j * n + j];
+        b[j] = sum * a[j][j];
     }
 }
 
@@ -49,14 +54,14 @@ mod tests {
         let g = [
             1.0, 0.3, -0.2, 0.7, 0.0, 2.0, 0.4, -1.1, 0.5, 0.0, 1.5, 0.3, -0.6, 0.2, 0.0, 1.2,
         ];
-        let mut a = [0.0_f64; 16];
+        let mut a = [[0.0_f64; 4]; 4];
         for i in 0..4 {
             for j in 0..4 {
-                a[i * 4 + j] = (0..4).map(|k| g[i * 4 + k] * g[j * 4 + k]).sum();
+                a[i][j] = (0..4).map(|k| g[i * 4 + k] * g[j * 4 + k]).sum();
             }
         }
         let x = [1.0, -2.0, 0.5, 3.0];
-        let mut b: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| a[i * 4 + j] * x[j]).sum());
+        let mut b: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| a[i][j] * x[j]).sum());
         factorize(&mut a, 4);
         solve_factorized(&a, &mut b, 4);
         for (got, want) in b.iter().zip(x) {

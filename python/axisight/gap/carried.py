@@ -1,0 +1,92 @@
+"""Whether the verdict of the estimation logs holds on the validation logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from axisight.gap.headline import percent
+from axisight.gap.howfar import Stage, Stages
+from axisight.gap.result import Gap
+from axisight.gap.settings import Settings
+from axisight.gap.verdict import Conclusion
+
+# A gap on one log and axis this much above the floor is seen by eye: a simulator without a fault,
+# re-fitted within its tolerances, leaves less, the errors of its formulas included.
+_FACTOR = 1.3
+_SEEN = 0.03
+# Noise cannot be this much larger than a gap that contains it.
+_ABSURD = 1.25
+
+
+def carried_over(
+    conclusion: Conclusion, stages: Stages, gap: Gap, names: Sequence[str], settings: Settings
+) -> Conclusion:
+    """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
+
+    A cause whose addition does not shrink the validation gap is withdrawn; so is *none* where a
+    log stands above the floor; and nothing is said where the noise estimated from the logs is
+    larger than the gap.
+    """
+    withdrawn = None
+    if gap.floor > _ABSURD * gap.refitted:
+        withdrawn = (
+            f"No verdict: the noise estimated from the logs ({percent(gap.floor)} of the torque) is "
+            f"larger than the gap ({percent(gap.refitted)}): look for faults in the data, such as "
+            f"glitches, frozen or missing samples, with `axisight check`."
+        )
+    elif conclusion.causes:
+        withdrawn = _no_fall(stages, gap, names, settings)
+    elif conclusion.verdict == "none":
+        withdrawn = _above_floor(stages, names)
+    if withdrawn is None:
+        return conclusion
+    return replace(
+        conclusion,
+        verdict="unknown",
+        causes=(),
+        equivalent=(),
+        axes=tuple(replace(a, causes=(), verdict="unknown") for a in conclusion.axes),
+        next_experiment=(
+            "Look at the log and axis named: what was different there (load, pose, speed, torque "
+            "range)? Record more of it for estimation."
+        ),
+        withdrawn=withdrawn,
+    )
+
+
+def _squares(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.array(stage.per_log())
+
+
+def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings) -> str | None:
+    """Say so where the causes remove less than half of what explaining the gap takes."""
+    explainable = gap.before**2 - gap.floor**2
+    fall = gap.before**2 - gap.after**2
+    if explainable > 0 and fall / explainable >= 0.5 * settings.explained_share:
+        return None
+    before, after = _squares(stages.given), _squares(stages.after)
+    log, axis = divmod(int(np.argmax(after - before)), after.shape[1])
+    return (
+        f"What explains the estimation logs does not carry over to the validation logs: with it the "
+        f"gap goes from {percent(gap.before)} to {percent(gap.after)} of the torque; on axis {axis + 1} of "
+        f"{names[log]} from {percent(float(np.sqrt(before[log, axis])))} to "
+        f"{percent(float(np.sqrt(after[log, axis])))}."
+    )
+
+
+def _above_floor(stages: Stages, names: Sequence[str]) -> str | None:
+    """Say where the re-fitted simulator leaves more than noise."""
+    left, noise = _squares(stages.refitted), _squares(stages.floor)
+    excess = left - _FACTOR**2 * noise - _SEEN**2
+    if not np.any(excess > 0):
+        return None
+    log, axis = divmod(int(np.argmax(excess)), excess.shape[1])
+    return (
+        f"No effect is missing on the estimation logs, but that does not carry over to the validation "
+        f"logs: on axis {axis + 1} of {names[log]} the simulator leaves "
+        f"{percent(float(np.sqrt(left[log, axis])))} of the torque unexplained; sensor noise alone leaves "
+        f"{percent(float(np.sqrt(noise[log, axis])))}."
+    )

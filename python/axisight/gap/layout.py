@@ -1,0 +1,101 @@
+"""Losses of data blocks summed by axis and by stretch of time, and how sure their fall is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.gap.model import Evidence
+
+Array = NDArray[np.float64]
+
+# Stretches of all logs together, where they are long enough: with fewer, a mean has to lie too
+# many of its own standard errors from zero to be believed.
+_STRETCHES = 16
+# Neighbouring blocks are correlated, stretches of a few blocks nearly not.
+_BLOCKS_A_STRETCH = 2
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the blocks of a problem lie: ``axis`` from 0, ``stretch``, ``log``, each (n_blocks,).
+
+    A stretch is a piece of time of one log, all axes: what happens then on one axis and on
+    another is not independent.
+    """
+
+    axis: NDArray[np.int64]
+    stretch: NDArray[np.int64]
+    log: NDArray[np.int64]
+    size: NDArray[np.int64]
+
+    @property
+    def n_axes(self) -> int:
+        """Number of axes."""
+        return int(self.axis.max()) + 1
+
+    def by_axis(self, values: Array) -> Array:
+        """Return the sum (n_axes,) of values by block (n_blocks,)."""
+        return np.asarray(np.bincount(self.axis, values, minlength=self.n_axes), np.float64)
+
+    def samples(self) -> Array:
+        """Return the number of residuals on each axis (n_axes,)."""
+        return self.by_axis(self.size.astype(np.float64))
+
+    def significance(self, before: Array, after: Array, axis: int | None = None) -> float:
+        """Return how sure a fall of loss by block is, in standard deviations of a normal.
+
+        The fall is summed over the axes (or one ``axis``, from 0) within each stretch of time and
+        compared with its scatter between the stretches of a log: that one log shows an effect
+        and another does not is no doubt of it. An effect may show in a few loud stretches only,
+        or be drowned by one: the plain sums and those relative to the loss of their stretch are
+        both tried, and the larger counts.
+        """
+        used = np.ones(len(before), bool) if axis is None else self.axis == axis
+        _, first, stretches = np.unique(self.stretch[used], return_index=True, return_inverse=True)
+        logs = self.log[used][first]
+        old = np.asarray(np.bincount(stretches, before[used]), np.float64)
+        new = np.asarray(np.bincount(stretches, after[used]), np.float64)
+        fall = old - new
+        relative = fall / np.maximum(old + new, 1e-300)
+        return max(_standard_errors(fall, logs), _standard_errors(relative, logs))
+
+
+def layout_of(evidence: Evidence) -> Layout:
+    """Return where the blocks of a model's evidence lie."""
+    stretch = np.zeros(len(evidence.log), dtype=np.int64)
+    logs = np.unique(evidence.log)
+    wanted = max(4, -(-_STRETCHES // len(logs)))
+    first = 0
+    for log in logs:
+        counts = []
+        for axis in np.unique(evidence.axis[evidence.log == log]):
+            rows = np.flatnonzero((evidence.log == log) & (evidence.axis == axis))
+            rows = rows[np.argsort(evidence.start[rows], kind="stable")]
+            count = max(1, min(wanted, len(rows) // _BLOCKS_A_STRETCH))
+            stretch[rows] = first + count * np.arange(len(rows)) // len(rows)
+            counts.append(count)
+        first += max(counts)
+    return Layout(evidence.axis, stretch, evidence.log, evidence.size)
+
+
+def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:
+    """Return the mean over its standard error, as the normal deviate of equal probability.
+
+    The standard error of a stratified mean: scatter within each log, pooled.
+    """
+    own = [x[logs == log] for log in np.unique(logs)]
+    if max(len(part) for part in own) < 2:
+        own = [x]
+    freedom = sum(len(part) - 1 for part in own)
+    if freedom < 1:
+        return 0.0
+    pooled = sum(float(((part - part.mean()) ** 2).sum()) for part in own) / freedom
+    mean = float(x.mean())
+    t = mean / max(float(np.sqrt(pooled / len(x))), 1e-12 * abs(mean), 1e-300)
+    # The scatter is known from these few only; beyond what floating point holds, it is sure.
+    tail = float(scipy.stats.t.logsf(t, freedom))
+    return float(-scipy.special.ndtri_exp(tail)) if tail > -700 else 37.0

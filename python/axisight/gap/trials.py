@@ -1,0 +1,219 @@
+"""One round of a search: screen every candidate, fit the promising ones, refine the leaders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.errors import InputError
+from axisight.gap.decide import Standing, Trial, stand, trial
+from axisight.gap.layout import Layout
+from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.score import held_out_loss, linear_gain
+from axisight.gap.settings import Settings
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+A = TypeVar("A")
+B = TypeVar("B")
+
+# Candidates of a place fitted in full: the best of the screen, and all that come near them.
+_FITTED = 4
+_NEAR = 0.3
+# A linear step promises less than a fit may gain; this much less of what is worth naming.
+_HOPELESS = 0.3
+# Candidates fitted where none is worth it.
+_LOOKED_AT = 3
+
+
+def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]:
+    """Return the effects of a model without those that a new one contains at the same place."""
+    contains = effect_info(new.effect.name).contains
+    place = (new.effect.axis, getattr(new.effect, "axes", None))
+    return [
+        f
+        for f in free
+        if f.effect.name not in contains
+        or (f.effect.axis, getattr(f.effect, "axes", None)) != place
+    ]
+
+
+def fresh(options: Sequence[FreeEffect], model: Evidence, refused: set[str]) -> list[FreeEffect]:
+    """Return the candidates that the model neither has nor contains, and that were not refused."""
+    present = {e.label for e in model.effects}
+    contained = {(name, e.axis) for e in model.effects for name in effect_info(e.name).contains}
+    return [
+        o
+        for o in options
+        if o.effect.label not in present | refused
+        and (o.effect.name, o.effect.axis) not in contained
+    ]
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Where the fit of a candidate begins, and the gain it promises."""
+
+    option: FreeEffect
+    robot_values: Mapping[str, float]
+    gain: float
+
+
+class Trials:
+    """Candidates on top of one model. Failures are kept in ``skipped`` with their reason."""
+
+    def __init__(
+        self,
+        fitter: ModelFitter,
+        model: Evidence,
+        floor: Array,
+        layout: Layout,
+        settings: Settings,
+        progress: Progress,
+    ) -> None:
+        self.fitter, self.model, self.floor = fitter, model, floor
+        self.layout, self.settings, self.progress = layout, settings, progress
+        self.current = held_out_loss(model)
+        self.skipped: dict[str, str] = {}
+
+    def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
+        """Screen all candidates by one linear step, fit the promising ones in full."""
+        with ThreadPoolExecutor(self.settings.threads) as pool:
+            try:
+                label = f"screening candidates, round {number}"
+                starts = self._each(pool, self._screened, options, label)
+                chosen = [starts[i] for i in self._promising(starts)]
+                label = f"fitting candidates, round {number}"
+                fitted = self._each(pool, self._fitted, chosen, label)
+            except BaseException:
+                self.fitter.cancel.cancel()
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+        return [t for t in fitted if t is not None]
+
+    def standings(self, trials: Sequence[Trial]) -> list[Standing]:
+        """Return how the trials stand on each axis that one of them improves."""
+        found = [
+            stand(
+                trials,
+                self.current,
+                self.floor,
+                self.layout,
+                axis,
+                explained_share=self.settings.explained_share,
+            )
+            for axis in range(self.layout.n_axes)
+        ]
+        return [s for s in found if s is not None]
+
+    def refined(self, trials: list[Trial], number: int) -> list[Trial]:
+        """Fit the leaders of each axis again with the simulator's sensitivities renewed.
+
+        A large effect bends the re-fitted simulator, and the sensitivities taken from
+        it; the leaders deserve better before one of them is believed.
+        """
+        done: set[str] = set()
+        label = f"refining the leaders, round {number}"
+        while todo := next(iter(self._worth_refining(trials, done)), None):
+            self.progress(label, len(done), len(done) + 1)
+            done.add(todo.label)
+            better = self.fitter.fit(todo.evidence.free, todo.evidence, max_iterations=3)
+            if better.total < todo.evidence.total:
+                trials = [trial(todo.candidate, better) if t is todo else t for t in trials]
+        self.progress(label, 1, 1)
+        return trials
+
+    def _worth_refining(self, trials: Sequence[Trial], done: set[str]) -> list[Trial]:
+        """Return the leaders that explain anything but not nearly everything, not done yet."""
+        out = []
+        for standing in self.standings(trials):
+            leader = standing.best
+            if leader.score > _GOOD_ENOUGH or leader.gain < self.settings.smallest_gain:
+                continue
+            for r in standing.ranked[:_REFINED]:
+                near = r.score > 0.02 and r.score > 0.3 * leader.score
+                if near and r.trial.label not in done and r.trial not in out:
+                    out.append(r.trial)
+        return out
+
+    def _attempt(
+        self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None
+    ) -> A | None:
+        effects = [*kept_beside(self.model.free, option), option]
+        try:
+            return solve(effects, self.model, robot_values=values)
+        except InputError as error:
+            # A candidate that cannot be simulated is out, and the result says so.
+            self.skipped[option.effect.label] = str(error)
+            return None
+
+    def _screened(self, option: FreeEffect) -> _Start:
+        evidence = self._attempt(self.fitter.evaluate, option, None)
+        best = _Start(option, self.model.robot_values, -np.inf)
+        if evidence is not None:
+            best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
+        for values in option.starts:
+            # A large effect bends the re-fitted simulator: its own starts begin without.
+            begin = option.at(values)
+            at_start = self._attempt(self.fitter.evaluate, begin, {})
+            if at_start is not None and self.model.total - at_start.total > best.gain:
+                best = _Start(begin, {}, self.model.total - at_start.total)
+        return best
+
+    def _fitted(self, start: _Start) -> Trial | None:
+        solve = partial(self.fitter.fit, lazy=True)
+        evidence = self._attempt(solve, start.option, start.robot_values)
+        return None if evidence is None else trial(start.option, evidence)
+
+    def _promising(self, starts: Sequence[_Start]) -> list[int]:
+        """Return which candidates to fit: at every place the best, where anything is to be gained."""
+        samples = self.layout.samples()
+        places = sorted({s.option.effect.axis or 0 for s in starts})
+        keep: list[int] = []
+        for place in places:
+            mine = [i for i, s in enumerate(starts) if (s.option.effect.axis or 0) == place]
+            mine.sort(key=lambda i: -starts[i].gain)
+            worth = samples[place - 1] if place else samples.min()
+            least = _HOPELESS * self.settings.smallest_gain * float(worth)
+            best = starts[mine[0]].gain
+            keep += [
+                i
+                for k, i in enumerate(mine)
+                if starts[i].gain > least
+                and (k < _FITTED or (k < 2 * _FITTED and starts[i].gain > _NEAR * best))
+            ]
+        # Where nothing is worth a cause, the best of all still say what was looked at.
+        return keep or sorted(range(len(starts)), key=lambda i: -starts[i].gain)[:_LOOKED_AT]
+
+    def _each(
+        self, pool: ThreadPoolExecutor, work: Callable[[A], B], items: Sequence[A], label: str
+    ) -> list[B]:
+        out = []
+        for k, value in enumerate(pool.map(work, items)):
+            out.append(value)
+            self.progress(label, k + 1, len(items))
+        return out
+
+
+# Leaders of an axis that are refined, unless the first already explains nearly everything.
+_REFINED = 2
+_GOOD_ENOUGH = 0.95
+
+
+# Share of a gain that another candidate may have on the same axis and not count as felt.
+_FELT = 0.2
+
+
+def interact(one: int, other: int, axis: int, fall: Array) -> bool:
+    """Whether trial ``one``, taken in, would change what ``other`` gains on ``axis``.
+
+    ``fall`` (n_trials, n_axes): what each lowers the loss by.
+    """
+    return bool(abs(fall[one, axis]) > _FELT * abs(fall[other, axis]))
