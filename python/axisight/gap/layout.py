@@ -15,8 +15,6 @@ Array = NDArray[np.float64]
 # Stretches of all logs together, where they are long enough: with fewer, a mean has to lie too
 # many of its own standard errors from zero to be believed.
 _STRETCHES = 16
-# Neighbouring blocks are correlated, stretches of a few blocks nearly not.
-_BLOCKS_A_STRETCH = 2
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ def layout_of(evidence: Evidence) -> Layout:
         for axis in np.unique(evidence.axis[evidence.log == log]):
             rows = np.flatnonzero((evidence.log == log) & (evidence.axis == axis))
             rows = rows[np.argsort(evidence.start[rows], kind="stable")]
-            count = max(1, min(wanted, len(rows) // _BLOCKS_A_STRETCH))
+            count = min(wanted, len(rows))
             stretch[rows] = first + count * np.arange(len(rows)) // len(rows)
             counts.append(count)
         first += max(counts)

@@ -350,6 +350,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
+    #[allow(clippy::unused_self)] // called like the other sized methods
     fn padded_size<const N: usize>(&self) -> usize {
         N
     }
@@ -375,7 +376,6 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     #[inline(never)]
-    #[allow(clippy::unused_self)] // called like the other sized methods
     fn factorize_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
         if let Some(sized) = scratch.sized::<N>(self.len()) {
             factorize(sized.inertia, sized.n);
@@ -383,7 +383,6 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     #[inline(never)]
-    #[allow(clippy::unused_self)]
     fn solve_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
         if let Some(sized) = scratch.sized::<N>(self.len()) {
             solve_factorized(sized.inertia, sized.bias, sized.n);
