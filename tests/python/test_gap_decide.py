@@ -126,6 +126,16 @@ def test_where_there_is_nothing_to_explain_no_cause_is_most_probable():
     assert found.p_none > max(found.p_unknown, found.best.probability)
 
 
+def test_without_its_first_candidates_a_standing_still_sums_to_one():
+    one, two = (
+        a_trial("viscous_friction", 1, np.full(40, x), axis=k) for k, x in ((1, 1.0), (2, 4))
+    )
+    left = standing([one, two]).without_first(1)
+    assert [r.trial for r in left.ranked] == [two]
+    assert total(left) == pytest.approx(1.0)
+    assert standing([one, two]).without_first(0) == standing([one, two])
+
+
 def test_of_equal_fits_the_simpler_wins():
     simple = a_trial("coulomb_friction", 2, np.full(40, 1.1))
     elaborate = a_trial("asymmetric_friction", 3, np.full(40, 1.099))

@@ -93,6 +93,13 @@ class Standing:
         )
         return float(sum(r.probability for r in mine))
 
+    def without_first(self, count: int) -> Standing:
+        """Return the same without its first candidates, probabilities of the others scaled up."""
+        left = self.ranked[count:]
+        whole = sum(r.probability for r in left) + self.p_none + self.p_unknown
+        scaled = (replace(r, probability=r.probability / whole) for r in left)
+        return Standing(self.axis, tuple(scaled), self.p_none / whole, self.p_unknown / whole)
+
     def inseparable(self) -> list[Ranked]:
         """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
         winner = self.best

@@ -156,12 +156,14 @@ _NEARLY = 0.8
 def _led_by_a_cause(
     standing: Standing, state: Search, settings: Settings, tried: int
 ) -> Standing | None:
-    """Return the standing led by its first candidate that is a cause, not far behind the winner."""
-    for r in standing.ranked:
+    """Return the standing led by its first candidate that is a cause, not far behind the winner.
+
+    Those before it, which the data do not show evenly enough to be causes, are no rivals.
+    """
+    for k, r in enumerate(standing.ranked):
         near = r.score >= _NEARLY * standing.best.score
         if near and _is_cause(r, standing, state, settings, tried):
-            rest = (x for x in standing.ranked if x is not r)
-            return replace(standing, ranked=(r, *rest))
+            return standing.without_first(k)
     return None
 
 
