@@ -83,16 +83,6 @@ class Standing:
         """The most probable candidate."""
         return self.ranked[0]
 
-    def family_probability(self, member: Ranked) -> float:
-        """Return the probability of all candidates of a family at the same place as one of them."""
-        place = member.trial.candidate.effect.axis
-        mine = (
-            r
-            for r in self.ranked
-            if r.family == member.family and r.trial.candidate.effect.axis == place
-        )
-        return float(sum(r.probability for r in mine))
-
     def without_first(self, count: int) -> Standing:
         """Return the same without its first candidates, probabilities of the others scaled up."""
         left = self.ranked[count:]

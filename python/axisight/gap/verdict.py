@@ -155,12 +155,14 @@ def _named(
         if p.name.startswith("order_") and values.get(p.name):
             intervals[p.name] = Interval(values[p.name], values[p.name], values[p.name])
     units = {p.name: p.unit for p in info.parameters}
-    # What is a cause beside it is no rival.
-    beside = sum(
-        r.probability for r in standing.ranked if r is not ranked and r.trial.label in accepted
-    )
-    alone = ranked.probability / max(1.0 - beside, 1e-300)
-    family = max(standing.family_probability(ranked), alone)
+    # Whether anything explains the axis is judged with all causes in; among candidates, what is a
+    # cause beside it is no rival.
+    rivals = [r for r in standing.ranked if r is ranked or r.trial.label not in accepted]
+    whole = max(sum(r.probability for r in rivals), 1e-300)
+    place = effect.axis
+    kin = [r for r in rivals if r.family == info.family and r.trial.candidate.effect.axis == place]
+    alone = ranked.probability / whole
+    family = max(sum(r.probability for r in kin) / whole, alone)
     return NamedCause(effect.name, effect.axis, alone, intervals, units, info.family, family)
 
 
