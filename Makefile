@@ -16,8 +16,8 @@ CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 BIN := $(VENV)/bin
-# Byte code is made when a module is first imported, not for all that is installed.
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# Byte code is made when a module is first imported, not for all that is installed.
 INSTALL := $(PIP) install --no-compile
 WHEELS := $(TARGET)/wheels
 STAMPS := $(VENV)/.stamps
@@ -105,7 +105,8 @@ $(WHEELS)/.built: $(WHEELS)/.sources $(SOURCES) | $(STAMPS)/build-tools
 	@touch $@.begun
 	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")' > $@.requirements
 	$(INSTALL) --requirement $@.requirements & fetched=$$!; \
-	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS) && wait $$fetched
+	$(BIN)/maturin build --release --locked --interpreter $(BIN)/python --out $(WHEELS); \
+	built=$$?; wait $$fetched && exit $$built
 	@mv $@.begun $@
 
 # An editable install (`maturin develop`) is replaced: tests and demo use the wheel.

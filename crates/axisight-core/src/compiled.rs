@@ -4,19 +4,13 @@
 use crate::plant::{assemble, stepper};
 use crate::simulation::simulate_linear;
 use axisight_plant::simulation::Sample;
-use axisight_scalar::{Dual, Lanes, Scalar};
+use axisight_scalar::{Lanes, Scalar};
 use std::hint::black_box;
 
 /// The scalars of [`axisight_plant::compiled`]; the linear plant carries no derivatives.
 #[inline(never)] // or it would be compiled above, where it is not called
 pub fn compiled() {
-    effects::<f64>();
-    effects::<Lanes<4>>();
-    effects::<Lanes<8>>();
-    effects::<Dual<f64, 8>>();
-    effects::<Dual<Lanes<4>, 1>>();
-    effects::<Dual<Lanes<4>, 2>>();
-    effects::<Dual<Lanes<4>, 4>>();
+    axisight_plant::for_compiled_scalars!(effects);
     linear::<f64>();
     linear::<Lanes<4>>();
     linear::<Lanes<8>>();

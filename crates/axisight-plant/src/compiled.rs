@@ -7,20 +7,28 @@
 use crate::plant::{Plant, equilibrium};
 use crate::robot::Dynamics;
 use crate::simulation::{Sample, Stepper, simulate};
-use axisight_scalar::{Dual, Lanes, Scalar};
+use axisight_scalar::Scalar;
 use std::hint::black_box;
 
-/// One run; runs in lock-step; both with derivatives along one, two or four parameters for
-/// fits; eight derivatives of one run for Jacobians.
+/// Call `$keep` for every scalar: one run; runs in lock-step; both with derivatives along one, two
+/// or four parameters for fits; eight derivatives of one run for Jacobians.
+#[macro_export]
+macro_rules! for_compiled_scalars {
+    ($keep:ident) => {
+        $keep::<f64>();
+        $keep::<axisight_scalar::Lanes<4>>();
+        $keep::<axisight_scalar::Lanes<8>>();
+        $keep::<axisight_scalar::Dual<f64, 8>>();
+        $keep::<axisight_scalar::Dual<axisight_scalar::Lanes<4>, 1>>();
+        $keep::<axisight_scalar::Dual<axisight_scalar::Lanes<4>, 2>>();
+        $keep::<axisight_scalar::Dual<axisight_scalar::Lanes<4>, 4>>();
+    };
+}
+
+/// Everything that crates above call, for every scalar.
 #[inline(never)] // or it would be compiled above, where it is not called
 pub fn compiled() {
-    keep::<f64>();
-    keep::<Lanes<4>>();
-    keep::<Lanes<8>>();
-    keep::<Dual<f64, 8>>();
-    keep::<Dual<Lanes<4>, 1>>();
-    keep::<Dual<Lanes<4>, 2>>();
-    keep::<Dual<Lanes<4>, 4>>();
+    for_compiled_scalars!(keep);
 }
 
 fn keep<S: Scalar>() {

@@ -27,9 +27,8 @@ _MOST_ROUNDS = 8
 
 @dataclass(frozen=True)
 class Round:
-    """One round: the model it started from, how candidates stood, what was taken in."""
+    """One round: how candidates stood on each axis, what was taken in."""
 
-    start: Evidence
     standings: tuple[Standing, ...]
     accepted: tuple[tuple[Ranked, Standing], ...]
 
@@ -59,21 +58,19 @@ class Search:
     def to_explain(self) -> Array:
         """Return the held-out loss of the re-fitted simulator above the floor, by axis (n_axes,)."""
         used = predictable(self.model)
-        return self._by_axis(np.where(used, held_out_loss(self.baseline) - self.floor, 0.0))
+        above = held_out_loss(self.baseline) - self.floor
+        return self.layout.by_axis(np.where(used, above, 0.0))
 
     def removed(self) -> Array:
         """Return how much of it the causes remove, by axis (n_axes,)."""
         used = predictable(self.model)
         fall = held_out_loss(self.baseline) - held_out_loss(self.model)
-        return self._by_axis(np.where(used, fall, 0.0))
+        return self.layout.by_axis(np.where(used, fall, 0.0))
 
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
         total = float(self.to_explain().sum())
         return float(self.removed().sum()) / total if total > 0 else 0.0
-
-    def _by_axis(self, values: Array) -> Array:
-        return self.layout.by_axis(values)
 
 
 def search(
@@ -100,9 +97,9 @@ def search(
         trials = round_.refined(round_.run(options, number), number)
         out.skipped |= round_.skipped
         room = settings.max_causes - len(out.model.free)
-        taken = _taken(round_, trials, out, settings, len(options), room)
         standings = tuple(round_.standings(trials))
-        out.rounds.append(Round(out.model, standings, taken))
+        taken = _taken(round_, trials, standings, out, settings, len(options), room)
+        out.rounds.append(Round(standings, taken))
         if not taken:
             break
         _take_in(fitter, out, taken, progress)
@@ -115,6 +112,7 @@ def search(
 def _taken(
     round_: Trials,
     trials: Sequence[Trial],
+    standings: Sequence[Standing],
     state: Search,
     settings: Settings,
     tried: int,
@@ -124,29 +122,26 @@ def _taken(
     fall = falls(trials, round_.current, state.layout)
     place = {t.label: i for i, t in enumerate(trials)}
     found: list[tuple[Ranked, Standing]] = []
-    standings = round_.standings(trials)
 
     def felt_most(s: Standing) -> tuple[float, float]:
         # One that leads on several axes is judged where it gains most.
         mine = fall[place[s.best.trial.label]]
         return -float(mine.sum()), -float(mine[s.axis])
 
-    standings.sort(key=felt_most)
-    for standing in standings:
-        mine = place[standing.best.trial.label]
+    for standing in sorted(standings, key=felt_most):
+        led = _led_by_a_cause(standing, state, settings, tried)
+        if led is None:
+            continue
+        mine = place[led.best.trial.label]
         felt = any(
-            interact(place[r.trial.label], mine, standing.axis, fall)
+            interact(place[r.trial.label], mine, led.axis, fall)
             or interact(mine, place[r.trial.label], s.axis, fall)
             for r, s in found
         )
-        if felt or len(found) >= room:
-            continue
-        led = _led_by_a_cause(standing, state, settings, tried)
-        if led is None or not _earns_its_gain(round_.fitter, led.best, state.model):
-            continue
-        simpler = _simpler(led, round_.fitter)
-        found.append((simpler.best, simpler))
-    return tuple(found)
+        if not felt and _earns_its_gain(round_.fitter, led.best, state.model):
+            simpler = _simpler(led, round_.fitter)
+            found.append((simpler.best, simpler))
+    return tuple(found[: max(room, 0)])
 
 
 # Of candidates that explain nearly as much as the first, one may show more evenly over time.

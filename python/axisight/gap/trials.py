@@ -31,18 +31,17 @@ _NEAR = 0.3
 _HOPELESS = 0.3
 # Candidates fitted where none is worth it.
 _LOOKED_AT = 3
+# Leaders of an axis that are refined, unless the first already explains nearly everything.
+_REFINED = 2
+_GOOD_ENOUGH = 0.95
+# Share of a gain that another candidate may have on the same axis and not count as felt.
+_FELT = 0.2
 
 
 def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]:
     """Return the effects of a model without those that a new one contains at the same place."""
     contains = effect_info(new.effect.name).contains
-    place = (new.effect.axis, getattr(new.effect, "axes", None))
-    return [
-        f
-        for f in free
-        if f.effect.name not in contains
-        or (f.effect.axis, getattr(f.effect, "axes", None)) != place
-    ]
+    return [f for f in free if f.effect.name not in contains or f.effect.axis != new.effect.axis]
 
 
 def fresh(options: Sequence[FreeEffect], model: Evidence, refused: set[str]) -> list[FreeEffect]:
@@ -200,15 +199,6 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
-
-
-# Leaders of an axis that are refined, unless the first already explains nearly everything.
-_REFINED = 2
-_GOOD_ENOUGH = 0.95
-
-
-# Share of a gain that another candidate may have on the same axis and not count as felt.
-_FELT = 0.2
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

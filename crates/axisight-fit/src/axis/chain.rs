@@ -2,7 +2,7 @@
 //!
 //! The states are the deflections of the springs and the speeds of the masses, so that a
 //! turning axis has no state that drifts; the motor angle is carried where something needs it.
-//! Friction, backlash, springs and ripple are the formulas of the core's effects.
+//! Friction, backlash, springs and ripple are the formulas of the effects.
 
 use super::layout::AxisModel;
 use axisight_plant::formulas::{dead_zone, harmonic, smoothed_sign, spring_torque, stribeck_level};

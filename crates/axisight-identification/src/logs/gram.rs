@@ -4,6 +4,8 @@
 //! `J^T J`, `J^T r` and `r^T r` per block, cross-validation, bootstrap and
 //! sandwich covariance need no further simulation and no stored residuals.
 
+use axisight_numerics::Weighting;
+
 /// Where a block lies in the residual vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
@@ -30,14 +32,31 @@ pub struct BlockGram {
     pub loss: f64,
 }
 
-/// Cut `len` entries of one axis of one log into blocks of about `block_len`.
-pub(super) fn cut(
-    record: usize,
-    axis: usize,
-    start: usize,
-    len: usize,
-    block_len: usize,
+/// The blocks of logs of `lengths` samples, cut into about `block_s` seconds; log, axis, time.
+pub(super) fn blocks(
+    lengths: impl Iterator<Item = usize>,
+    weighting: &[Weighting],
+    sample_time: f64,
+    block_s: f64,
 ) -> Vec<Block> {
+    let mut start = 0;
+    let mut out = Vec::new();
+    for (record, n_samples) in lengths.enumerate() {
+        for (axis, weighting) in weighting.iter().enumerate() {
+            let len = weighting.output_len(n_samples);
+            let step = sample_time * weighting.decimation as f64;
+            // Truncation is fine: block lengths are approximate.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let block_len = (block_s / step) as usize;
+            out.extend(cut(record, axis, start, len, block_len));
+            start += len;
+        }
+    }
+    out
+}
+
+/// Cut `len` entries of one axis of one log into blocks of about `block_len`.
+fn cut(record: usize, axis: usize, start: usize, len: usize, block_len: usize) -> Vec<Block> {
     let count = (len / block_len.max(1)).max(1);
     (0..count)
         .map(|i| {

@@ -4,8 +4,10 @@
 //! the prediction holds below the first resonance; effects of the transmission,
 //! the sensor and of timing have no place in it.
 
-use super::gram::{Block, cut};
-use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
+use super::gram::{Block, blocks};
+use super::problem::{
+    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
+};
 use axisight_core::effects::Motor;
 use axisight_core::plant::{Axis, Plant, PlantError, assemble};
 use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
@@ -53,29 +55,7 @@ impl InverseDynamics {
     /// [`ProblemError::Invalid`] naming the field.
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
-        let invalid = |field: String, expected: String, got: String| {
-            Err(ProblemError::Invalid {
-                field,
-                expected,
-                got,
-            })
-        };
-        if self.records.is_empty() {
-            return invalid("records".into(), "at least one log".into(), "none".into());
-        }
-        if self.weighting.len() != n_axes {
-            let got = self.weighting.len().to_string();
-            return invalid(
-                "weighting".into(),
-                format!("one for each of {n_axes} axes"),
-                got,
-            );
-        }
-        for weighting in &self.weighting {
-            if let Err(e) = weighting.validate() {
-                return invalid(e.field.into(), e.expected.into(), e.got);
-            }
-        }
+        check_logs(self.records.len(), &self.weighting, n_axes)?;
         for (i, r) in self.records.iter().enumerate() {
             let n = r.position.len();
             for (name, x) in [
@@ -86,15 +66,19 @@ impl InverseDynamics {
             ] {
                 if x.len() != n || n == 0 || n % n_axes != 0 {
                     let expected = format!("{n} numbers, {n_axes} axes");
-                    return invalid(
+                    return Err(invalid(
                         format!("records[{i}].{name}"),
                         expected,
                         x.len().to_string(),
-                    );
+                    ));
                 }
                 if let Some(k) = x.iter().position(|v| !v.is_finite()) {
                     let got = format!("{} at sample {}", x[k], k / n_axes);
-                    return invalid(format!("records[{i}].{name}"), "finite numbers".into(), got);
+                    return Err(invalid(
+                        format!("records[{i}].{name}"),
+                        "finite numbers".into(),
+                        got,
+                    ));
                 }
             }
         }
@@ -297,19 +281,12 @@ impl Problem for InverseDynamics {
 
     fn blocks(&self) -> Vec<Block> {
         let n_axes = self.robot.n_axes();
-        let mut start = 0;
-        let mut out = Vec::new();
-        for (record, motion) in self.records.iter().enumerate() {
-            for (axis, weighting) in self.weighting.iter().enumerate() {
-                let len = weighting.output_len(motion.torque.len() / n_axes);
-                let step = self.robot.sample_time * weighting.decimation as f64;
-                // Truncation is fine: block lengths are approximate.
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                let block_len = (self.block_s / step) as usize;
-                out.extend(cut(record, axis, start, len, block_len));
-                start += len;
-            }
-        }
-        out
+        let lengths = self.records.iter().map(|r| r.torque.len() / n_axes);
+        blocks(
+            lengths,
+            &self.weighting,
+            self.robot.sample_time,
+            self.block_s,
+        )
     }
 }

@@ -2,6 +2,7 @@
 
 use super::gram::Block;
 use axisight_core::robot::{EffectSetting, Parameter};
+use axisight_numerics::Weighting;
 use axisight_scalar::Scalar;
 
 /// What a fitted number is.
@@ -74,6 +75,36 @@ pub enum ProblemError {
         /// What came.
         got: String,
     },
+}
+
+pub(super) fn invalid(field: String, expected: String, got: String) -> ProblemError {
+    ProblemError::Invalid {
+        field,
+        expected,
+        got,
+    }
+}
+
+/// Refuse a problem without logs, or whose weighting does not suit its axes.
+pub(super) fn check_logs(
+    n_logs: usize,
+    weighting: &[Weighting],
+    n_axes: usize,
+) -> Result<(), ProblemError> {
+    if n_logs == 0 {
+        let expected = "at least one log".into();
+        return Err(invalid("records".into(), expected, "none".into()));
+    }
+    if weighting.len() != n_axes {
+        let expected = format!("one for each of {n_axes} axes");
+        let got = weighting.len().to_string();
+        return Err(invalid("weighting".into(), expected, got));
+    }
+    for w in weighting {
+        w.validate()
+            .map_err(|e| invalid(e.field.into(), e.expected.into(), e.got))?;
+    }
+    Ok(())
 }
 
 /// A nonlinear least-squares problem over logs.

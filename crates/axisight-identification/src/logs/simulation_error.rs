@@ -5,8 +5,10 @@
 //! derivatives over `n` samples: about `4 n (1 + 2 d)` times one right-hand
 //! side for a batch of logs.
 
-use super::gram::{Block, cut};
-use super::problem::{Evaluation, FitParameter, Problem, ProblemError, seeded};
+use super::gram::{Block, blocks};
+use super::problem::{
+    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
+};
 use axisight_core::plant::assemble;
 use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
@@ -87,42 +89,24 @@ impl SimulationErrorProblem {
     /// [`ProblemError::Invalid`] naming the field.
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
-        let invalid = |field: String, expected: String, got: String| {
-            Err(ProblemError::Invalid {
-                field,
-                expected,
-                got,
-            })
-        };
-        if self.records.is_empty() {
-            return invalid("records".into(), "at least one log".into(), "none".into());
-        }
-        if self.weighting.len() != n_axes {
-            let got = self.weighting.len().to_string();
-            return invalid(
-                "weighting".into(),
-                format!("one for each of {n_axes} axes"),
-                got,
-            );
-        }
-        for weighting in &self.weighting {
-            if let Err(e) = weighting.validate() {
-                return invalid(e.field.into(), e.expected.into(), e.got);
-            }
-        }
+        check_logs(self.records.len(), &self.weighting, n_axes)?;
         for (i, record) in self.records.iter().enumerate() {
             let (n, m) = (record.input.len(), record.target.len());
             if n != m || n == 0 || n % n_axes != 0 {
                 let expected = format!("input and target of equal size, {n_axes} axes");
-                return invalid(
+                return Err(invalid(
                     format!("records[{i}]"),
                     expected,
                     format!("{n} and {m} numbers"),
-                );
+                ));
             }
             if let Some(k) = record.target.iter().position(|v| !v.is_finite()) {
                 let got = format!("{} at sample {}", record.target[k], k / n_axes);
-                return invalid(format!("records[{i}]"), "finite numbers".into(), got);
+                return Err(invalid(
+                    format!("records[{i}]"),
+                    "finite numbers".into(),
+                    got,
+                ));
             }
         }
         Ok(())
@@ -285,19 +269,12 @@ impl Problem for SimulationErrorProblem {
     }
 
     fn blocks(&self) -> Vec<Block> {
-        let mut start = 0;
-        let mut out = Vec::new();
-        for record in 0..self.records.len() {
-            for (axis, weighting) in self.weighting.iter().enumerate() {
-                let len = weighting.output_len(self.n_samples(record));
-                let step = self.robot.sample_time * weighting.decimation as f64;
-                // Truncation is fine: block lengths are approximate.
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                let block_len = (self.block_s / step) as usize;
-                out.extend(cut(record, axis, start, len, block_len));
-                start += len;
-            }
-        }
-        out
+        let lengths = (0..self.records.len()).map(|record| self.n_samples(record));
+        blocks(
+            lengths,
+            &self.weighting,
+            self.robot.sample_time,
+            self.block_s,
+        )
     }
 }
