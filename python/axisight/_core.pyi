@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CancelToken",
+    "Courses",
     "FitResult",
     "FrequencyFitResult",
     "Linearization",
@@ -29,6 +30,7 @@ __all__ = [
     "axis_linearize",
     "axis_simulate",
     "check_integrator",
+    "courses",
     "design_poses",
     "directions",
     "effect_table",
@@ -373,6 +375,10 @@ def status_advice() -> list[tuple[str, str]]:
     """What to mind of every status that is no convergence: pairs of status and advice."""
 
 @final
+class Courses:
+    """Runs of a model over all logs, for models close to it; see `courses`."""
+
+@final
 class FitResult:
     """Result of a fit. Arrays are copies.
 
@@ -697,6 +703,7 @@ def fit_simulation(
     input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
     warm: Sequence[tuple[int, _Array]] = ...,
+    courses: Courses | None = None,
     cancel: CancelToken | None = None,
 ) -> FitResult:
     """Fit a free-running simulation to logs.
@@ -738,11 +745,31 @@ def evaluate_simulation(
     input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
     warm: Sequence[tuple[int, _Array]] = ...,
+    courses: Courses | None = None,
     cancel: CancelToken | None = None,
 ) -> Linearization:
     """Compare a free-running simulation with logs at the initial values of the parameters.
 
     Arguments as for `fit_simulation`; columns of parameters in ``warm`` are taken from there.
+    """
+
+def courses(
+    robot: Robot,
+    effects: _Effects,
+    parameters: Sequence[ParameterSpec],
+    records: Sequence[tuple[_Array, _Array]],
+    weighting: Sequence[_Weighting],
+    options: OptionSpec,
+    *,
+    input: Literal["reference", "torque", "tracking"] = "reference",
+    output: Literal["torque", "position"] = "torque",
+    cancel: CancelToken | None = None,
+) -> Courses:
+    """Run a model over all logs, at the initial values of the parameters.
+
+    Arguments as for `fit_simulation`. Models close to it are then evaluated with the arm
+    linearised along these runs, at a fraction of the cost; the result may be used for
+    the same logs only.
     """
 
 def evaluate_inverse_dynamics(

@@ -38,4 +38,5 @@ fn keep<S: Scalar>() {
     black_box(Dynamics::<S>::evaluate as fn(_, _, _) -> _);
     black_box(Dynamics::<S>::forces_along as fn(_, _, _, _, _, _));
     black_box(Stepper::<S>::new as fn(_) -> _);
+    black_box(Stepper::<S>::along as fn(_, _) -> _);
 }

@@ -7,7 +7,7 @@ use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_identification::logs::{
-    BlockGram, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
+    BlockGram, Courses as Runs, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
     MotionRecord, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
     SimulationOutput, Target, fit,
 };
@@ -344,6 +344,14 @@ struct SimulationSpec<'a, 'py> {
     options: &'a OptionSpec,
     input: &'a str,
     output: &'a str,
+    courses: Option<&'a Courses>,
+}
+
+/// Runs of a model over all logs, for models close to it.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Courses {
+    /// Nothing where the arm cannot be linearised along runs.
+    runs: Option<Arc<Runs>>,
 }
 
 impl SimulationSpec<'_, '_> {
@@ -381,6 +389,7 @@ impl SimulationSpec<'_, '_> {
             weighting: weightings(self.weighting),
             method: options.integrator.method()?,
             block_s: options.block_s,
+            courses: self.courses.and_then(|c| c.runs.clone()),
             cancel: Some(Arc::clone(cancel)),
         };
         problem.validate().map_err(problem_error)?;
@@ -390,7 +399,7 @@ impl SimulationSpec<'_, '_> {
 
 /// Fit the simulation of logs. `records` are pairs (input, target) of `(n, n_axes)` arrays.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), cancel=None))]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn fit_simulation(
     py: Python<'_>,
@@ -403,6 +412,7 @@ pub fn fit_simulation(
     input: &str,
     output: &str,
     warm: Vec<WarmColumn<'_>>,
+    courses: Option<&Bound<'_, Courses>>,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<FitResult> {
     let cancel = flag(cancel);
@@ -415,6 +425,7 @@ pub fn fit_simulation(
         options: &options,
         input,
         output,
+        courses: courses.map(Bound::get),
     };
     let problem = spec.problem(&cancel)?;
     let options = self::options(&options)?;
@@ -424,7 +435,7 @@ pub fn fit_simulation(
 
 /// The simulation of logs at the initial values of the parameters.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), cancel=None))]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn evaluate_simulation(
     py: Python<'_>,
@@ -437,6 +448,7 @@ pub fn evaluate_simulation(
     input: &str,
     output: &str,
     warm: Vec<WarmColumn<'_>>,
+    courses: Option<&Bound<'_, Courses>>,
     cancel: Option<&Bound<'_, CancelToken>>,
 ) -> PyResult<Linearization> {
     let cancel = flag(cancel);
@@ -449,11 +461,47 @@ pub fn evaluate_simulation(
         options: &options,
         input,
         output,
+        courses: courses.map(Bound::get),
     };
     let problem = spec.problem(&cancel)?;
     let loss = loss(&options)?;
     let parameters = &problem.parameters;
     linearize(py, &cancel, &problem, parameters, loss, &warm)
+}
+
+/// Runs of a model over all logs, along which the arm of models close to it may be linearised.
+#[pyfunction]
+#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", cancel=None))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+pub fn courses(
+    py: Python<'_>,
+    robot: &Robot,
+    effects: Vec<EffectTuple>,
+    parameters: Vec<ParameterSpec>,
+    records: Vec<RecordTuple<'_>>,
+    weighting: Vec<WeightingTuple>,
+    options: OptionSpec,
+    input: &str,
+    output: &str,
+    cancel: Option<&Bound<'_, CancelToken>>,
+) -> PyResult<Courses> {
+    let cancel = flag(cancel);
+    let spec = SimulationSpec {
+        robot,
+        effects,
+        parameters,
+        records,
+        weighting,
+        options: &options,
+        input,
+        output,
+        courses: None,
+    };
+    let problem = spec.problem(&cancel)?;
+    let theta: Vec<f64> = problem.parameters.iter().map(|p| p.initial).collect();
+    let runs = detached(py, &cancel, || Runs::new(&problem, &theta))?;
+    let runs = runs.map_err(problem_error)?.map(Arc::new);
+    Ok(Courses { runs })
 }
 
 /// A motion as (position, velocity, acceleration, torque), each `(n, n_axes)`, motor side.

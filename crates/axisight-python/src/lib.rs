@@ -36,12 +36,14 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<entry::CancelToken>()?;
+    module.add_class::<fit::Courses>()?;
     module.add_class::<fit::FitResult>()?;
     module.add_class::<fit::Linearization>()?;
     module.add_function(wrap_pyfunction!(effects::effect_table, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::check_integrator, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::courses, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
     module.add_function(wrap_pyfunction!(fit::evaluate_simulation, module)?)?;

@@ -114,6 +114,7 @@ impl<R: Scalar, P: Partials<R>> Mul<f64> for DualNumber<R, P> {
 }
 
 impl<R: Scalar, P: Partials<R>> Scalar for DualNumber<R, P> {
+    type Real = R;
     const LANES: usize = R::LANES;
     const PARTIALS: usize = P::COUNT;
 
@@ -129,6 +130,24 @@ impl<R: Scalar, P: Partials<R>> Scalar for DualNumber<R, P> {
         Self {
             value: R::from_lanes(value_of),
             partials: P::zero(),
+        }
+    }
+    #[inline(always)]
+    fn from_real(value: R) -> Self {
+        Self {
+            value,
+            partials: P::zero(),
+        }
+    }
+    #[inline(always)]
+    fn real(self) -> R {
+        self.value
+    }
+    #[inline(always)]
+    fn fma_real(self, a: R, c: Self) -> Self {
+        Self {
+            value: self.value.fma(a, c.value),
+            partials: self.partials.times_plus(a, c.partials),
         }
     }
     #[inline(always)]

@@ -77,6 +77,7 @@ impl<const L: usize> SubAssign for Lanes<L> {
 }
 
 impl<const L: usize> Scalar for Lanes<L> {
+    type Real = Self;
     const LANES: usize = L;
     const PARTIALS: usize = 0;
 
@@ -87,6 +88,18 @@ impl<const L: usize> Scalar for Lanes<L> {
     #[inline(always)]
     fn from_lanes(value_of: impl FnMut(usize) -> f64) -> Self {
         Self(from_fn(value_of))
+    }
+    #[inline(always)]
+    fn from_real(value: Self) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn real(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn fma_real(self, a: Self, c: Self) -> Self {
+        self.fma(a, c)
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f64 {

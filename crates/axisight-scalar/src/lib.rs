@@ -43,6 +43,8 @@ pub trait Scalar:
     + Sub<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
+    /// The same number without its derivatives.
+    type Real: Scalar;
     /// Number of runs carried in lock-step.
     const LANES: usize;
     /// Number of partial derivatives carried.
@@ -52,6 +54,10 @@ pub trait Scalar:
     fn constant(x: f64) -> Self;
     /// One value per lane, with zero derivatives.
     fn from_lanes(value_of: impl FnMut(usize) -> f64) -> Self;
+    /// A value with zero derivatives.
+    fn from_real(value: Self::Real) -> Self;
+    /// The value.
+    fn real(self) -> Self::Real;
     /// The value in one lane.
     fn lane(&self, lane: usize) -> f64;
     /// The derivative with respect to seed `partial` in one lane; zero if none is carried.
@@ -69,6 +75,9 @@ pub trait Scalar:
     fn axpy(self, a: f64, y: Self) -> Self {
         self.fma(Self::constant(a), y)
     }
+    /// `self * a + c` as [`Scalar::fma`], cheaper because `a` carries no derivatives.
+    #[must_use]
+    fn fma_real(self, a: Self::Real, c: Self) -> Self;
     /// Reciprocal.
     #[must_use]
     fn recip(self) -> Self;
@@ -115,6 +124,7 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    type Real = Self;
     const LANES: usize = 1;
     const PARTIALS: usize = 0;
 
@@ -125,6 +135,18 @@ impl Scalar for f64 {
     #[inline(always)]
     fn from_lanes(mut value_of: impl FnMut(usize) -> f64) -> Self {
         value_of(0)
+    }
+    #[inline(always)]
+    fn from_real(value: Self) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn real(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn fma_real(self, a: Self, c: Self) -> Self {
+        self.fma(a, c)
     }
     #[inline(always)]
     fn lane(&self, _lane: usize) -> f64 {

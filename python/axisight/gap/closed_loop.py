@@ -78,6 +78,7 @@ class ClosedLoopFitter(ModelFitter):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        near: _core.Courses | None = None,
     ) -> _core.FitResult:
         """Run the fit in the core."""
         return _core.fit_simulation(
@@ -90,6 +91,23 @@ class ClosedLoopFitter(ModelFitter):
             input="tracking",
             output="torque",
             warm=warm,
+            courses=near,
+            cancel=self.cancel,
+        )
+
+    def run(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
+    ) -> _core.Courses:
+        """Run the model in the core."""
+        return _core.courses(
+            self.robot.core,
+            core_effects(effects),
+            [core_spec(p, effects) for p in parameters],
+            self.records,
+            self.weighting.core(),
+            options,
+            input="tracking",
+            output="torque",
             cancel=self.cancel,
         )
 
@@ -99,6 +117,7 @@ class ClosedLoopFitter(ModelFitter):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        near: _core.Courses | None = None,
     ) -> _core.Linearization:
         """Evaluate the model in the core."""
         return _core.evaluate_simulation(
@@ -111,6 +130,7 @@ class ClosedLoopFitter(ModelFitter):
             input="tracking",
             output="torque",
             warm=warm,
+            courses=near,
             cancel=self.cancel,
         )
 

@@ -97,6 +97,7 @@ class InverseDynamicsFitter(ModelFitter):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        _near: _core.Courses | None = None,
     ) -> _core.FitResult:
         """Run the fit in the core."""
         return _core.fit_inverse_dynamics(
@@ -116,6 +117,7 @@ class InverseDynamicsFitter(ModelFitter):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        _near: _core.Courses | None = None,
     ) -> _core.Linearization:
         """Evaluate the model in the core."""
         return _core.evaluate_inverse_dynamics(

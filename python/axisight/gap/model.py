@@ -143,8 +143,9 @@ class ModelFitter(ABC):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        near: _core.Courses | None,
     ) -> _core.FitResult:
-        """Run the fit in the core."""
+        """Run the fit in the core, around the runs ``near`` if there are any."""
 
     @abstractmethod
     def linearize(
@@ -153,8 +154,21 @@ class ModelFitter(ABC):
         parameters: Sequence[Parameter],
         options: FitOptions,
         warm: list[tuple[int, Array]],
+        near: _core.Courses | None,
     ) -> _core.Linearization:
         """Evaluate the model in the core, at the initial values."""
+
+    def runs(self, model: Evidence) -> _core.Courses | None:
+        """Return runs of a model around which others close to it cost less; None without any."""
+        setup = self._setup(model.free, model, None, [False] * len(model.free), lazy=False)
+        return self.run(setup.effects, setup.parameters, self._options())
+
+    def run(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
+    ) -> _core.Courses | None:
+        """Run the model in the core, at the initial values."""
+        del effects, parameters, options
+        return None
 
     def fit(
         self,
@@ -163,6 +177,7 @@ class ModelFitter(ABC):
         *,
         robot_values: Mapping[str, float] | None = None,
         lazy: bool = False,
+        near: _core.Courses | None = None,
         max_iterations: int = 15,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
@@ -170,14 +185,15 @@ class ModelFitter(ABC):
         An effect that the robot has itself is replaced by the free one of its label.
         The simulator's parameters begin at ``robot_values``, else where
         ``start`` ended, else at their nominal values; ``lazy`` takes their
-        sensitivities from ``start`` instead of computing them.
+        sensitivities from ``start`` instead of computing them. ``near`` are `runs` of a
+        model close by.
         """
         # What a candidate changes of the sensitivities of effects elsewhere can wait.
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
         setup = self._setup(free, start, robot_values, held, lazy=lazy)
         options = self._options(max_iterations)
-        result = self.solve(setup.effects, setup.parameters, options, setup.warm)
+        result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         return _evidence(result, setup, list(free))
 
     def evaluate(
@@ -186,10 +202,13 @@ class ModelFitter(ABC):
         start: Evidence | None = None,
         *,
         robot_values: Mapping[str, float] | None = None,
+        near: _core.Courses | None = None,
     ) -> Linearized:
         """Return the model where a lazy `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
-        result = self.linearize(setup.effects, setup.parameters, self._options(), setup.warm)
+        result = self.linearize(
+            setup.effects, setup.parameters, self._options(), setup.warm, near
+        )
         return _linearized(result, setup)
 
     def _options(self, max_iterations: int = 0) -> FitOptions:

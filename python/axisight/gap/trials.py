@@ -80,6 +80,7 @@ class Trials:
         self.fitter, self.model, self.floor = fitter, model, floor
         self.layout, self.settings, self.progress = layout, settings, progress
         self.current = held_out_loss(model)
+        self.near = fitter.runs(model)
         self.skipped: dict[str, str] = {}
 
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
@@ -147,7 +148,7 @@ class Trials:
     ) -> A | None:
         effects = [*kept_beside(self.model.free, option), option]
         try:
-            return solve(effects, self.model, robot_values=values)
+            return solve(effects, self.model, robot_values=values, near=self.near)
         except InputError as error:
             # A candidate that cannot be simulated is out, and the result says so.
             self.skipped[option.effect.label] = str(error)

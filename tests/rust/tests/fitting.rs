@@ -89,6 +89,7 @@ fn arm_problem(seed: u64, sigma: f64) -> SimulationErrorProblem {
         weighting: vec![flat(1.0 / SIGMA)],
         method: METHOD,
         block_s: 0.05,
+        courses: None,
         cancel: None,
     }
 }
@@ -192,6 +193,7 @@ fn three_axes_come_back_from_reference_driven_torque() {
         weighting: vec![flat(100.0); 3],
         method: METHOD,
         block_s: 0.1,
+        courses: None,
         cancel: None,
     };
     let fit = solve(&problem);

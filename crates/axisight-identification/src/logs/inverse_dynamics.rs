@@ -158,7 +158,7 @@ impl InverseDynamics {
 }
 
 /// The arm along a motion: forces on its driven joints, without effects.
-struct Arm<'a, S> {
+struct Arm<'a, S: Scalar> {
     plant: &'a Plant<S>,
     scratch: DynamicsScratch<S>,
     motion: [Vec<S>; 3],

@@ -1,5 +1,6 @@
 //! Fitting: residuals of several logs, exact sensitivities, the search for their least squares.
 
+mod courses;
 mod fit;
 mod gram;
 mod inverse_dynamics;
@@ -8,6 +9,7 @@ mod loss;
 mod problem;
 mod simulation_error;
 
+pub use courses::Courses;
 pub use fit::{Fit, FitOptions, fit};
 pub use gram::{Block, BlockGram};
 pub use inverse_dynamics::{InverseDynamics, MotionRecord};

@@ -1,16 +1,19 @@
 //! Simulation error: logs against a free-running simulation of the loop.
 //!
 //! All logs run in lock-step in the lanes of one simulation; derivatives ride
-//! along as dual numbers, a few parameters per pass. Cost of a pass with `d`
-//! derivatives over `n` samples: about `4 n (1 + 2 d)` times one right-hand
-//! side for a batch of logs.
+//! along as dual numbers, a few parameters per pass. The residual comes from the model itself;
+//! for derivatives the arm is linearised along that run ([`axisight_core::robot::Course`]), and
+//! for both when runs of a model nearby are given ([`Courses`]). A pass with `d` derivatives
+//! over `n` samples takes about `4 n (1 + 2 d)` right-hand sides for a batch of logs, of which
+//! the linearised arm leaves a sixth.
 
+use super::courses::{Batch, Courses};
 use super::gram::{Block, blocks};
 use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
 };
-use axisight_core::plant::assemble;
-use axisight_core::robot::{EffectSetting, RobotDescription};
+use axisight_core::plant::{Plant, assemble};
+use axisight_core::robot::{Course, EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Lanes, Scalar};
@@ -19,7 +22,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Logs simulated in lock-step.
-const LANES: usize = 4;
+pub(super) const LANES: usize = 4;
 /// Derivatives per pass.
 const SEEDS: usize = 4;
 
@@ -75,12 +78,29 @@ pub struct SimulationErrorProblem {
     pub method: Method,
     /// Length of a block [s].
     pub block_s: f64,
+    /// Runs of a model nearby, along which the arm is linearised.
+    pub courses: Option<Arc<Courses>>,
     /// Set by another thread to give the fit up.
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
 /// Series per lane and axis, value and derivatives: `[quantity][lane * axes + axis][sample]`.
-type Traces = Vec<Vec<Vec<f64>>>;
+pub(super) type Traces = Vec<Vec<Vec<f64>>>;
+
+fn failed(e: &dyn std::fmt::Display) -> ProblemError {
+    ProblemError::Failed(e.to_string())
+}
+
+/// The arm in a run.
+pub(super) enum Arm<'a> {
+    /// As it is.
+    Exact,
+    /// Linearised.
+    Along(&'a Arc<Course<Lanes<LANES>>>),
+}
+
+/// From as many derivatives as this, a run of its own to linearise along is worth it.
+const WORTH_A_COURSE: usize = 3;
 
 impl SimulationErrorProblem {
     /// Check shapes.
@@ -116,16 +136,52 @@ impl SimulationErrorProblem {
         self.records[record].input.len() / self.robot.n_axes()
     }
 
-    /// Model output of the logs `records` with derivatives along `seeds`.
-    fn traces<S: Scalar>(
+    /// Logs that run in lock-step.
+    pub(super) fn batches(&self) -> Vec<Vec<usize>> {
+        let all: Vec<usize> = (0..self.records.len()).collect();
+        all.chunks(LANES).map(<[usize]>::to_vec).collect()
+    }
+
+    fn plant<S: Scalar>(&self, theta: &[f64], seeds: &[usize]) -> Result<Plant<S>, ProblemError> {
+        let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
+        assemble(&self.robot, &overrides, &settings).map_err(|e| failed(&e))
+    }
+
+    /// Whether the arm may be linearised along runs.
+    pub(super) fn follows_courses(&self, theta: &[f64]) -> Result<bool, ProblemError> {
+        Ok(self.method.has_fixed_steps() && self.plant::<f64>(theta, &[])?.follows_courses())
+    }
+
+    /// Output of the logs `records`, and the run it comes from.
+    pub(super) fn exact_run(
         &self,
         records: &[usize],
         theta: &[f64],
-        seeds: &[usize],
+    ) -> Result<(Vec<Vec<f64>>, Arc<Course<Lanes<LANES>>>), ProblemError> {
+        let plant = self.plant::<Lanes<LANES>>(theta, &[])?;
+        let joints = plant.joint_slots();
+        let rates = plant.n_angles() + joints.start..plant.n_angles() + joints.end;
+        let mut states = Vec::new();
+        let mut keep = |x: &[Lanes<LANES>]| {
+            states.extend_from_slice(&x[joints.clone()]);
+            states.extend_from_slice(&x[rates.clone()]);
+        };
+        let mut stepper = Stepper::new(&plant);
+        let traces = self.traces(records, &plant, &mut stepper, 0, Some(&mut keep))?;
+        let course = Course::new(&plant.chain, self.robot.sample_time, &states);
+        Ok((traces.into_iter().flatten().collect(), Arc::new(course)))
+    }
+
+    /// Model output of the logs `records` with the first `n_seeds` derivatives; `keep` sees
+    /// every state.
+    fn traces<S: Scalar>(
+        &self,
+        records: &[usize],
+        plant: &Plant<S>,
+        stepper: &mut Stepper<S>,
+        n_seeds: usize,
+        mut keep: Option<&mut dyn FnMut(&[S])>,
     ) -> Result<Traces, ProblemError> {
-        let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
-        let failed = |e: &dyn std::fmt::Display| ProblemError::Failed(e.to_string());
-        let plant = assemble(&self.robot, &overrides, &settings).map_err(|e| failed(&e))?;
         let n_axes = plant.axes.len();
         let inputs: Vec<&[f64]> = records
             .iter()
@@ -141,7 +197,7 @@ impl SimulationErrorProblem {
             .max()
             .unwrap_or(0);
         let series = || vec![Vec::with_capacity(n_samples); records.len() * n_axes];
-        let mut traces: Traces = (0..=seeds.len()).map(|_| series()).collect();
+        let mut traces: Traces = (0..=n_seeds).map(|_| series()).collect();
         let run = Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,
@@ -160,6 +216,9 @@ impl SimulationErrorProblem {
             cancel: self.cancel.as_deref(),
         };
         let mut observe = |sample: &Sample<'_, S>| {
+            if let Some(keep) = &mut keep {
+                keep(sample.state);
+            }
             let output = match self.output {
                 SimulationOutput::Torque => sample.command,
                 SimulationOutput::Position => sample.measured,
@@ -168,14 +227,13 @@ impl SimulationErrorProblem {
                 for lane in 0..records.len() {
                     let slot = lane * n_axes + axis;
                     traces[0][slot].push(y.lane(lane));
-                    for seed in 0..seeds.len() {
+                    for seed in 0..n_seeds {
                         traces[seed + 1][slot].push(y.partial(seed, lane));
                     }
                 }
             }
         };
-        let mut stepper = Stepper::new(&plant);
-        match simulate(&plant, &run, &mut stepper, &mut observe).map_err(|e| failed(&e))? {
+        match simulate(plant, &run, stepper, &mut observe).map_err(|e| failed(&e))? {
             Status::Completed => Ok(traces),
             Status::Cancelled(_) => Err(ProblemError::Cancelled),
             Status::Diverged(k) => Err(failed(&format!("diverged at sample {k}"))),
@@ -185,18 +243,35 @@ impl SimulationErrorProblem {
         }
     }
 
-    fn pass(
+    /// Model output of the logs `records` with derivatives along `seeds`.
+    pub(super) fn pass(
         &self,
         records: &[usize],
         theta: &[f64],
         seeds: &[usize],
+        arm: &Arm<'_>,
     ) -> Result<Traces, ProblemError> {
         match seeds.len() {
-            0 => self.traces::<Lanes<LANES>>(records, theta, seeds),
-            1 => self.traces::<Dual<Lanes<LANES>, 1>>(records, theta, seeds),
-            2 => self.traces::<Dual<Lanes<LANES>, 2>>(records, theta, seeds),
-            _ => self.traces::<Dual<Lanes<LANES>, SEEDS>>(records, theta, seeds),
+            0 => self.run::<Lanes<LANES>>(records, theta, seeds, arm),
+            1 => self.run::<Dual<Lanes<LANES>, 1>>(records, theta, seeds, arm),
+            2 => self.run::<Dual<Lanes<LANES>, 2>>(records, theta, seeds, arm),
+            _ => self.run::<Dual<Lanes<LANES>, SEEDS>>(records, theta, seeds, arm),
         }
+    }
+
+    fn run<S: Scalar<Real = Lanes<LANES>>>(
+        &self,
+        records: &[usize],
+        theta: &[f64],
+        seeds: &[usize],
+        arm: &Arm<'_>,
+    ) -> Result<Traces, ProblemError> {
+        let plant = self.plant::<S>(theta, seeds)?;
+        let mut stepper = match arm {
+            Arm::Exact => Stepper::new(&plant),
+            Arm::Along(course) => Stepper::along(&plant, course),
+        };
+        self.traces(records, &plant, &mut stepper, seeds.len(), None)
     }
 
     /// Whitened series of one batch: `[quantity][lane][axis]`, residual first.
@@ -232,21 +307,87 @@ impl SimulationErrorProblem {
     }
 }
 
+/// One batch of logs as an evaluation goes through it.
+enum Prepared<'a> {
+    /// The arm as it is, with and without derivatives.
+    Exact,
+    /// Along runs of a model nearby.
+    Near(&'a Batch),
+    /// Along its own run, of which the output is known.
+    Own(Vec<Vec<f64>>, Arc<Course<Lanes<LANES>>>),
+}
+
+impl SimulationErrorProblem {
+    /// How each batch is to be evaluated.
+    fn prepared(
+        &self,
+        batches: &[Vec<usize>],
+        theta: &[f64],
+        n_columns: usize,
+    ) -> Result<Vec<Prepared<'_>>, ProblemError> {
+        let exact = || batches.iter().map(|_| Prepared::Exact).collect();
+        if self.courses.is_none() && n_columns < WORTH_A_COURSE || !self.follows_courses(theta)? {
+            return Ok(exact());
+        }
+        if let Some(courses) = &self.courses {
+            let joints = self.plant::<f64>(theta, &[])?.chain.len();
+            if !courses.fit(joints, batches.len()) {
+                return Ok(exact());
+            }
+            let numbers = 0..batches.len();
+            let batch = |b| courses.batch(b).map_or(Prepared::Exact, Prepared::Near);
+            return Ok(numbers.map(batch).collect());
+        }
+        let run = |records: &Vec<usize>| {
+            let (output, course) = self.exact_run(records, theta)?;
+            Ok(Prepared::Own(output, course))
+        };
+        batches.par_iter().map(run).collect()
+    }
+
+    /// Output of a batch with derivatives along `seeds`.
+    fn output(
+        &self,
+        records: &[usize],
+        theta: &[f64],
+        seeds: &[usize],
+        prepared: &Prepared<'_>,
+    ) -> Result<Traces, ProblemError> {
+        match prepared {
+            Prepared::Exact => self.pass(records, theta, seeds, &Arm::Exact),
+            Prepared::Near(batch) => {
+                let mut traces = self.pass(records, theta, seeds, &Arm::Along(&batch.course))?;
+                batch.correct(&mut traces);
+                Ok(traces)
+            }
+            Prepared::Own(output, course) => {
+                let mut traces = self.pass(records, theta, seeds, &Arm::Along(course))?;
+                if let Some(first) = traces.first_mut() {
+                    first.clone_from(output);
+                }
+                Ok(traces)
+            }
+        }
+    }
+}
+
 impl Problem for SimulationErrorProblem {
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
-        let all: Vec<usize> = (0..self.records.len()).collect();
+        let batches = self.batches();
+        let prepared = self.prepared(&batches, theta, columns.len())?;
         let mut chunks: Vec<&[usize]> = columns.chunks(SEEDS).collect();
         if chunks.is_empty() {
             chunks.push(&[]);
         }
-        let tasks: Vec<(usize, &[usize], &[usize])> = all
-            .chunks(LANES)
+        let tasks: Vec<_> = batches
+            .iter()
+            .zip(&prepared)
             .flat_map(|batch| chunks.iter().enumerate().map(move |(i, c)| (i, batch, *c)))
             .collect();
         let done: Vec<_> = tasks
             .par_iter()
-            .map(|(_, batch, seeds)| {
-                let traces = self.pass(batch, theta, seeds)?;
+            .map(|(_, (batch, prepared), seeds)| {
+                let traces = self.output(batch, theta, seeds, prepared)?;
                 Ok(self.whiten(batch, traces))
             })
             .collect::<Result<_, ProblemError>>()?;

@@ -41,6 +41,12 @@ impl<S: Scalar> Plant<S> {
         self.n_motors + self.chain.len()
     }
 
+    /// Whether the arm may be linearised along a run: it stands on the ground, and every motor
+    /// is behind a compliant gear, so that no command makes a joint jump.
+    pub fn follows_courses(&self) -> bool {
+        self.n_base == 0 && self.axes.iter().all(|axis| axis.gear.is_some())
+    }
+
     /// Number of motor angles among the states (compliant gears).
     pub fn n_motors(&self) -> usize {
         self.n_motors

@@ -82,6 +82,40 @@ impl<S: Scalar> Chain<S> {
         }
     }
 
+    /// The same chain over another scalar whose numbers without derivatives these are.
+    pub fn lifted<D: Scalar<Real = S>>(&self) -> Chain<D> {
+        let body = |b: &Body<S>| Body {
+            mass: D::from_real(b.mass),
+            com: b.com.map(D::from_real),
+            inertia: b.inertia.map(D::from_real),
+        };
+        let joint = |j: &ChainJoint<S>| ChainJoint {
+            motion: j.motion,
+            origin: j.origin,
+            axis: j.axis,
+            body: j.body.as_ref().map(body),
+        };
+        Chain {
+            gravity: self.gravity.map(D::from_real),
+            joints: self.joints.iter().map(joint).collect(),
+        }
+    }
+
+    /// Whether gravity and all masses are those of `other`, derivatives aside.
+    pub fn same_masses(&self, other: &Chain<S::Real>) -> bool {
+        let same = |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l) == b.lane(l));
+        let all = |a: &[S], b: &[S::Real]| a.iter().zip(b).all(|(a, b)| same(a, b));
+        let bodies = |a: &ChainJoint<S>, b: &ChainJoint<S::Real>| match (&a.body, &b.body) {
+            (None, None) => true,
+            (Some(a), Some(b)) => {
+                same(&a.mass, &b.mass) && all(&a.com, &b.com) && all(&a.inertia, &b.inertia)
+            }
+            _ => false,
+        };
+        let joints = self.joints.iter().zip(&other.joints);
+        all(&self.gravity, &other.gravity) && joints.into_iter().all(|(a, b)| bodies(a, b))
+    }
+
     /// Number of joints.
     pub fn len(&self) -> usize {
         self.joints.len()

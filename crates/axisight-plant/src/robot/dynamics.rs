@@ -13,6 +13,7 @@
 //! with derivatives, whose arithmetic hides the loops, share the code for any number.
 
 use super::chain::{Body, Chain, ChainJoint};
+use super::course::Along;
 use super::description::Motion;
 use super::linear_algebra::{factorize, solve_factorized};
 use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};
@@ -178,7 +179,9 @@ impl<S: Scalar> Screw<S> {
 
 /// Scratch and results of one evaluation, padded to a compiled size.
 #[derive(Debug, Clone)]
-pub struct DynamicsScratch<S> {
+pub struct DynamicsScratch<S: Scalar> {
+    /// The run that the arm is linearised along, if it is.
+    pub(crate) along: Option<Along<S>>,
     /// Inertia matrix M(q): entry (i, j) for `i <= j`, row-major. Padding has unit inertia.
     inertia: Vec<S>,
     /// Coriolis, centrifugal and gravity forces `c(q, q') + g(q)`; zero for padding.
@@ -340,6 +343,7 @@ impl<S: Scalar> Dynamics<S> {
     pub fn scratch(&self) -> DynamicsScratch<S> {
         let n = sized!(self.len(), self.padded_size());
         DynamicsScratch {
+            along: None,
             inertia: vec![S::zero(); n * n],
             bias: vec![S::zero(); n],
             angles: vec![S::zero(); n],
@@ -357,21 +361,33 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
     pub fn place(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
+        if let Some(along) = &mut scratch.along {
+            return along.place(q);
+        }
         sized!(self.len(), self.place_sized(q, scratch));
     }
 
     /// Bias forces at rates `v` and the angles last placed.
     pub fn add_rates(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
+        if let Some(along) = &mut scratch.along {
+            return along.bias(v, &mut scratch.bias);
+        }
         sized!(self.len(), self.add_rates_sized(v, scratch));
     }
 
     /// Factors of the inertia matrix, in its place.
     pub fn factorize(&self, scratch: &mut DynamicsScratch<S>) {
+        if scratch.along.is_some() {
+            return;
+        }
         sized!(self.len(), self.factorize_sized(scratch));
     }
 
     /// Forces to accelerations, with the factors of the inertia matrix.
     pub fn solve(&self, scratch: &mut DynamicsScratch<S>) {
+        if let Some(along) = &mut scratch.along {
+            return along.accelerate(&mut scratch.bias);
+        }
         sized!(self.len(), self.solve_sized(scratch));
     }
 

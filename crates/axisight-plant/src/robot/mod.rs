@@ -1,6 +1,7 @@
 //! The arm: its description, its chain and the rigid-body algorithms on it.
 
 mod chain;
+mod course;
 pub mod description;
 mod dynamics;
 mod linear_algebra;
@@ -10,6 +11,7 @@ mod setting;
 mod vector;
 
 pub use chain::{Body, Chain, ChainJoint, Pose};
+pub use course::{Along, Course};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
 pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
 pub use parameters::{Parameter, ParameterError};

@@ -101,6 +101,16 @@ pub enum SimulationError {
         "method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}"
     )]
     NoJacobian(Method),
+    /// A course that does not fit the run.
+    #[error("course: expected at least {expected} samples and a method of fixed steps, got {got} samples and {method:?}")]
+    Course {
+        /// Samples of the run.
+        expected: usize,
+        /// Samples of the course.
+        got: usize,
+        /// Integrator.
+        method: Method,
+    },
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,
@@ -124,6 +134,15 @@ pub fn simulate<S: Scalar>(
     let n_samples = check(run, n_axes, S::LANES)?;
     if run.method.may_be_implicit() && !stepper.has_jacobian() {
         return Err(SimulationError::NoJacobian(run.method));
+    }
+    if let Some(got) = stepper.course_samples()
+        && (got < n_samples || !run.method.has_fixed_steps())
+    {
+        return Err(SimulationError::Course {
+            expected: n_samples,
+            got,
+            method: run.method,
+        });
     }
     let rest = equilibrium(plant, run.start)?;
     stepper.begin();
@@ -155,6 +174,7 @@ pub fn simulate<S: Scalar>(
             command: &signals.command,
             sample_time: run.sample_time,
         };
+        stepper.enter(k);
         let mut torque = SampleTorque::new(&mut paths, &signals.command, &mut buffers);
         let met = interval.advance(run.method, &mut x, stepper, &mut torque);
         torque.finish();

@@ -4,8 +4,9 @@ use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
 use super::{dormand_prince, nystrom4, runge_kutta4};
 use crate::plant::Plant;
-use crate::robot::DynamicsScratch;
+use crate::robot::{Along, Course, DynamicsScratch};
 use axisight_scalar::Scalar;
+use std::sync::Arc;
 
 /// How the plant is integrated inside a sample.
 ///
@@ -55,6 +56,11 @@ impl Default for Method {
 }
 
 impl Method {
+    /// Whether the steps are the same whatever the plant does.
+    pub fn has_fixed_steps(self) -> bool {
+        matches!(self, Self::RungeKutta4 { .. } | Self::Nystrom4 { .. })
+    }
+
     /// Whether the method may need the exact Jacobian of [`Stepper::with_jacobian`].
     pub fn may_be_implicit(self) -> bool {
         matches!(
@@ -82,7 +88,7 @@ pub struct Effort {
 }
 
 /// Integrator state of one run: scratch and effort counters.
-pub struct Stepper<S> {
+pub struct Stepper<S: Scalar> {
     pub(super) plant_scratch: DynamicsScratch<S>,
     pub(super) stages: Vec<Vec<S>>,
     pub(super) probe: Vec<S>,
@@ -91,6 +97,8 @@ pub struct Stepper<S> {
     /// the torques; empty when there is none to reuse.
     pub(super) reusable: Vec<S>,
     pub(super) start: Vec<S>,
+    /// First of the sample's equal parts that the step in hand covers, and their number.
+    part: (usize, usize),
     pub(super) implicit: Option<Box<dyn Implicit<S>>>,
     /// Sub-steps per sample of the error-controlled explicit method.
     pub(super) substeps: usize,
@@ -115,10 +123,40 @@ impl<S: Scalar> Stepper<S> {
             applied: vec![S::zero(); plant.axes.len()],
             reusable: Vec::new(),
             start: zeros,
+            part: (0, 1),
             implicit: None,
             substeps: 1,
             stiff_score: 0,
             effort: Effort::default(),
+        }
+    }
+
+    /// Scratch for `plant` with its arm linearised along `course`, see
+    /// [`Plant::follows_courses`]; methods of fixed steps only.
+    pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Self {
+        let mut stepper = Self::new(plant);
+        stepper.plant_scratch.along = Some(Along::new(course, &plant.chain));
+        stepper
+    }
+
+    /// Number of samples of the course, where there is one.
+    pub(super) fn course_samples(&self) -> Option<usize> {
+        self.plant_scratch.along.as_ref().map(Along::samples)
+    }
+
+    /// Go to a sample.
+    pub(super) fn enter(&mut self, sample: usize) {
+        if let Some(along) = &mut self.plant_scratch.along {
+            along.enter(sample);
+        }
+    }
+
+    /// Fraction `at` of the step in hand.
+    #[inline(always)]
+    fn go_to(&mut self, at: f64) {
+        if let Some(along) = &mut self.plant_scratch.along {
+            let (first, parts) = self.part;
+            along.go_to((first as f64 + at) / parts as f64);
         }
     }
 
@@ -148,6 +186,7 @@ impl<S: Scalar> Stepper<S> {
             *a = line.at(at);
         }
         self.effort.evaluations += 1;
+        self.go_to(at);
         plant.derivative(
             &self.probe,
             &self.applied,
@@ -171,6 +210,7 @@ impl<S: Scalar> Stepper<S> {
             *a = line.at(at);
         }
         self.effort.evaluations += 1;
+        self.go_to(at);
         plant.derivative_in_place(
             &self.probe,
             &self.applied,
@@ -243,6 +283,7 @@ impl<S: Scalar> Interval<'_, S> {
         let n = substeps.max(1);
         let h = self.sample_time / n as f64;
         for i in 0..n {
+            stepper.part = (i, n);
             step(self, x, h, torque.part(i, n), stepper);
             torque.accept();
         }

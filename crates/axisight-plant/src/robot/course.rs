@@ -1,0 +1,292 @@
+//! The arm along a run: its equations of motion linearised about a motion in time.
+//!
+//! With angles, rates and accelerations `q0, v0, a0` of the run and `h = M(q) a0 + c(q, v)`,
+//! `M(q0) q'' = F - [c(q0, v0) + p + B_q (q - q0) + B_v (v - v0)]`, where `B_q` and `B_v` are the
+//! derivatives of `h` on the run, and `p` are the forces that an arm of other masses needs on the
+//! run beyond those of the arm itself. What is left out is of second order in the distance from
+//! the run and in the change of the masses. Everything but the arm (motors, gears, effects) stays
+//! as nonlinear as it is.
+//!
+//! For `n` joints an evaluation takes `3 n^2` multiplications without derivatives of the matrices,
+//! against about `30 n^2` with them for the equations themselves.
+
+use super::chain::Chain;
+use super::dynamics::Dynamics;
+use axisight_scalar::{Dual, Scalar};
+use std::sync::Arc;
+
+/// Longest time over which the matrices are taken as straight lines [s].
+const LONGEST_STRIDE_S: f64 = 8e-3;
+/// Samples over which forces of other masses are taken as straight lines.
+const FORCING_STRIDE: usize = 2;
+/// Derivatives at a time.
+const SEEDS: usize = 4;
+
+/// A run, and the arm linearised along it.
+#[derive(Debug, Clone)]
+pub struct Course<R> {
+    chain: Chain<R>,
+    sample_time: f64,
+    samples: usize,
+    /// By sample: angles, rates, bias forces.
+    motion: Vec<R>,
+    /// Samples from node to node.
+    stride: usize,
+    /// By node: inverse of the inertia matrix, `B_q`, `B_v`, row-major.
+    nodes: Vec<R>,
+}
+
+impl<R: Scalar> Course<R> {
+    /// Of a run of the arm `chain`: `states` holds its joint angles and rates sample by sample.
+    pub fn new(chain: &Chain<R>, sample_time: f64, states: &[R]) -> Self {
+        let n = chain.len();
+        let dynamics = Dynamics::new(chain);
+        let samples = states.len() / (2 * n).max(1);
+        let mut motion = Vec::with_capacity(3 * n * samples);
+        let mut scratch = dynamics.scratch();
+        for state in states.chunks_exact((2 * n).max(1)) {
+            let (q, v) = state.split_at(n);
+            dynamics.place(q, &mut scratch);
+            dynamics.add_rates(v, &mut scratch);
+            motion.extend_from_slice(state);
+            motion.extend_from_slice(&scratch.forces()[..n]);
+        }
+        // A stride is a small positive number of samples.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let stride = ((LONGEST_STRIDE_S / sample_time) as usize).max(1);
+        let mut course = Self {
+            chain: chain.clone(),
+            sample_time,
+            samples,
+            motion,
+            stride,
+            nodes: Vec::new(),
+        };
+        course.linearize(&dynamics);
+        course
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.chain.len()
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    fn part(&self, sample: usize, which: usize) -> &[R] {
+        let n = self.joints();
+        let first = (3 * sample.min(self.samples - 1) + which) * n;
+        &self.motion[first..first + n]
+    }
+
+    /// Accelerations at a sample, from the rates on either side.
+    fn acceleration(&self, sample: usize) -> Vec<R> {
+        let (before, after) = (
+            sample.saturating_sub(1),
+            (sample + 1).min(self.samples - 1),
+        );
+        let time = (after - before).max(1) as f64 * self.sample_time;
+        let rates = self.part(after, 1).iter().zip(self.part(before, 1));
+        rates.map(|(b, a)| (*b - *a) * (1.0 / time)).collect()
+    }
+
+    fn linearize(&mut self, dynamics: &Dynamics<R>) {
+        let n = self.joints();
+        let lifted = Dynamics::new(&self.chain.lifted::<Dual<R, SEEDS>>());
+        let (mut plain, mut dual) = (dynamics.scratch(), lifted.scratch());
+        let mut force = vec![Dual::<R, SEEDS>::zero(); n];
+        // One node beyond the last sample, for the straight line to it.
+        for node in 0..=self.samples.div_ceil(self.stride) {
+            let sample = (node * self.stride).min(self.samples - 1);
+            let (q, v) = (self.part(sample, 0), self.part(sample, 1));
+            let a = self.acceleration(sample);
+            let mut matrices = vec![R::zero(); 3 * n * n];
+            let (inverse, derivatives) = matrices.split_at_mut(n * n);
+            dynamics.place(q, &mut plain);
+            dynamics.factorize(&mut plain);
+            for j in 0..n {
+                plain.forces().fill(R::zero());
+                plain.forces()[j] = R::one();
+                dynamics.solve(&mut plain);
+                for i in 0..n {
+                    inverse[i * n + j] = plain.forces()[i];
+                }
+            }
+            // Seeds along the angles, then along the rates.
+            for first in (0..2 * n).step_by(SEEDS) {
+                let seeded = |offset: usize, x: &[R]| -> Vec<Dual<R, SEEDS>> {
+                    let seed = |(i, x): (usize, &R)| {
+                        let x = Dual::from_real(*x);
+                        match (offset + i).checked_sub(first) {
+                            Some(seed) if seed < SEEDS => x.seeded(seed),
+                            _ => x,
+                        }
+                    };
+                    x.iter().enumerate().map(seed).collect()
+                };
+                let (q, v, a) = (seeded(0, q), seeded(n, v), seeded(2 * n + SEEDS, &a));
+                lifted.forces_along(&q, &v, &a, &mut dual, &mut force);
+                for column in first..(first + SEEDS).min(2 * n) {
+                    let (matrix, j) = (column / n, column % n);
+                    for (i, force) in force.iter().enumerate() {
+                        derivatives[(matrix * n + i) * n + j] = force.partials[column - first];
+                    }
+                }
+            }
+            self.nodes.extend_from_slice(&matrices);
+        }
+    }
+
+    /// Forces that `chain` needs on the run beyond those of the run's own arm, node by node;
+    /// `None` for the same arm.
+    fn forcing<S: Scalar<Real = R>>(&self, chain: &Chain<S>) -> Option<Vec<S>> {
+        if !chain.carries_derivatives() && chain.same_masses(&self.chain) {
+            return None;
+        }
+        let n = self.joints();
+        let (own, other) = (Dynamics::new(&self.chain), Dynamics::new(chain));
+        let (mut own_scratch, mut scratch) = (own.scratch(), other.scratch());
+        let (mut own_force, mut force) = (vec![R::zero(); n], vec![S::zero(); n]);
+        let mut out = Vec::new();
+        for node in 0..=self.samples.div_ceil(FORCING_STRIDE) {
+            let sample = (node * FORCING_STRIDE).min(self.samples - 1);
+            let (q, v) = (self.part(sample, 0), self.part(sample, 1));
+            let a = self.acceleration(sample);
+            own.forces_along(q, v, &a, &mut own_scratch, &mut own_force);
+            let [q, v, a] = [q, v, &a[..]].map(|x| -> Vec<S> {
+                x.iter().map(|x| S::from_real(*x)).collect()
+            });
+            other.forces_along(&q, &v, &a, &mut scratch, &mut force);
+            let both = force.iter().zip(&own_force);
+            out.extend(both.map(|(f, own)| *f - S::from_real(*own)));
+        }
+        Some(out)
+    }
+}
+
+/// An arm on a [`Course`], as the integrators call it.
+#[derive(Debug, Clone)]
+pub struct Along<S: Scalar> {
+    course: Arc<Course<S::Real>>,
+    /// By node of [`FORCING_STRIDE`] samples.
+    forcing: Option<Vec<S>>,
+    sample: usize,
+    /// Fraction of the sample.
+    at: f64,
+    /// In the middle of the sample: inverse of the inertia matrix, `B_q`, `B_v`.
+    matrices: Vec<S::Real>,
+    /// `q - q0`.
+    off: Vec<S>,
+    copy: Vec<S>,
+}
+
+impl<S: Scalar> Along<S> {
+    /// The arm `chain` on `course`.
+    pub fn new(course: &Arc<Course<S::Real>>, chain: &Chain<S>) -> Self {
+        let n = course.joints();
+        let mut along = Self {
+            forcing: course.forcing(chain),
+            course: Arc::clone(course),
+            sample: 0,
+            at: 0.0,
+            matrices: vec![S::Real::zero(); 3 * n * n],
+            off: vec![S::zero(); n],
+            copy: vec![S::zero(); n],
+        };
+        along.enter(0);
+        along
+    }
+
+    /// Number of samples the course has.
+    pub fn samples(&self) -> usize {
+        self.course.samples
+    }
+
+    /// Go to a sample.
+    pub fn enter(&mut self, sample: usize) {
+        self.sample = sample;
+        let (course, size) = (&self.course, self.matrices.len());
+        let node = sample / course.stride;
+        let share = ((sample % course.stride) as f64 + 0.5) / course.stride as f64;
+        let share = S::Real::constant(share);
+        let pair = &course.nodes[node * size..(node + 2) * size];
+        let (from, to) = pair.split_at(size);
+        for ((out, from), to) in self.matrices.iter_mut().zip(from).zip(to) {
+            *out = (*to - *from).fma(share, *from);
+        }
+    }
+
+    /// Go to a fraction of the sample.
+    #[inline(always)]
+    pub fn go_to(&mut self, at: f64) {
+        self.at = at;
+    }
+
+    /// A part of the motion at the present instant.
+    #[inline(always)]
+    fn motion(&self, which: usize) -> impl Iterator<Item = S::Real> {
+        let at = S::Real::constant(self.at);
+        let from = self.course.part(self.sample, which);
+        let to = self.course.part(self.sample + 1, which);
+        from.iter().zip(to).map(move |(a, b)| (*b - *a).fma(at, *a))
+    }
+
+    /// Take joint angles.
+    #[inline(always)]
+    pub(super) fn place(&mut self, q: &[S]) {
+        let mut off = std::mem::take(&mut self.off);
+        for ((off, q), on) in off.iter_mut().zip(q).zip(self.motion(0)) {
+            *off = *q - S::from_real(on);
+        }
+        self.off = off;
+    }
+
+    /// Forces without acceleration at rates `v` and the angles last placed.
+    #[inline(always)]
+    pub(super) fn bias(&mut self, v: &[S], out: &mut [S]) {
+        let n = self.off.len();
+        let mut faster = std::mem::take(&mut self.copy);
+        for ((faster, v), on) in faster.iter_mut().zip(v).zip(self.motion(1)) {
+            *faster = *v - S::from_real(on);
+        }
+        for (out, on) in out.iter_mut().zip(self.motion(2)) {
+            *out = S::from_real(on);
+        }
+        if let Some(forcing) = &self.forcing {
+            let place = (self.sample % FORCING_STRIDE) as f64 + self.at;
+            let share = S::Real::constant(place / FORCING_STRIDE as f64);
+            let first = self.sample / FORCING_STRIDE * n;
+            let (from, to) = forcing[first..first + 2 * n].split_at(n);
+            for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
+                *out += (*to - *from).fma_real(share, *from);
+            }
+        }
+        let (by_angle, by_rate) = self.matrices[n * n..].split_at(n * n);
+        let rows = by_angle.chunks_exact(n).zip(by_rate.chunks_exact(n));
+        for (out, (by_angle, by_rate)) in out.iter_mut().zip(rows) {
+            for ((a, b), (off, faster)) in by_angle
+                .iter()
+                .zip(by_rate)
+                .zip(self.off.iter().zip(&faster))
+            {
+                *out = faster.fma_real(*b, off.fma_real(*a, *out));
+            }
+        }
+        self.copy = faster;
+    }
+
+    /// Forces to accelerations.
+    #[inline(always)]
+    pub(super) fn accelerate(&mut self, force: &mut [S]) {
+        let n = self.copy.len();
+        self.copy.copy_from_slice(&force[..n]);
+        let rows = self.matrices.chunks_exact(n.max(1));
+        for (out, row) in force[..n].iter_mut().zip(rows) {
+            let sum = row.iter().zip(&self.copy);
+            *out = sum.fold(S::zero(), |sum, (a, f)| f.fma_real(*a, sum));
+        }
+    }
+}
