@@ -110,6 +110,7 @@ fn through_plant<S: Scalar>(robot: &RobotDescription, torque: &[f64]) -> Respons
         drive: Drive::Torque(&inputs),
         noise: &[],
         resolution: 0.0,
+        disturbances: false,
         method: Method::RungeKutta4 { substeps: 1 },
         cancel: None,
     };

@@ -75,6 +75,7 @@ fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
         drive: Drive::Reference(&inputs),
         noise: &[],
         resolution: 0.0,
+        disturbances: false,
         method: Method::RungeKutta4 { substeps: 1 },
         cancel: None,
     };

@@ -58,6 +58,7 @@ impl Case {
             drive: Drive::Reference(&inputs),
             noise: &noise,
             resolution: 0.0,
+            disturbances: false,
             method: Method::default(),
             cancel: None,
         };

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CancelToken",
+    "Column",
     "Courses",
     "FitResult",
     "FrequencyFitResult",
@@ -375,6 +376,14 @@ def status_advice() -> list[tuple[str, str]]:
     """What to mind of every status that is no convergence: pairs of status and advice."""
 
 @final
+class Column:
+    """A column of a Jacobian, kept where it was computed for other fits to use."""
+
+    @property
+    def values(self) -> _Array:
+        """A copy, (n_residuals,)."""
+
+@final
 class Courses:
     """Runs of a model over all logs, for models close to it; see `courses`."""
 
@@ -432,6 +441,10 @@ class FitResult:
     @property
     def jacobian(self) -> _Array:
         """Derivatives of the residuals, shape (n_free, n_residuals): one row per parameter."""
+    @property
+    def columns(self) -> list[Column]:
+        """Rows of ``jacobian``, kept where they are: for ``warm``."""
+
     @property
     def blocks(self) -> list[tuple[int, int, int, int]]:
         """Blocks of the residual vector: (log, axis, start, length), all from 0."""
@@ -702,7 +715,7 @@ def fit_simulation(
     *,
     input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
-    warm: Sequence[tuple[int, _Array]] = ...,
+    warm: Sequence[tuple[int, Column]] = ...,
     courses: Courses | None = None,
     cancel: CancelToken | None = None,
 ) -> FitResult:
@@ -723,7 +736,7 @@ def fit_inverse_dynamics(
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
-    warm: Sequence[tuple[int, _Array]] = ...,
+    warm: Sequence[tuple[int, Column]] = ...,
     cancel: CancelToken | None = None,
 ) -> FitResult:
     """Fit the torque predicted from measured motions, transmissions taken as rigid.
@@ -744,7 +757,7 @@ def evaluate_simulation(
     *,
     input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
-    warm: Sequence[tuple[int, _Array]] = ...,
+    warm: Sequence[tuple[int, Column]] = ...,
     courses: Courses | None = None,
     cancel: CancelToken | None = None,
 ) -> Linearization:
@@ -780,7 +793,7 @@ def evaluate_inverse_dynamics(
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
-    warm: Sequence[tuple[int, _Array]] = ...,
+    warm: Sequence[tuple[int, Column]] = ...,
     cancel: CancelToken | None = None,
 ) -> Linearization:
     """Predict the torque of measured motions at the initial values of the parameters.

@@ -156,6 +156,7 @@ fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>,
         drive: Drive::Reference(&references),
         noise: &noises,
         resolution: settings.resolution,
+        disturbances: false,
         method: group.plant.method(),
         cancel: Some(group.cancel),
     };

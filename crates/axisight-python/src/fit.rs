@@ -7,13 +7,13 @@ use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_identification::logs::{
-    BlockGram, Courses as Runs, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
+    BlockGram, Column as Shared, Courses as Runs, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
     MotionRecord, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
     SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
 use axisight_numerics::descent::Status;
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -52,7 +52,27 @@ type WeightingTuple = (Vec<f64>, Vec<f64>, usize);
 /// Log, axis, start and length of a block.
 type BlockTuple = (usize, usize, usize, usize);
 /// Number of a parameter and its Jacobian column.
-type WarmColumn<'py> = (usize, PyReadonlyArray1<'py, f64>);
+type WarmColumn<'py> = (usize, Bound<'py, Column>);
+
+/// A column of a Jacobian, kept where it was computed for other fits to use.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Column {
+    shared: Shared,
+}
+
+#[pymethods]
+impl Column {
+    /// A copy.
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.shared.to_vec())
+    }
+}
+
+/// Rows of a matrix from columns that are kept apart.
+fn stacked(columns: &[Shared]) -> Vec<f64> {
+    columns.iter().flat_map(|c| c.iter().copied()).collect()
+}
 
 /// Result of a fit; arrays are copies.
 #[pyclass(frozen, module = "axisight._core")]
@@ -117,7 +137,13 @@ impl FitResult {
     /// Jacobian columns of the free parameters, `(n_free, n_residuals)`.
     #[getter]
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array2(py, self.fit.columns.concat(), self.fit.n_residuals)
+        array2(py, stacked(&self.fit.columns), self.fit.n_residuals)
+    }
+    /// The same, kept where they are.
+    #[getter]
+    fn columns(&self) -> Vec<Column> {
+        let shared = self.fit.columns.iter().map(Arc::clone);
+        shared.map(|shared| Column { shared }).collect()
     }
     #[getter]
     fn blocks(&self) -> Vec<BlockTuple> {
@@ -168,7 +194,7 @@ impl Linearization {
     /// Jacobian columns of the free parameters, `(n_free, n_residuals)`.
     #[getter]
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array2(py, self.at.columns.concat(), self.at.residual.len())
+        array2(py, stacked(&self.at.columns), self.at.residual.len())
     }
     #[getter]
     fn blocks(&self) -> Vec<BlockTuple> {
@@ -288,10 +314,9 @@ fn weightings(specs: Vec<WeightingTuple>) -> Vec<Weighting> {
         .collect()
 }
 
-fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Vec<f64>)> {
-    warm.iter()
-        .map(|(i, c)| (*i, c.as_array().to_vec()))
-        .collect()
+fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Shared)> {
+    let shared = |(i, c): &WarmColumn<'_>| (*i, Arc::clone(&c.get().shared));
+    warm.iter().map(shared).collect()
 }
 
 fn problem_error(e: ProblemError) -> PyErr {

@@ -36,6 +36,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<entry::CancelToken>()?;
+    module.add_class::<fit::Column>()?;
     module.add_class::<fit::Courses>()?;
     module.add_class::<fit::FitResult>()?;
     module.add_class::<fit::Linearization>()?;

@@ -19,7 +19,7 @@ from axisight.gap.torques import Variant
 from axisight.gap.view import View
 from axisight.logs import Log
 from axisight.robot import Robot
-from axisight.simulation import simulate, white_noise
+from axisight.simulation import simulate_batch, white_noise
 
 Array = NDArray[np.float64]
 
@@ -39,13 +39,20 @@ class ClosedLoopView(View):
         """Return the logged torque."""
         return log.torque_nm
 
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the simulated torque."""
-        return simulated_torque(self.robot, variant, log)
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the simulated torque of every log."""
+        return simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
 
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the torque that sensor noise causes through the loop."""
-        return noise_torque(self.robot, log, self.floor.position_std_rad, self.settings.seed, run)
+    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the torque that sensor noise causes through the loop, for every log."""
+        return noise_torques(
+            self.robot,
+            logs,
+            self.floor.position_std_rad,
+            self.settings.seed,
+            first_run,
+            threads=self.settings.threads,
+        )
 
 
 def _contiguous(x: Array) -> Array:
@@ -77,7 +84,7 @@ class ClosedLoopFitter(ModelFitter):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None = None,
     ) -> _core.FitResult:
         """Run the fit in the core."""
@@ -116,7 +123,7 @@ class ClosedLoopFitter(ModelFitter):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None = None,
     ) -> _core.Linearization:
         """Evaluate the model in the core."""
@@ -135,19 +142,49 @@ class ClosedLoopFitter(ModelFitter):
         )
 
 
-def simulated_torque(robot: Robot, variant: Variant, log: Log) -> Array:
-    """Return the commanded torque (n, n_axes) [Nm] of a simulator along a log's references.
+def simulated_torques(
+    robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
+) -> list[Array]:
+    """Return the commanded torque (n, n_axes) [Nm] of a simulator along the references of logs.
 
     Where the simulation fails (an unstable model), the rest is NaN.
     """
+    changed = robot.with_parameters(variant.robot_values)
+    return _along(changed, logs, threads, effects=variant.effects)
+
+
+def _along(
+    robot: Robot,
+    logs: Sequence[Log],
+    threads: int,
+    *,
+    effects: Sequence[Effect] = (),
+    noise: Sequence[Array] | None = None,
+) -> list[Array]:
+    """Return the torque commanded along the references of logs, which may differ in length."""
+    references = _padded([_reference(log) for log in logs])
+    out = simulate_batch(
+        robot,
+        references,
+        effects=effects,
+        method="rk4",
+        noise=None if noise is None else _padded(noise),
+        threads=threads,
+    )
+    torque = out["torque_cmd_nm"].values
+    return [torque[i, : log.n_samples] for i, log in enumerate(logs)]
+
+
+def _padded(rows: Sequence[Array]) -> Array:
+    """Stack arrays (n, n_axes), zeros after the end of the shorter ones."""
+    longest = max(len(row) for row in rows)
+    return np.stack([np.pad(row, ((0, longest - len(row)), (0, 0))) for row in rows])
+
+
+def _reference(log: Log) -> Array:
     if log.velocity_ref_rad_s is None:
         raise InputError(f"log {log.name!r}: expected velocity references")
-    changed = robot.with_parameters(variant.robot_values)
-    out = simulate(changed, log.velocity_ref_rad_s, effects=variant.effects, method="rk4")
-    torque = np.full(log.torque_nm.shape, np.nan)
-    values = out["torque_cmd_nm"].values
-    torque[: len(values)] = values
-    return torque
+    return log.velocity_ref_rad_s
 
 
 def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floor:
@@ -155,10 +192,7 @@ def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floo
     nominal = robot.position_noise_std
     std = np.maximum(position_noise_std(logs), nominal)
     log = logs[0]
-    reference = log.velocity_ref_rad_s
-    if reference is None:
-        raise InputError(f"log {log.name!r}: expected velocity references")
-    noise = noise_torque(robot, log, std, settings.seed)
+    (noise,) = noise_torques(robot, [log], std, settings.seed)
     rate, segment = 1.0 / log.sample_time_s, segment_of(log)
     f, noise_density = torque_density(noise, rate, segment)
     torque = np.mean([torque_density(x.torque_nm, rate, segment)[1] for x in logs], axis=0)
@@ -172,10 +206,20 @@ def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floo
     return Floor(std, f, noise_density, weighting, expected)
 
 
-def noise_torque(robot: Robot, log: Log, std_rad: Array, seed: int, run: int = 0) -> Array:
-    """Return the torque (n, n_axes) [Nm] that position noise alone causes along a log."""
-    scaled = white_noise(seed, run, log.n_samples, robot.n_axes) * std_rad
-    clean = simulate(robot, log.velocity_ref_rad_s, method="rk4")
-    noisy = simulate(robot, log.velocity_ref_rad_s, method="rk4", noise=scaled)
-    n = min(clean.sizes["time"], noisy.sizes["time"])
-    return np.asarray(noisy["torque_cmd_nm"].values[:n] - clean["torque_cmd_nm"].values[:n])
+def noise_torques(
+    robot: Robot,
+    logs: Sequence[Log],
+    std_rad: Array,
+    seed: int,
+    first_run: int = 0,
+    *,
+    threads: int = 0,
+) -> list[Array]:
+    """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log."""
+    noise = [
+        white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
+        for i, log in enumerate(logs)
+    ]
+    clean = _along(robot, logs, threads)
+    noisy = _along(robot, logs, threads, noise=noise)
+    return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]

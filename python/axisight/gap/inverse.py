@@ -53,14 +53,17 @@ class InverseView(View):
         """Return the low-passed torque."""
         return motion(log, self.cutoff)[3]
 
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the predicted torque."""
-        return predicted_torque(self.robot, variant, motion(log, self.cutoff))
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the predicted torque of every log."""
+        return [predicted_torque(self.robot, variant, motion(x, self.cutoff)) for x in logs]
 
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the error that noise of position and torque causes."""
-        std = self.floor.position_std_rad
-        return inverse_noise(self.robot, log, std, self.cutoff, self.settings.seed, 2 * run)
+    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the error that noise of position and torque causes, for every log."""
+        std, seed = self.floor.position_std_rad, self.settings.seed
+        return [
+            inverse_noise(self.robot, log, std, self.cutoff, seed, 2 * run)
+            for run, log in enumerate(logs, start=first_run)
+        ]
 
 
 def motion(log: Log, cutoff_hz: float) -> Motion:
@@ -96,7 +99,7 @@ class InverseDynamicsFitter(ModelFitter):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         _near: _core.Courses | None = None,
     ) -> _core.FitResult:
         """Run the fit in the core."""
@@ -116,7 +119,7 @@ class InverseDynamicsFitter(ModelFitter):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         _near: _core.Courses | None = None,
     ) -> _core.Linearization:
         """Evaluate the model in the core."""

@@ -65,6 +65,32 @@ class Linearized:
         """Loss of the estimation logs."""
         return float(self.loss.sum())
 
+    def without(self, kept: int, *, among: range, fixed: set[str]) -> Linearized:
+        """Return the same with one effect of those at the places ``among``, which comes first there.
+
+        ``fixed``: the robot's parameters that are no longer free.
+        """
+        wanted = [
+            i
+            for i, (place, name) in enumerate(self.parameters)
+            if (name not in fixed if place is None else place == kept or place not in among)
+        ]
+
+        def renamed(key: tuple[int | None, str]) -> tuple[int | None, str]:
+            return (among.start if key[0] == kept else key[0], key[1])
+
+        names = [self.parameters[i] for i in wanted]
+        pick = np.ix_(wanted, wanted)
+        return Linearized(
+            parameters=tuple(renamed(n) for n in names),
+            at_bound=tuple(renamed(n) for n in self.at_bound if n in names),
+            matrix=self.matrix[:, wanted][:, :, wanted],
+            gradient=self.gradient[:, wanted],
+            loss=self.loss,
+            prior_matrix=self.prior_matrix[pick],
+            prior_gradient=self.prior_gradient[wanted],
+        )
+
 
 @dataclass(frozen=True)
 class Evidence(Linearized):
@@ -72,7 +98,8 @@ class Evidence(Linearized):
 
     ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
     fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
-    ``size`` (n_blocks,) of the blocks.
+    ``size`` (n_blocks,) of the blocks. ``renewed``: the sensitivities are the model's own,
+    none is another's.
     """
 
     effects: tuple[Effect, ...]
@@ -80,13 +107,14 @@ class Evidence(Linearized):
     robot_values: dict[str, float]
     std: dict[tuple[int | None, str], float]
     status: str
+    renewed: bool
     condition: float
     log: NDArray[np.int64]
     axis: NDArray[np.int64]
     start: NDArray[np.int64]
     size: NDArray[np.int64]
     residual: Array
-    columns: dict[tuple[str | None, str], Array]
+    columns: dict[tuple[str | None, str], _core.Column]
 
 
 @dataclass(frozen=True)
@@ -96,7 +124,7 @@ class _Setup:
     effects: list[Effect]
     parameters: list[Parameter]
     own: list[Parameter]
-    warm: list[tuple[int, Array]]
+    warm: list[tuple[int, _core.Column]]
 
 
 class ModelFitter(ABC):
@@ -142,7 +170,7 @@ class ModelFitter(ABC):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
     ) -> _core.FitResult:
         """Run the fit in the core, around the runs ``near`` if there are any."""
@@ -153,7 +181,7 @@ class ModelFitter(ABC):
         effects: Sequence[Effect],
         parameters: Sequence[Parameter],
         options: FitOptions,
-        warm: list[tuple[int, Array]],
+        warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
     ) -> _core.Linearization:
         """Evaluate the model in the core, at the initial values."""
@@ -179,22 +207,24 @@ class ModelFitter(ABC):
         lazy: bool = False,
         near: _core.Courses | None = None,
         max_iterations: int = 15,
+        refreshes: int = 0,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
         An effect that the robot has itself is replaced by the free one of its label.
         The simulator's parameters begin at ``robot_values``, else where
         ``start`` ended, else at their nominal values; ``lazy`` takes their
-        sensitivities from ``start`` instead of computing them. ``near`` are `runs` of a
-        model close by.
+        sensitivities from ``start``; else they are computed where the fit begins, and
+        ``refreshes`` times anew where it has settled: small changes of masses and stiffness
+        hardly bend them. ``near`` are `runs` of a model close by.
         """
         # What a candidate changes of the sensitivities of effects elsewhere can wait.
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
         setup = self._setup(free, start, robot_values, held, lazy=lazy)
-        options = self._options(max_iterations)
+        options = self._options(max_iterations, refreshes)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
-        return _evidence(result, setup, list(free))
+        return _evidence(result, setup, list(free), renewed=not lazy)
 
     def evaluate(
         self,
@@ -206,17 +236,52 @@ class ModelFitter(ABC):
     ) -> Linearized:
         """Return the model where a lazy `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
-        result = self.linearize(
-            setup.effects, setup.parameters, self._options(), setup.warm, near
-        )
+        return self._evaluated(setup, near)
+
+    def loss(
+        self,
+        free: Sequence[FreeEffect],
+        start: Evidence | None = None,
+        *,
+        robot_values: Mapping[str, float] | None = None,
+        near: _core.Courses | None = None,
+    ) -> float:
+        """Return the loss where a `fit` would begin."""
+        setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
+        fixed = [replace(p, frozen=True) for p in setup.parameters]
+        return self._evaluated(replace(setup, parameters=fixed, warm=[]), near).total
+
+    def evaluate_each(
+        self, options: Sequence[FreeEffect], start: Evidence, near: _core.Courses | None = None
+    ) -> list[Linearized]:
+        """Return what `evaluate` would for each of several effects that do nothing as they are.
+
+        They do not disturb one another: one evaluation serves all.
+        """
+        free, n = [*start.free, *options], len(start.free)
+        setup = self._setup(free, start, None, [True] * len(free), lazy=True, fixed_by=start.free)
+        together = self._evaluated(setup, near)
+        return [
+            together.without(n + i, among=range(n, len(free)), fixed=self._replaced([option]))
+            for i, option in enumerate(options)
+        ]
+
+    def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> Linearized:
+        options = self._options()
+        result = self.linearize(setup.effects, setup.parameters, options, setup.warm, near)
         return _linearized(result, setup)
 
-    def _options(self, max_iterations: int = 0) -> FitOptions:
+    def _replaced(self, free: Sequence[FreeEffect]) -> set[str]:
+        """Return the robot's parameters that effects stand in for."""
+        names = (_same_quantity(self.robot, f.effect) for f in free)
+        return {name for name in names if name is not None}
+
+    def _options(self, max_iterations: int = 0, refreshes: int = 0) -> FitOptions:
         return FitOptions(
             max_iterations=max_iterations,
             loss_tolerance=1e-4,
             step_tolerance=1e-4,
-            nuisance_refreshes=0,
+            nuisance_refreshes=refreshes,
             block_s=self.block_s,
         )
 
@@ -228,21 +293,26 @@ class ModelFitter(ABC):
         held: Sequence[bool],
         *,
         lazy: bool,
+        fixed_by: Sequence[FreeEffect] | None = None,
     ) -> _Setup:
-        """Return parameters and warm columns; ``held``: effects whose columns ``start`` may have."""
+        """Return parameters and warm columns.
+
+        ``held``: effects whose columns ``start`` may have; ``fixed_by``: effects, all unless
+        given, that hold the robot's parameters they stand in for at their values.
+        """
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
         # One that the simulator has itself is tried with other values: it takes its place.
         tried = [f.effect for f in free]
-        same = {_same_quantity(self.robot, f.effect) for f in free}
+        same = self._replaced(free if fixed_by is None else fixed_by)
         own = [
             replace(p, frozen=True)
             if p.name in same
             else replace(
                 p,
                 initial=begin.get(p.name, p.initial),
-                nuisance=lazy,
+                nuisance=True,
             )
             for p in self.own
         ]
@@ -310,7 +380,9 @@ def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) ->
     )
 
 
-def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]) -> Evidence:
+def _evidence(
+    result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect], *, renewed: bool
+) -> Evidence:
     at = _linearized(result, setup)
     values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
     for (place, name), value in zip(_names(setup), result.theta, strict=True):
@@ -318,7 +390,7 @@ def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]
             values[place][name] = float(value)
     fitted = tuple(f.effect.with_values(v) for f, v in zip(free, values, strict=True))
     blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
-    jacobian = result.jacobian
+    columns = result.columns
     std = np.sqrt(np.maximum(np.diag(result.sandwich), 0.0))
     return Evidence(
         parameters=at.parameters,
@@ -333,6 +405,7 @@ def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]
         robot_values={p.name: float(result.theta[i]) for i, p in enumerate(setup.own)},
         std={n: float(s) for n, s in zip(at.parameters, std, strict=True)},
         status=result.status,
+        renewed=renewed,
         condition=result.condition,
         log=blocks[:, 0],
         axis=blocks[:, 1],
@@ -340,7 +413,7 @@ def _evidence(result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect]
         size=blocks[:, 3],
         residual=result.residual,
         columns={
-            (None if place is None else fitted[place].label, name): jacobian[i]
+            (None if place is None else fitted[place].label, name): columns[i]
             for i, (place, name) in enumerate(at.parameters)
         },
     )

@@ -29,15 +29,19 @@ def strongest_orders(
     of the speed: an angle error seen through an inertia.
     """
     left = [r - r.mean() for r in residuals]
+    waves = [
+        _waves(a, v, bandwidth_hz, speed_power)
+        for a, v in zip(angles_rad, speeds_rad_s, strict=True)
+    ]
+    normal = np.sum([np.einsum("aon,bon->oab", w, w) for w in waves], axis=0)
+    usable = np.linalg.cond(normal) < 1e8
+    inverse = np.linalg.inv(np.where(usable[:, None, None], normal, np.eye(2)))
     found: list[int] = []
     for _ in range(count):
-        gains = [
-            0.0
-            if n in found
-            else _gain(left, angles_rad, speeds_rad_s, n, bandwidth_hz, speed_power)
-            for n in range(1, HIGHEST_ORDER + 1)
-        ]
-        if max(gains) <= 0:
+        along = np.sum([w @ r for w, r in zip(waves, left, strict=True)], axis=0)
+        gains = np.where(usable, np.einsum("ao,oab,bo->o", along, inverse, along), 0.0)
+        gains[[n - 1 for n in found]] = 0.0
+        if gains.max() <= 0:
             break
         best = int(np.argmax(gains)) + 1
         found.append(best)
@@ -48,34 +52,23 @@ def strongest_orders(
     return found
 
 
+def _waves(angle: Array, speed: Array, bandwidth_hz: float, power: int) -> Array:
+    """Return cosine and sine of every order (2, orders, n), zero where it is out of reach."""
+    order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
+    used = np.abs(speed) * order < 2 * np.pi * bandwidth_hz
+    turning = np.cumprod(np.broadcast_to(np.exp(1j * angle), used.shape), axis=0)
+    waves = np.stack([turning.real, turning.imag]) * np.abs(speed) ** power
+    # The mean of a wave over too short a stretch would pass for an offset.
+    mean = np.sum(waves * used, axis=-1, keepdims=True) / np.maximum(used.sum(-1), 1)[:, None]
+    return np.asarray((waves - mean) * used)
+
+
 def _regressors(
     angle: Array, speed: Array, order: int, bandwidth_hz: float, power: int
 ) -> tuple[Array, NDArray[np.bool_]]:
     used = np.abs(speed) * order < 2 * np.pi * bandwidth_hz
-    weight = np.abs(speed) ** power
     wave = np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1)
-    return wave * weight[:, None], used
-
-
-def _gain(
-    residuals: Sequence[Array],
-    angles: Sequence[Array],
-    speeds: Sequence[Array],
-    order: int,
-    bandwidth_hz: float,
-    power: int,
-) -> float:
-    """Squared error one order removes, one amplitude and phase for all logs."""
-    normal, projection = np.zeros((2, 2)), np.zeros(2)
-    for r, a, v in zip(residuals, angles, speeds, strict=True):
-        x, used = _regressors(a, v, order, bandwidth_hz, power)
-        # The mean of a wave over too short a stretch would pass for an offset.
-        x = x[used] - (x[used].mean(axis=0) if used.any() else 0.0)
-        normal += x.T @ x
-        projection += x.T @ r[used]
-    if np.linalg.cond(normal) > 1e8:
-        return 0.0
-    return float(projection @ np.linalg.solve(normal, projection))
+    return wave * (np.abs(speed) ** power)[:, None], used
 
 
 def _remove(

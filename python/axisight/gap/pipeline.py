@@ -125,17 +125,15 @@ def _check_log(robot: Robot, log: Log) -> None:
         )
 
 
-def _errors(view: View, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-    return [view.torque(variant, log) - view.measured(log) for log in logs]
+def _errors(view: View, torques: Sequence[Array], logs: Sequence[Log]) -> list[Array]:
+    return [torque - view.measured(log) for torque, log in zip(torques, logs, strict=True)]
 
 
 def _error_logs(view: View, found: Search) -> list[ErrorLog]:
     """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
-    refit = Variant(found.baseline.robot_values)
-    return [
-        ErrorLog(log, view.torque(refit, log) - view.measured(log), view.noise(log, 0))
-        for log in view.logs
-    ]
+    refit = view.torques(Variant(found.baseline.robot_values), view.logs)
+    errors, noises = _errors(view, refit, view.logs), view.noises(view.logs, 0)
+    return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
 
 
 # An error in torque this much above the floor is seen by eye; noise of an unexpected
@@ -168,9 +166,11 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
     def measure(errors: Sequence[Array]) -> Stage:
         return stage(logs, errors, settings.block_s)
 
-    given, refitted = measure(_errors(view, AS_GIVEN, logs)), measure(_errors(view, refit, logs))
-    floor = measure([view.noise(log, run) for run, log in enumerate(logs, start=1)])
-    stages = [measure(_errors(view, v, logs)) for v in variants]
+    before = view.torques(AS_GIVEN, logs)
+    steps = [view.torques(v, logs) for v in (refit, *variants)]
+    given = measure(_errors(view, before, logs))
+    refitted, *stages = [measure(_errors(view, torques, logs)) for torques in steps]
+    floor = measure(view.noises(logs, len(view.logs)))
     after = stages[-1] if stages else refitted
     # The first cause is credited from the simulator as given: that is what the user had.
     earlier = [given, *stages]
@@ -178,12 +178,7 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
         gap_reduction(a, b, given, floor, draws=settings.bootstrap, seed=settings.seed)
         for a, b in zip(earlier, stages, strict=False)
     ]
-    final = variants[-1] if variants else refit
-    drawn = overlays(
-        logs,
-        [view.torque(AS_GIVEN, log) for log in logs],
-        [view.torque(final, log) for log in logs],
-    )
+    drawn = overlays(logs, before, steps[-1])
     return Reach(Stages(given, refitted, after, floor), reductions, drawn)
 
 

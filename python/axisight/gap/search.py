@@ -86,7 +86,7 @@ def search(
     ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
     """
     progress("re-fitting the simulator", 0, 1)
-    baseline = fitter.fit([])
+    baseline = fitter.fit([], refreshes=1)
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.size
     out = Search(baseline, baseline, floor, layout_of(baseline))
@@ -191,7 +191,8 @@ def _take_in(
     progress(label, 0, 1)
     if len(taken) == 1:
         start = taken[0][0].trial.evidence
-        state.model = fitter.fit(start.free, start, max_iterations=4)
+        settled = start.renewed and start.status != "max_iterations"
+        state.model = start if settled else fitter.fit(start.free, start, max_iterations=4)
     else:
         free = list(state.model.free)
         for r, _ in taken:

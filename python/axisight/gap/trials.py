@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -15,7 +16,7 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Standing, Trial, stand, trial
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.settings import Settings
 
@@ -24,6 +25,8 @@ Progress = Callable[[str, int, int], None]
 A = TypeVar("A")
 B = TypeVar("B")
 
+# Parameters of candidates that are screened together: the core takes so many derivatives at once.
+_TOGETHER = 4
 # Candidates of a place fitted in full: the best of the screen, and all that come near them.
 _FITTED = 4
 _NEAR = 0.3
@@ -88,7 +91,9 @@ class Trials:
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
                 label = f"screening candidates, round {number}"
-                starts = self._each(pool, self._screened, options, label)
+                groups = self._groups(options)
+                screened = self._each(pool, self._screened, groups, label)
+                starts = [start for group in screened for start in group]
                 chosen = [starts[i] for i in self._promising(starts)]
                 label = f"fitting candidates, round {number}"
                 fitted = self._each(pool, self._fitted, chosen, label)
@@ -154,17 +159,44 @@ class Trials:
             self.skipped[option.effect.label] = str(error)
             return None
 
-    def _screened(self, option: FreeEffect) -> _Start:
-        evidence = self._attempt(self.fitter.evaluate, option, None)
+    def _groups(self, options: Sequence[FreeEffect]) -> list[list[FreeEffect]]:
+        """Return the candidates by evaluation: those that do nothing as they are share one."""
+        alone: list[FreeEffect] = []
+        together: list[FreeEffect] = []
+        for option in options:
+            beside = kept_beside(self.model.free, option)
+            idle = not option.effect.acts and len(beside) == len(self.model.free)
+            (together if idle and len(option.free) <= _TOGETHER else alone).append(option)
+        groups: list[list[FreeEffect]] = []
+        for option in sorted(together, key=lambda o: -len(o.free)):
+            room = (g for g in groups if _size(g) + len(option.free) <= _TOGETHER)
+            group = next(room, None)
+            if group is None:
+                groups.append([option])
+            else:
+                group.append(option)
+        return [[option] for option in alone] + groups
+
+    def _screened(self, group: list[FreeEffect]) -> list[_Start]:
+        """Return where fits of the candidates would begin, and what they promise."""
+        found: Sequence[Linearized | None] = []
+        if len(group) > 1:
+            # One that cannot be simulated leaves all to be tried alone.
+            with suppress(InputError):
+                found = self.fitter.evaluate_each(group, self.model, self.near)
+        found = found or [self._attempt(self.fitter.evaluate, o, None) for o in group]
+        return [self._best_start(o, e) for o, e in zip(group, found, strict=True)]
+
+    def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> _Start:
         best = _Start(option, self.model.robot_values, -np.inf)
         if evidence is not None:
             best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
         for values in option.starts:
             # A large effect bends the re-fitted simulator: its own starts begin without.
             begin = option.at(values)
-            at_start = self._attempt(self.fitter.evaluate, begin, {})
-            if at_start is not None and self.model.total - at_start.total > best.gain:
-                best = _Start(begin, {}, self.model.total - at_start.total)
+            loss = self._attempt(self.fitter.loss, begin, {})
+            if loss is not None and self.model.total - loss > best.gain:
+                best = _Start(begin, {}, self.model.total - loss)
         return best
 
     def _fitted(self, start: _Start) -> Trial | None:
@@ -200,6 +232,10 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
+
+
+def _size(group: Sequence[FreeEffect]) -> int:
+    return sum(len(option.free) for option in group)
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

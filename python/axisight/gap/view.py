@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,9 +50,12 @@ class View(ABC):
         """Return the torque errors are taken from (n, n_axes) [Nm]."""
 
     @abstractmethod
-    def torque(self, variant: Variant, log: Log) -> Array:
-        """Return the torque of a simulator on a log (n, n_axes) [Nm]."""
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
     @abstractmethod
-    def noise(self, log: Log, run: int) -> Array:
-        """Return the torque error of noise alone (n, n_axes) [Nm]."""
+    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the torque error of noise alone on each log (n, n_axes) [Nm].
+
+        The noise of log ``i`` is that of run ``first_run + i``.
+        """

@@ -165,6 +165,7 @@ pub fn trace<S: Scalar>(
         drive,
         noise,
         resolution: 0.0,
+        disturbances: true,
         method,
         cancel: None,
     };

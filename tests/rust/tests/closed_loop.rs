@@ -196,6 +196,7 @@ fn run_of<'a>(robot: &'a RobotDescription, drive: Drive<'a>, noise: &'a [&'a [f6
         drive,
         noise,
         resolution: 0.0,
+        disturbances: true,
         method: Method::default(),
         cancel: None,
     }

@@ -144,6 +144,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
         drive: Drive::Torque(&[torque]),
         noise: &[],
         resolution: 0.0,
+        disturbances: true,
         method: Method::RungeKutta4 { substeps: 2 },
         cancel: None,
     };

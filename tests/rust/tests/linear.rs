@@ -66,6 +66,7 @@ fn linear_trace<S: Scalar>(
         drive,
         noise,
         resolution: 0.0,
+        disturbances: true,
         method,
         cancel: None,
     };
@@ -321,6 +322,7 @@ fn samples_show_ripple_at_the_true_angle() {
         drive: Drive::Reference(&[&reference]),
         noise: &[&noise],
         resolution: 0.0,
+        disturbances: true,
         method: ONE,
         cancel: None,
     };
@@ -468,6 +470,7 @@ fn misuse_is_refused_by_name() {
         drive: Drive::Torque(&[&torque]),
         noise: &[],
         resolution: 0.0,
+        disturbances: true,
         method: ONE,
         cancel: Some(&flag),
     };

@@ -343,6 +343,7 @@ impl Batch<'_> {
             },
             noise: &noise,
             resolution: self.resolution,
+            disturbances: true,
             method: self.method,
             cancel: self.cancel,
         })

@@ -1,11 +1,12 @@
 //! Fits with bounds, priors, robust loss and lazy nuisance columns.
 //!
-//! A trial point costs a plain simulation; only an accepted one gets its derivatives. Those of
+//! A trial point costs a plain simulation; only an accepted one gets its derivatives, unless
+//! they are few: then most trials are accepted and one simulation serves both. Derivatives of
 //! nuisance parameters are kept from point to point, so that promises of the linear model are
 //! not relied on.
 
 use super::gram::BlockGram;
-use super::linearize::{Linearization, at_bound, grams, limits};
+use super::linearize::{Column, Linearization, at_bound, grams, limits};
 use super::loss::Loss;
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError};
 use axisight_numerics::descent::{
@@ -94,7 +95,7 @@ pub struct Fit {
     /// Whitened residuals.
     pub residual: Vec<f64>,
     /// Jacobian columns of the free parameters.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Vec<Column>,
 }
 
 /// Share of the loss that new nuisance columns, or another step, have to be worth.
@@ -104,6 +105,9 @@ const WORTH_REFRESHING: f64 = 1e-4;
 /// move them. One that moves them less, a millionth of the noise of one, is left where it is:
 /// the shape of a friction of no size, say.
 const LEAST_INFLUENCE: f64 = 1e-12;
+
+/// Derivatives that a trial point gets at once: as many as cost less than another simulation.
+const FEW: usize = 4;
 
 /// The present point of a fit, with everything the next step needs.
 struct Search<'a, P: Problem> {
@@ -115,7 +119,7 @@ struct Search<'a, P: Problem> {
     free: Vec<usize>,
     /// Columns renewed at every step: positions in `free`.
     fresh: Vec<usize>,
-    columns: Vec<Vec<f64>>,
+    columns: Vec<Column>,
     residual: Vec<f64>,
     blocks: Vec<BlockGram>,
     /// Loss of the residuals.
@@ -134,7 +138,7 @@ pub fn fit<P: Problem>(
     problem: &P,
     parameters: &[FitParameter],
     options: FitOptions,
-    warm: &[(usize, Vec<f64>)],
+    warm: &[(usize, Column)],
 ) -> Result<Fit, ProblemError> {
     let start = Linearization::new(problem, parameters, options.loss, warm)?;
     let initial_loss = start.loss;
@@ -213,7 +217,7 @@ impl<'a, P: Problem> Search<'a, P> {
     /// Residuals and columns `slots` at the present point.
     fn take(&mut self, evaluation: Evaluation, slots: &[usize]) {
         for (slot, column) in slots.iter().zip(evaluation.columns) {
-            self.columns[*slot] = column;
+            self.columns[*slot] = Column::new(column);
         }
         self.residual = evaluation.residual;
         (self.plain, self.blocks) = grams(
@@ -317,7 +321,11 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
 
     fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Evaluation)>, ProblemError> {
         let theta = self.all(theta);
-        match self.evaluate(&theta, &[]) {
+        let fresh = std::mem::take(&mut self.fresh);
+        let wanted = if fresh.len() <= FEW { &fresh[..] } else { &[] };
+        let evaluated = self.evaluate(&theta, wanted);
+        self.fresh = fresh;
+        match evaluated {
             Ok(trial) => {
                 let losses = trial.residual.iter().map(|r| self.rho.evaluate(*r).0);
                 let loss: f64 = losses.sum();
@@ -331,7 +339,7 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
     fn accept(&mut self, theta: &[f64], trial: Evaluation) -> Result<(), ProblemError> {
         self.theta = self.all(theta);
         let fresh = std::mem::take(&mut self.fresh);
-        let evaluation = if fresh.is_empty() {
+        let evaluation = if trial.columns.len() == fresh.len() {
             trial
         } else {
             self.evaluate(&self.theta.clone(), &fresh)?

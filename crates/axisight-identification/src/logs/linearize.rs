@@ -8,6 +8,10 @@ use super::loss::Loss;
 use super::problem::{FitParameter, Problem, ProblemError};
 use axisight_numerics::descent::{Limits, Reach};
 use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A column of a Jacobian, shared by the fits that use it.
+pub type Column = Arc<Vec<f64>>;
 
 /// A problem at one point.
 #[derive(Debug, Clone)]
@@ -23,7 +27,7 @@ pub struct Linearization {
     /// Whitened residuals.
     pub residual: Vec<f64>,
     /// Jacobian columns of the free parameters.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Vec<Column>,
     /// Normal equations by block.
     pub blocks: Vec<BlockGram>,
 }
@@ -42,7 +46,7 @@ impl Linearization {
         problem: &P,
         parameters: &[FitParameter],
         loss: Loss,
-        warm: &[(usize, Vec<f64>)],
+        warm: &[(usize, Column)],
     ) -> Result<Self, ProblemError> {
         check(parameters)?;
         let theta: Vec<f64> = parameters.iter().map(|p| p.initial).collect();
@@ -55,10 +59,10 @@ impl Linearization {
             .filter(|i| known(i).is_none())
             .collect();
         let evaluation = problem.evaluate(&theta, &wanted)?.finite()?;
-        let mut computed = evaluation.columns.into_iter();
-        let columns: Vec<Vec<f64>> = free
+        let mut computed = evaluation.columns.into_iter().map(Arc::new);
+        let columns: Vec<Column> = free
             .iter()
-            .map(|i| known(i).map_or_else(|| computed.next().unwrap_or_default(), Clone::clone))
+            .map(|i| known(i).map_or_else(|| computed.next().unwrap_or_default(), Arc::clone))
             .collect();
         let n = evaluation.residual.len();
         if let Some(column) = columns.iter().find(|c| c.len() != n) {
@@ -125,7 +129,7 @@ pub(super) fn grams<P: Problem>(
     free: &[usize],
     loss: Loss,
     residual: &[f64],
-    columns: &[Vec<f64>],
+    columns: &[Column],
 ) -> (f64, Vec<BlockGram>) {
     let (losses, weight): (Vec<f64>, Vec<f64>) = residual.iter().map(|r| loss.evaluate(*r)).unzip();
     let columns: Vec<&[f64]> = columns.iter().map(|c| &c[..]).collect();

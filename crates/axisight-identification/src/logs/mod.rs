@@ -13,7 +13,7 @@ pub use courses::Courses;
 pub use fit::{Fit, FitOptions, fit};
 pub use gram::{Block, BlockGram};
 pub use inverse_dynamics::{InverseDynamics, MotionRecord};
-pub use linearize::Linearization;
+pub use linearize::{Column, Linearization};
 pub use loss::Loss;
 pub use problem::{Evaluation, FitParameter, Problem, ProblemError, Target};
 pub use simulation_error::{Record, SimulationErrorProblem, SimulationInput, SimulationOutput};

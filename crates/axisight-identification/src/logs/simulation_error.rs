@@ -212,6 +212,7 @@ impl SimulationErrorProblem {
             },
             noise: &[],
             resolution: 0.0,
+            disturbances: false,
             method: self.method,
             cancel: self.cancel.as_deref(),
         };

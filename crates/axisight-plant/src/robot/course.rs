@@ -7,8 +7,8 @@
 //! the run and in the change of the masses. Everything but the arm (motors, gears, effects) stays
 //! as nonlinear as it is.
 //!
-//! For `n` joints an evaluation takes `3 n^2` multiplications without derivatives of the matrices,
-//! against about `30 n^2` with them for the equations themselves.
+//! For `n` joints an evaluation takes `n^2` multiplications, `2 n^2` more once a sample, all by
+//! numbers without derivatives; the equations themselves take about `30 n^2` with them.
 
 use super::chain::Chain;
 use super::dynamics::Dynamics;
@@ -180,6 +180,10 @@ pub struct Along<S: Scalar> {
     matrices: Vec<S::Real>,
     /// `q - q0`.
     off: Vec<S>,
+    /// `B_q (q - q0) + B_v (v - v0)` at the start of the sample: against a gear spring a
+    /// thousandth, and it changes little until the next.
+    held: Vec<S>,
+    is_held: bool,
     copy: Vec<S>,
 }
 
@@ -194,6 +198,8 @@ impl<S: Scalar> Along<S> {
             at: 0.0,
             matrices: vec![S::Real::zero(); 3 * n * n],
             off: vec![S::zero(); n],
+            held: vec![S::zero(); n],
+            is_held: false,
             copy: vec![S::zero(); n],
         };
         along.enter(0);
@@ -208,6 +214,7 @@ impl<S: Scalar> Along<S> {
     /// Go to a sample.
     pub fn enter(&mut self, sample: usize) {
         self.sample = sample;
+        self.is_held = false;
         let (course, size) = (&self.course, self.matrices.len());
         let node = sample / course.stride;
         let share = ((sample % course.stride) as f64 + 0.5) / course.stride as f64;
@@ -237,25 +244,31 @@ impl<S: Scalar> Along<S> {
     /// Take joint angles.
     #[inline(always)]
     pub(super) fn place(&mut self, q: &[S]) {
-        let mut off = std::mem::take(&mut self.off);
-        for ((off, q), on) in off.iter_mut().zip(q).zip(self.motion(0)) {
-            *off = *q - S::from_real(on);
+        if !self.is_held {
+            let mut off = std::mem::take(&mut self.off);
+            self.subtract(0, q, &mut off);
+            self.off = off;
         }
-        self.off = off;
+    }
+
+    /// `out = x - x0` for a part of the motion.
+    fn subtract(&self, which: usize, x: &[S], out: &mut [S]) {
+        for ((out, x), on) in out.iter_mut().zip(x).zip(self.motion(which)) {
+            *out = *x - S::from_real(on);
+        }
     }
 
     /// Forces without acceleration at rates `v` and the angles last placed.
     #[inline(always)]
     pub(super) fn bias(&mut self, v: &[S], out: &mut [S]) {
-        let n = self.off.len();
-        let mut faster = std::mem::take(&mut self.copy);
-        for ((faster, v), on) in faster.iter_mut().zip(v).zip(self.motion(1)) {
-            *faster = *v - S::from_real(on);
+        if !self.is_held {
+            self.hold(v);
         }
-        for (out, on) in out.iter_mut().zip(self.motion(2)) {
-            *out = S::from_real(on);
+        for ((out, on), held) in out.iter_mut().zip(self.motion(2)).zip(&self.held) {
+            *out = *held + S::from_real(on);
         }
         if let Some(forcing) = &self.forcing {
+            let n = self.off.len();
             let place = (self.sample % FORCING_STRIDE) as f64 + self.at;
             let share = S::Real::constant(place / FORCING_STRIDE as f64);
             let first = self.sample / FORCING_STRIDE * n;
@@ -264,18 +277,28 @@ impl<S: Scalar> Along<S> {
                 *out += (*to - *from).fma_real(share, *from);
             }
         }
+    }
+
+    /// What being off the run takes at rates `v`.
+    fn hold(&mut self, v: &[S]) {
+        let n = self.off.len();
+        let mut faster = std::mem::take(&mut self.copy);
+        self.subtract(1, v, &mut faster);
         let (by_angle, by_rate) = self.matrices[n * n..].split_at(n * n);
         let rows = by_angle.chunks_exact(n).zip(by_rate.chunks_exact(n));
-        for (out, (by_angle, by_rate)) in out.iter_mut().zip(rows) {
-            for ((a, b), (off, faster)) in by_angle
+        for (out, (by_angle, by_rate)) in self.held.iter_mut().zip(rows) {
+            let mut sum = S::zero();
+            for ((a, off), (b, faster)) in by_angle
                 .iter()
-                .zip(by_rate)
-                .zip(self.off.iter().zip(&faster))
+                .zip(&self.off)
+                .zip(by_rate.iter().zip(&faster))
             {
-                *out = faster.fma_real(*b, off.fma_real(*a, *out));
+                sum = faster.fma_real(*b, off.fma_real(*a, sum));
             }
+            *out = sum;
         }
         self.copy = faster;
+        self.is_held = true;
     }
 
     /// Forces to accelerations.

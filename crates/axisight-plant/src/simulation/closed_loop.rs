@@ -45,6 +45,8 @@ pub struct Run<'a> {
     pub method: Method,
     /// Step of the position sensor [rad]; zero for none.
     pub resolution: f64,
+    /// Whether samples say what torque effects add on the motors; zero where not asked for.
+    pub disturbances: bool,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,
 }
@@ -58,7 +60,8 @@ pub struct Sample<'a, S> {
     pub command: &'a [S],
     /// Measured motor position [rad].
     pub measured: &'a [S],
-    /// Torque added on the motor by ripple, friction and other effects [Nm].
+    /// Torque added on the motor by ripple, friction and other effects [Nm], where the run
+    /// asks for it.
     pub torque_disturbance: &'a [S],
     /// Error of the position measurement, noise included [rad].
     pub position_disturbance: &'a [S],
@@ -167,7 +170,9 @@ pub fn simulate<S: Scalar>(
         }
         signals.measure(plant, run, k, &x);
         signals.command(run, k, &mut controller);
-        signals.disturb(plant, &x);
+        if run.disturbances {
+            signals.disturb(plant, &x);
+        }
         observe(&signals.sample(k, &x));
         let interval = Interval {
             plant,
@@ -178,9 +183,7 @@ pub fn simulate<S: Scalar>(
         let mut torque = SampleTorque::new(&mut paths, &signals.command, &mut buffers);
         let met = interval.advance(run.method, &mut x, stepper, &mut torque);
         torque.finish();
-        if x.iter()
-            .any(|v| (0..S::LANES).any(|l| !v.lane(l).is_finite()))
-        {
+        if !all_finite(&x) {
             return Ok(Status::Diverged(k));
         }
         if !met {
@@ -188,6 +191,13 @@ pub fn simulate<S: Scalar>(
         }
     }
     Ok(Status::Completed)
+}
+
+/// Whether no state is infinite or NaN: zero times the sum of all would be NaN.
+fn all_finite<S: Scalar>(x: &[S]) -> bool {
+    let zero = S::Real::zero();
+    let sum = x.iter().fold(zero, |sum, v| v.real().fma(zero, sum));
+    (0..S::LANES).all(|lane| sum.lane(lane) == 0.0)
 }
 
 /// Signals of the current sample.
