@@ -7,9 +7,9 @@ use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_identification::logs::{
-    BlockGram, Column as Shared, Courses as Runs, Fit, FitOptions, FitParameter, InverseDynamics, Linearization as Point, Loss,
-    MotionRecord, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
-    SimulationOutput, Target, fit,
+    BlockGram, Column as Shared, Courses as Runs, Fit, FitOptions, FitParameter, InverseDynamics,
+    Linearization as Point, Loss, MotionRecord, Problem, ProblemError, Record,
+    SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
 use axisight_numerics::descent::Status;

@@ -116,6 +116,11 @@ class Evidence(Linearized):
     residual: Array
     columns: dict[tuple[str | None, str], _core.Column]
 
+    @property
+    def converged(self) -> bool:
+        """Whether the fit ended where no step lowers the loss further."""
+        return self.status in ("loss_converged", "step_converged", "exact")
+
 
 @dataclass(frozen=True)
 class _Setup:
@@ -208,6 +213,7 @@ class ModelFitter(ABC):
         near: _core.Courses | None = None,
         max_iterations: int = 15,
         refreshes: int = 0,
+        fresh: bool = False,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
@@ -216,12 +222,13 @@ class ModelFitter(ABC):
         ``start`` ended, else at their nominal values; ``lazy`` takes their
         sensitivities from ``start``; else they are computed where the fit begins, and
         ``refreshes`` times anew where it has settled: small changes of masses and stiffness
-        hardly bend them. ``near`` are `runs` of a model close by.
+        hardly bend them. ``fresh`` computes them at every step, for effects that do bend them.
+        ``near`` are `runs` of a model close by.
         """
         # What a candidate changes of the sensitivities of effects elsewhere can wait.
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
-        setup = self._setup(free, start, robot_values, held, lazy=lazy)
+        setup = self._setup(free, start, robot_values, held, lazy=lazy, fresh=fresh)
         options = self._options(max_iterations, refreshes)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         return _evidence(result, setup, list(free), renewed=not lazy)
@@ -293,6 +300,7 @@ class ModelFitter(ABC):
         held: Sequence[bool],
         *,
         lazy: bool,
+        fresh: bool = False,
         fixed_by: Sequence[FreeEffect] | None = None,
     ) -> _Setup:
         """Return parameters and warm columns.
@@ -312,7 +320,7 @@ class ModelFitter(ABC):
             else replace(
                 p,
                 initial=begin.get(p.name, p.initial),
-                nuisance=True,
+                nuisance=not fresh,
             )
             for p in self.own
         ]

@@ -16,7 +16,7 @@ from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.settings import Settings
-from axisight.gap.trials import Progress, Trials, fresh, interact, kept_beside
+from axisight.gap.trials import Progress, Trials, fresh, interact, kept_beside, settled
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def search(
     ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
     """
     progress("re-fitting the simulator", 0, 1)
-    baseline = fitter.fit([], refreshes=1)
+    baseline = fitter.fit([], refreshes=2)
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.size
     out = Search(baseline, baseline, floor, layout_of(baseline))
@@ -191,14 +191,13 @@ def _take_in(
     progress(label, 0, 1)
     if len(taken) == 1:
         start = taken[0][0].trial.evidence
-        settled = start.renewed and start.status != "max_iterations"
-        state.model = start if settled else fitter.fit(start.free, start, max_iterations=4)
+        state.model = settled(fitter, start.free, start)
     else:
         free = list(state.model.free)
         for r, _ in taken:
             new = r.trial.evidence.free[-1]
             free = [*kept_beside(free, new), new]
-        state.model = fitter.fit(free, state.model, max_iterations=6)
+        state.model = settled(fitter, free, state.model)
     progress(label, 1, 1)
 
 
@@ -221,7 +220,7 @@ def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[st
             break
         dropped.add(free[worst].effect.label)
         rest = [*free[:worst], *free[worst + 1 :]]
-        state.model = fitter.fit(rest, state.model, max_iterations=4)
+        state.model = settled(fitter, rest, state.model)
     return dropped
 
 

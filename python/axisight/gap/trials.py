@@ -59,6 +59,17 @@ def fresh(options: Sequence[FreeEffect], model: Evidence, refused: set[str]) -> 
     ]
 
 
+def settled(
+    fitter: ModelFitter, free: Sequence[FreeEffect], start: Evidence, *, max_iterations: int = 6
+) -> Evidence:
+    """Return a fit with sensitivities of its own, as often renewed as it needs."""
+    if not start.renewed or len(free) != len(start.free):
+        start = fitter.fit(free, start, refreshes=1)
+    if start.converged:
+        return start
+    return fitter.fit(start.free, start, fresh=True, max_iterations=max_iterations)
+
+
 @dataclass(frozen=True)
 class _Start:
     """Where the fit of a candidate begins, and the gain it promises."""
@@ -129,7 +140,7 @@ class Trials:
         while todo := next(iter(self._worth_refining(trials, done)), None):
             self.progress(label, len(done), len(done) + 1)
             done.add(todo.label)
-            better = self.fitter.fit(todo.evidence.free, todo.evidence, max_iterations=3)
+            better = settled(self.fitter, todo.evidence.free, todo.evidence)
             if better.total < todo.evidence.total:
                 trials = [trial(todo.candidate, better) if t is todo else t for t in trials]
         self.progress(label, 1, 1)

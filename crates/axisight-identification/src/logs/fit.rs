@@ -25,7 +25,8 @@ pub struct FitOptions {
     pub step_tolerance: f64,
     /// Loss of whitened residuals.
     pub loss: Loss,
-    /// How often nuisance columns are computed anew after the search has settled.
+    /// How often nuisance columns are computed anew after the search has settled, where it has
+    /// gone far from where they were computed.
     pub nuisance_refreshes: usize,
 }
 
@@ -101,6 +102,9 @@ pub struct Fit {
 /// Share of the loss that new nuisance columns, or another step, have to be worth.
 const WORTH_REFRESHING: f64 = 1e-4;
 
+/// Share of the loss by which it has fallen when columns computed before are no longer good.
+const MOVED: f64 = 0.01;
+
 /// Sum of squares of whitened residuals by which a natural change of any parameter is taken to
 /// move them. One that moves them less, a millionth of the noise of one, is left where it is:
 /// the shape of a friction of no size, say.
@@ -144,17 +148,27 @@ pub fn fit<P: Problem>(
     let initial_loss = start.loss;
     let mut search = Search::new(problem, parameters, options.loss, start);
     let lazy = search.fresh.len() < search.free.len();
+    // Columns that were handed over belong to another model.
+    let mut stale = !warm.is_empty();
+    let mut before = search.normal.loss;
     let (mut status, mut iterations) = search.descend(&options, 0)?;
     for _ in 0..options.nuisance_refreshes {
-        if !lazy || matches!(status, Status::MaxIterations | Status::Exact) {
+        stale |= before - search.normal.loss > MOVED * before;
+        if !lazy || !stale || matches!(status, Status::MaxIterations | Status::Exact) {
             break;
         }
-        let before = search.normal.loss;
+        before = search.normal.loss;
         search.refresh()?;
+        stale = false;
         (status, iterations) = search.descend(&options, iterations)?;
         if before - search.normal.loss <= WORTH_REFRESHING * before {
             break;
         }
+    }
+    // Columns that are no longer good point no longer where the loss is least.
+    let moved = before - search.normal.loss > MOVED * before;
+    if lazy && moved && options.nuisance_refreshes > 0 && status.advice().is_none() {
+        status = Status::MaxIterations;
     }
     Ok(search.finish(status, initial_loss, iterations))
 }

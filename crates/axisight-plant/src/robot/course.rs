@@ -84,10 +84,7 @@ impl<R: Scalar> Course<R> {
 
     /// Accelerations at a sample, from the rates on either side.
     fn acceleration(&self, sample: usize) -> Vec<R> {
-        let (before, after) = (
-            sample.saturating_sub(1),
-            (sample + 1).min(self.samples - 1),
-        );
+        let (before, after) = (sample.saturating_sub(1), (sample + 1).min(self.samples - 1));
         let time = (after - before).max(1) as f64 * self.sample_time;
         let rates = self.part(after, 1).iter().zip(self.part(before, 1));
         rates.map(|(b, a)| (*b - *a) * (1.0 / time)).collect()
@@ -156,9 +153,8 @@ impl<R: Scalar> Course<R> {
             let (q, v) = (self.part(sample, 0), self.part(sample, 1));
             let a = self.acceleration(sample);
             own.forces_along(q, v, &a, &mut own_scratch, &mut own_force);
-            let [q, v, a] = [q, v, &a[..]].map(|x| -> Vec<S> {
-                x.iter().map(|x| S::from_real(*x)).collect()
-            });
+            let [q, v, a] =
+                [q, v, &a[..]].map(|x| -> Vec<S> { x.iter().map(|x| S::from_real(*x)).collect() });
             other.forces_along(&q, &v, &a, &mut scratch, &mut force);
             let both = force.iter().zip(&own_force);
             out.extend(both.map(|(f, own)| *f - S::from_real(*own)));

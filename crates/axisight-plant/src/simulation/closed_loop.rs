@@ -105,7 +105,9 @@ pub enum SimulationError {
     )]
     NoJacobian(Method),
     /// A course that does not fit the run.
-    #[error("course: expected at least {expected} samples and a method of fixed steps, got {got} samples and {method:?}")]
+    #[error(
+        "course: expected at least {expected} samples and a method of fixed steps, got {got} samples and {method:?}"
+    )]
     Course {
         /// Samples of the run.
         expected: usize,
