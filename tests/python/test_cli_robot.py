@@ -238,7 +238,7 @@ def test_diagnose_names_other_values_of_an_identified_effect(axis, friction_nm: 
     assert cause["parameters"]["coulomb_nm"]["value"] == pytest.approx(friction_nm, rel=0.05)
     # With its own friction besides, the simulator would be further off than before.
     assert found["gap"]["after"] < 1.2 * found["gap"]["floor"]
-    assert "lacks the machine's values of coulomb friction on axis 1" in text
+    assert "lacks the machine's values of Coulomb friction on axis 1" in text
 
 
 # Studies and excitations.
