@@ -18,6 +18,7 @@ from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
+from axisight.gap.remainder import parameters_at_edge, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
@@ -157,6 +158,7 @@ class Reach:
     stages: Stages
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
+    left: tuple[ErrorLog, ...]
 
 
 def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings: Settings) -> Reach:
@@ -164,12 +166,14 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
     model = found.model
     variants = [Variant(model.robot_values, model.effects[: i + 1]) for i in range(named)]
     refit = Variant(found.baseline.robot_values)
+    measured = [view.measured(log) for log in logs]
+    noise = [view.noise(log, run) for run, log in enumerate(logs, start=1)]
 
     def measure(errors: Sequence[Array]) -> Stage:
-        return stage(logs, errors, settings.block_s)
+        return stage(logs, errors, settings.block_s, measured)
 
     given, refitted = measure(_errors(view, AS_GIVEN, logs)), measure(_errors(view, refit, logs))
-    floor = measure([view.noise(log, run) for run, log in enumerate(logs, start=1)])
+    floor = measure(noise)
     stages = [measure(_errors(view, v, logs)) for v in variants]
     after = stages[-1] if stages else refitted
     # The first cause is credited from the simulator as given: that is what the user had.
@@ -179,12 +183,13 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
         for a, b in zip(earlier, stages, strict=False)
     ]
     final = variants[-1] if variants else refit
-    drawn = overlays(
-        logs,
-        [view.torque(AS_GIVEN, log) for log in logs],
-        [view.torque(final, log) for log in logs],
+    simulated = [view.torque(final, log) for log in logs]
+    drawn = overlays(logs, [view.torque(AS_GIVEN, log) for log in logs], simulated)
+    left = tuple(
+        ErrorLog(log, torque - u, e)
+        for log, torque, u, e in zip(logs, simulated, measured, noise, strict=True)
     )
-    return Reach(Stages(given, refitted, after, floor), reductions, drawn)
+    return Reach(Stages(given, refitted, after, floor), reductions, drawn, left)
 
 
 def _assemble(
@@ -200,7 +205,7 @@ def _assemble(
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
     reach = _reach(view, held_logs, found, len(conclusion.causes), settings)
-    gap = gap_figures(reach.stages)
+    gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
     conclusion = carried_over(conclusion, reach.stages, gap, names, settings)
     causes = tuple(
@@ -218,6 +223,9 @@ def _assemble(
     )
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     nominal = robot_parameters(robot)
+    # Where nothing was named, `after` is the simulator re-fitted alone.
+    fitted = found.model if reach.reductions else found.baseline
+    tolerances = settings.tolerances_of(robot)
     return Diagnosis(
         name=name,
         mode=view.mode,
@@ -233,11 +241,14 @@ def _assemble(
         band_map=bands,
         regime_maps=regimes,
         overlays=reach.overlays,
-        refit={k: _relative(found.model, k, nominal[k]) for k in found.model.robot_values},
+        refit={k: _relative(fitted, k, nominal[k]) for k in fitted.robot_values},
         checks=(*conclusion.checks, *_filtered(view)),
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
+        remainder=remainder_of(reach.stages, gap, reach.left, settings),
+        findings=parameters_at_edge(fitted, nominal, tolerances),
+        settings=settings.as_dict(robot),
         provenance={
             "axisight_version": version("axisight"),
             "seed": settings.seed,
