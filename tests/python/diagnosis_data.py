@@ -135,18 +135,23 @@ def explained(n_axes: int = 3) -> Diagnosis:
             "The gain survives on the trajectory that was not used for fitting: 93 %.",
         ),
         axes=tuple(
-            AxisVerdict(i, "explained" if i == axis else "none", 0.2, 0.95, (0,) if i == axis else ())
+            AxisVerdict(
+                i, "explained" if i == axis else "none", 0.2, 0.95, (0,) if i == axis else ()
+            )
             for i in range(1, n_axes + 1)
         ),
         p_none=0.001,
         p_unknown=0.02,
         remainder=Remainder(
-            0.037, np.full(n_axes, 0.037),
+            0.037,
+            np.full(n_axes, 0.037),
             (Where(1, 0.7, (6.0, 15.0), "speed: slow", "70 % of the squared gap above the floor"),),
             "speed",
         ),
         findings=(
-            Finding("parameter_at_edge", "axis2.damping", "axis2.damping ended +32 % off, at the bound"),
+            Finding(
+                "parameter_at_edge", "axis2.damping", "axis2.damping ended +32 % off, at the bound"
+            ),
         ),
         settings=Settings().as_dict(load_robot("two_mass_axis")),
         provenance={

@@ -52,9 +52,8 @@ def stage(
         count = max(1, len(squares) // length)
         parts = np.array_split(squares, count)
         blocks.append(np.array([p.mean(axis=0) for p in parts]))
-    torque = sum(float(np.sum(u**2)) for u in torques)
-    error = sum(float(np.sum(e**2)) for e in errors)
-    return Stage(tuple(blocks), float(np.sqrt(error / max(torque, 1e-300))))
+    torque, left = (sum(float(np.sum(x**2)) for x in of) for of in (torques, errors))
+    return Stage(tuple(blocks), float(np.sqrt(left / max(torque, 1e-300))))
 
 
 @dataclass(frozen=True)

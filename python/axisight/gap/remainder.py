@@ -11,7 +11,7 @@ from axisight.gap.howfar import Stages
 from axisight.gap.model import Evidence
 from axisight.gap.result import Finding, Gap, Remainder
 from axisight.gap.settings import Settings
-from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
 
 # A parameter this many of its tolerances off is one machine in four hundred: rather something
 # unmodelled that pulls at it.
@@ -33,10 +33,18 @@ def remainder_of(
         return Remainder(total, per_axis)
     bands = band_map(logs, settings.block_s)
     regimes = regime_maps(logs, settings.bandwidth_hz, settings.block_s)
-    places = findings(bands, regimes, settings.significance)
-    where = tuple(w for w in places if standing[w.axis - 1])
-    regime = where[0].regime if where else None
-    return Remainder(total, per_axis, where, None if regime is None else regime.partition(":")[0])
+    shares = per_axis**2 / max(float(np.sum(per_axis**2)), 1e-300)
+    where = sorted(
+        (
+            placed(bands, regimes, int(i), float(shares[i]), settings.significance)
+            for i in np.flatnonzero(standing)
+        ),
+        key=lambda w: -w.share,
+    )
+    regime = where[0].regime
+    return Remainder(
+        total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
+    )
 
 
 def parameters_at_edge(
