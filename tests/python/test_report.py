@@ -84,7 +84,7 @@ def test_many_values_are_grouped_and_counted():
 
 def test_pooled_remainder_and_findings_are_on_the_page():
     page = " ".join(render_report(explained()).split())
-    assert '<td>pooled</td><td>–</td><td class="num">22 %</td>' in page
+    assert '<td class="word">pooled</td><td class="word">–</td><td class="num">22 %</td>' in page
     assert "√(Σ e² / Σ u²)" in page
     assert "3.7 % of the torque on the held-out logs remain above the floor" in page
     assert "that varies with speed" in page
