@@ -45,6 +45,10 @@ def test_every_verdict_gives_a_page_that_needs_no_network(verdict):
     assert 3_000_000 < len(page) < 8_000_000
 
 
+def test_no_tool_offers_to_send_a_chart_away():
+    assert "showSendToCloud: false" in render_report(explained())
+
+
 def test_one_prismatic_axis_is_in_newtons():
     assert "(N)" in render_report(one_prismatic())
 
@@ -96,7 +100,8 @@ def test_pooled_remainder_and_findings_are_on_the_page():
     assert "√(Σ e² / Σ u²)" not in render_report(plain)
 
 
-# Says whether any tool of a figure covers something of a figure or what stands above it.
+# Says whether any tool of a figure covers something of a figure or what stands above it, and
+# whether there are tools of the ranking (units) or to share a chart (tens).
 PROBE = """<script>setTimeout(function () {
   function boxes(query) {
     return Array.prototype.map.call(document.querySelectorAll(query), function (e) {
@@ -106,8 +111,10 @@ PROBE = """<script>setTimeout(function () {
   var others = boxes(".main-svg .nsewdrag, .main-svg .legend, .choose label");
   var covered = others.filter(function (o) { return tools.some(function (t) {
     return t.left < o.right && o.left < t.right && t.top < o.bottom && o.top < t.bottom; }); });
-  var ranking = document.querySelectorAll("#ranking-figure .modebar").length;
-  document.title = "probe " + tools.length + " " + others.length + " " + covered.length + " " + ranking;
+  var unwanted = document.querySelectorAll("#ranking-figure .modebar").length;
+  var shares = document.querySelectorAll('.modebar-btn[data-title*="hare"]').length;
+  unwanted += 10 * shares;
+  document.title = "probe " + tools.length + " " + others.length + " " + covered.length + " " + unwanted;
 }, 1500);</script></body>"""
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 
@@ -126,8 +133,8 @@ def test_tools_cover_no_figure(tmp_path, width):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     found = re.search(r"<title>probe (\d+) (\d+) (\d+) (\d+)</title>", done.stdout)
     assert found is not None
-    tools, others, covered, ranking = map(int, found.groups())
-    assert (tools, covered, ranking) == (1, 0, 0)
+    tools, others, covered, unwanted = map(int, found.groups())
+    assert (tools, covered, unwanted) == (1, 0, 0)
     assert others >= 5
 
 

@@ -1,6 +1,7 @@
 (function () {
   "use strict";
-  var config = { responsive: true, displaylogo: false,
+  // Nothing leaves the page: plotly would offer to upload a chart to its makers.
+  var config = { responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   function data(id) {
     var element = document.getElementById(id);
