@@ -1,6 +1,7 @@
 """Effects that a robot file states: which commands use them, and what they say."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -264,6 +265,24 @@ def test_diagnose_uses_the_part_asked_for(axis: Path, log: Path, monkeypatch) ->
     assert seen[1]["estimation"][0].n_samples == 9000
     assert "--from" in run("diagnose", free, free, "--model", axis, "--from", 7, code=2)
     assert len(seen) == 2
+
+
+def test_options_of_the_search_arrive(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "settings")
+    options = ("--cutoff-hz", 12.5, "--max-causes", 2, "--threads", 1, "--seed", 3)
+    run("diagnose", log, log, "--model", axis, *options, code=2)
+    run("diagnose", log, log, "--model", axis, code=2)
+    given, default = seen
+    assert (given.cutoff_hz, given.max_causes, given.threads, given.seed) == (12.5, 2, 1, 3)
+    assert (default.cutoff_hz, default.threads) == (None, os.cpu_count())
+
+
+@pytest.mark.parametrize("cutoff_hz", [0, -3, 1000])
+def test_a_cutoff_that_is_none_is_refused(axis: Path, log: Path, cutoff_hz: float) -> None:
+    free = open_loop(log)
+    text = run("diagnose", free, free, "--model", axis, "--cutoff-hz", cutoff_hz, code=2)
+    wanted = "cutoff_hz: expected between 0 and the Nyquist frequency 1000 Hz"
+    assert f"{wanted}, got {cutoff_hz} Hz" in text
 
 
 def test_a_closed_loop_cannot_begin_in_motion(axis: Path, log: Path, monkeypatch) -> None:

@@ -12,8 +12,8 @@ from diagnosis_data import explained, hostile, of
 
 @pytest.fixture
 def shown(monkeypatch):
-    def render(diagnosis) -> str:
-        console = Console(width=200, record=True, file=StringIO())
+    def render(diagnosis, width: int = 200) -> str:
+        console = Console(width=width, record=True, file=StringIO())
         monkeypatch.setattr(show, "OUT", console)
         show.show_diagnosis(diagnosis)
         return " ".join(console.export_text().split())
@@ -25,7 +25,7 @@ def test_a_diagnosis_says_it_all(shown):
     text = shown(replace(explained(), next_experiment="Move slowly."))
     for words in (
         "explained: Axis 2 has Coulomb friction",
-        "coulomb_nm │ 0.612 │ 0.583 to 0.641 │ Nm │ 0.970",
+        "coulomb_friction@2 0.970 coulomb_nm 0.612 Nm 0.583 to 0.641",
         "│ 2 │ explained │ 46.5 % │ 43.5 % │ 6.2 % │ 5 %",
         "│ all │ explained │ 31 % │ 29 % │ 6.2 % │ 5 %",
         "│ pooled │ │ 21.7 % │ 20.3 % │ 4.34 % │ 3.5 %",
@@ -44,6 +44,12 @@ def test_what_is_not_there_is_not_said(shown):
     text = shown(replace(of("none"), gap=replace(of("none").gap, pooled=None)))
     for words in ("pooled", "remains", "finding", "next experiment", "re-fitted within", "cause"):
         assert words not in text, words
+
+
+def test_nothing_is_cut_on_a_narrow_screen(shown):
+    text = shown(explained(), width=80)
+    assert "…" not in text
+    assert "coulomb_friction@2 0.970 coulomb_nm 0.612 Nm 0.583 to 0.641" in text
 
 
 def test_names_are_no_markup(shown):

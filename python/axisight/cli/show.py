@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
 
 from axisight.cli.common import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
+from axisight.gap.headline import in_order
 
 _RANKED = 8
 _REFITTED = 10
@@ -54,16 +57,16 @@ def _percent(x: float) -> str:
 
 
 def _causes(found: Diagnosis) -> Table:
-    table = Table("cause", "axis", "parameter", "value", "95 % interval", "unit", "probability")
-    for cause in found.causes:
-        axis = "arm" if cause.axis is None else str(cause.axis)
-        first = (cause.effect, axis)
+    # Narrow enough for a terminal of 80 columns; longer names fold, for a cut one is of no use.
+    table = Table(box=SIMPLE_HEAD)
+    for name in ("cause and its values", "value", "95 % interval", "probability"):
+        table.add_column(name, overflow="fold")
+    for cause in in_order(found.causes):
+        table.add_row(escape(cause.label), "", "", f"{cause.probability:.3f}")
         for name, p in cause.parameters.items():
-            shown = f"{cause.probability:.3f}" if first[0] else ""
-            interval = f"{p.low:.4g} to {p.high:.4g}"
             unit = cause.units.get(name, "1")
-            table.add_row(*first, name, f"{p.value:.4g}", interval, unit, shown)
-            first = ("", "")
+            value = f"{p.value:.4g}" if unit == "1" else f"{p.value:.4g} {unit}"
+            table.add_row(f"  {escape(name)}", escape(value), f"{p.low:.4g} to {p.high:.4g}", "")
     return table
 
 
@@ -84,7 +87,7 @@ def _gaps(found: Diagnosis) -> Table:
         p = gap.pooled
         pooled = (p.before, p.refitted, p.after, p.floor)
         table.add_row("pooled", "", *(_percent(x) for x in pooled))
-        table.caption = "pooled: sqrt(sum of squared errors / sum of squared torques) over the arm"
+        table.caption = "pooled: sqrt(sum of squared errors / sum of squared torques)"
     return table
 
 
@@ -97,18 +100,23 @@ def _refitted(refit: dict[str, Interval]) -> Table:
     largest = sorted(refit.items(), key=lambda item: -abs(item[1].value))
     for name, p in largest[:_REFITTED]:
         interval = f"{100 * p.low:+.2g} to {100 * p.high:+.2g} %"
-        table.add_row(name, f"{100 * p.value:+.2g} %", interval)
+        table.add_row(escape(name), f"{100 * p.value:+.2g} %", interval)
     if len(largest) > _REFITTED:
         table.caption = f"and {len(largest) - _REFITTED} more that changed less"
     return table
 
 
 def _ranking(found: Diagnosis) -> Table:
-    table = Table("effect", "axis", "probability", "held-out score", "significance")
-    table.title = "candidates where there was most to explain"
+    table = Table(title="candidates where there was most to explain")
+    for name in ("effect", "axis", "probability", "held-out score", "significance"):
+        table.add_column(name, overflow="fold")
     for c in found.ranking[:_RANKED]:
         axis = "arm" if c.axis is None else str(c.axis)
         table.add_row(
-            c.effect, axis, f"{c.probability:.3f}", f"{c.score:.3f}", f"{c.significance:.1f}"
+            escape(c.effect),
+            axis,
+            f"{c.probability:.3f}",
+            f"{c.score:.3f}",
+            f"{c.significance:.1f}",
         )
     return table

@@ -41,6 +41,12 @@ def headline(
     return f"The simulator lacks {missing}: {shrinks}"
 
 
+def in_order(causes: Sequence[Cause]) -> list[Cause]:
+    """Return causes by effect, in the order in which effects first come, then by axis."""
+    first = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
+    return sorted(causes, key=lambda c: (first[c.effect], c.axis or 0))
+
+
 def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) -> str:
     """Return causes in words, one phrase an effect: "Coulomb friction on axes 1, 2 and 5".
 
@@ -49,7 +55,7 @@ def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) 
     """
     present = {(e.name, e.axis) for e in own if e.acts}
     axes: dict[str, list[int]] = {}
-    for c in causes:
+    for c in in_order(causes):
         axes.setdefault(c.effect, []).extend([] if c.axis is None else [c.axis])
     phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
     for effect, mine in axes.items():
@@ -58,7 +64,7 @@ def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) 
         adjective, _, head = noun(effect).rpartition(" ")
         # Two delays are two things; friction of two kinds is one.
         shared = head if start not in ("a", "an") else noun(effect)
-        key = (start, shared, tuple(sorted(mine)))
+        key = (start, shared, tuple(mine))
         phrases.setdefault(key, []).append(adjective if shared == head else "")
     return _listed(
         [

@@ -118,6 +118,11 @@ class Cause:
     family: str = ""
     family_probability: float = 1.0
 
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return self.effect if self.axis is None else f"{self.effect}@{self.axis}"
+
 
 @dataclass(frozen=True)
 class AxisVerdict:

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from axisight.effects import effect_table
+from axisight.gap.headline import in_order
 from axisight.gap.result import (
     Candidate,
     Cause,
@@ -109,7 +110,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": _places(diagnosis.where),
         "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "maps": _maps(gap_maps(diagnosis)),
-        "causes": [_cause(cause) for cause in diagnosis.causes],
+        "causes": [_cause(cause) for cause in in_order(diagnosis.causes)],
         "ranking": [_candidate(c) for c in ranking],
         "top": TOP,
         "ranking_json": Markup(page_json(ranking_figure(diagnosis).to_plotly_json())),
@@ -197,10 +198,9 @@ def _remainder(remainder: Remainder) -> dict[str, Any]:
 
 def _values(causes: Sequence[Cause]) -> dict[str, Any]:
     """Return the values that stand beside the headline: sizes of the causes, and how many are below."""
-    order = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
     rows: list[dict[str, str]] = []
     title = ""
-    for cause in sorted(causes, key=lambda c: (order[c.effect], c.axis or 0)):
+    for cause in in_order(causes):
         parameters = _cause(cause)["parameters"]
         shapes = _shapes(cause.effect)
         for row in [r for r in parameters if r["name"] not in shapes] or parameters:
