@@ -168,6 +168,12 @@ def test_a_simulation_that_broke_off_has_no_place(base):
     stages = Stages(broken, broken, broken, floor)
     found = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
     assert np.isnan(found.gap) and found.where == ()
+    # Nor where the run that tells the noise broke off.
+    error[:] = 0.1
+    left = stage([log], [error], 1.0)
+    stages = Stages(left, left, left, floor)
+    short = [ErrorLog(log, error, noise[:-500])]
+    assert remainder_of(stages, gap_figures(stages), short, Settings()).where == ()
 
 
 @pytest.mark.parametrize(
