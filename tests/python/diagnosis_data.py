@@ -5,7 +5,20 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, Overlay, Where
+from axisight import Settings, load_robot
+from axisight.gap.result import (
+    AxisVerdict,
+    Candidate,
+    Cause,
+    Diagnosis,
+    Finding,
+    Gap,
+    Interval,
+    Overlay,
+    Pooled,
+    Remainder,
+    Where,
+)
 
 BANDS = ["0.1–0.5 Hz", "0.5–2 Hz", "2–6 Hz", "6–15 Hz", "15–40 Hz", "40–100 Hz", "100–250 Hz"]
 REGIMES = {
@@ -52,6 +65,7 @@ def gap(before: float, refitted: float, after: float, floor: float, n_axes: int)
     return Gap(
         before, refitted, after, floor,
         before * spread, refitted * spread, after * np.ones(n_axes), floor * np.ones(n_axes),
+        Pooled(0.7 * before, 0.7 * refitted, 0.7 * after, 0.7 * floor),
     )  # fmt: skip
 
 
@@ -120,12 +134,37 @@ def explained(n_axes: int = 3) -> Diagnosis:
             "Residual after the fit is white on every axis (largest of 12 tests: 2.1 s.e.).",
             "The gain survives on the trajectory that was not used for fitting: 93 %.",
         ),
+        axes=tuple(
+            AxisVerdict(
+                i, "explained" if i == axis else "none", 0.2, 0.95, (0,) if i == axis else ()
+            )
+            for i in range(1, n_axes + 1)
+        ),
+        p_none=0.001,
+        p_unknown=0.02,
+        remainder=Remainder(
+            0.037,
+            np.full(n_axes, 0.037),
+            (Where(1, 0.7, (6.0, 15.0), "speed: slow", "70 % of the squared gap above the floor"),),
+            "speed",
+        ),
+        findings=(
+            Finding(
+                "parameter_at_edge", "axis2.damping", "axis2.damping ended +32 % off, at the bound"
+            ),
+        ),
+        settings=Settings().as_dict(load_robot("two_mass_axis")),
         provenance={
-            "axisight": "0.1.0",
+            "axisight_version": "0.1.0",
             "seed": 7,
+            "robot": "practice",
+            "robot_effects": [],
             "axis_kinds": ["revolute"] * n_axes,
-            "settings": {"candidates": 29, "significance": 3.0},
-            "logs": ["logs/a.parquet", "logs/b.parquet"],
+            "estimation_logs": ["a", "b"],
+            "validation_logs": ["validation_multisine", "validation_trajectory"],
+            "position_noise_std_rad": [1e-5] * n_axes,
+            "cutoff_hz": None,
+            "seconds": 12.3,
         },
     )
 
@@ -135,23 +174,26 @@ def of(verdict: str) -> Diagnosis:
     base = explained()
     if verdict == "explained":
         return base
+    if verdict == "undecidable":
+        rival = replace(base.causes[0], effect="torque_constant", parameters={}, probability=0.48)
+        return replace(
+            base, verdict=verdict, causes=(rival,),
+            headline="Torque constant of axis 2 and payload explain the gap equally.",
+            ranking=ranking(0.48), equivalent=(("torque_constant@2", "payload"),),
+            next_experiment="Hold still in two poses with a known payload of at least 5 kg.",
+        )  # fmt: skip
     common = {"verdict": verdict, "causes": ()}
     if verdict == "none":
         return replace(
             base, **common, headline="Simulator and robot agree to within the noise.",
             gap=gap(0.052, 0.051, 0.051, 0.05, 3), where=(), alternatives=(), ranking=(), refit={},
             band_map=shares("band", BANDS, 3, 1, 0.0), regime_maps={}, overlays=base.overlays[:1],
-        )  # fmt: skip
-    if verdict == "unknown":
-        return replace(
-            base, **common, headline="Axis 2 has a gap between 2 and 15 Hz that no effect explains.",
-            gap=gap(0.31, 0.29, 0.29, 0.05, 3), alternatives=(), mode="inverse_dynamics",
-            next_experiment="Record axis 2 alone at three amplitudes.",
+            remainder=Remainder(0.01, np.full(3, 0.01)), findings=(), axes=(),
         )  # fmt: skip
     return replace(
-        base, **common, headline="Torque constant of axis 2 and payload explain the gap equally.",
-        ranking=ranking(0.48), equivalent=(("torque_constant@2", "payload"),),
-        next_experiment="Hold still in two poses with a known payload of at least 5 kg.",
+        base, **common, headline="Axis 2 has a gap between 2 and 15 Hz that no effect explains.",
+        gap=gap(0.31, 0.29, 0.29, 0.05, 3), alternatives=(), mode="inverse_dynamics",
+        next_experiment="Record axis 2 alone at three amplitudes.",
     )  # fmt: skip
 
 
@@ -186,4 +228,6 @@ def hostile() -> Diagnosis:
         regime_maps={bad: base.regime_maps["speed"].assign_coords(relabel)},
         overlays=(replace(base.overlays[0], log=bad), *base.overlays[1:]),
         refit={bad: Interval(0.1, 0.0, 0.2)}, provenance={bad: {bad: bad}},
+        findings=(Finding("parameter_at_edge", bad, bad),),
+        remainder=Remainder(0.1, np.full(3, 0.1), (Where(2, 0.5, (1.0, 2.0), bad, bad),), bad),
     )  # fmt: skip

@@ -180,7 +180,7 @@ OPTIONS = {
     "effects": (
         [
             "--effect",
-            "coulomb_friction@2:coulomb_nm=0.5,smoothing_rad_s=0.2",
+            "coulomb_friction@2 coulomb_nm=0.5 smoothing_rad_s = 0.2",
             "--effect",
             "payload:mass_kg=30",
             "--effect",
@@ -227,6 +227,16 @@ def test_simulate_does_what_the_library_does(case, name, torque):
         (["--effect", "backlash@4:half_width_rad=1e-4"], ["from 1 to 3", "4"]),
         (["--effect", "backlash"], ["backlash", "no axis"]),
         (["--effect", "payload@1:mass_kg=3"], ["payload"]),
+        (["--effect", "backlash@1 half_width_rad 1e-4"], ["PARAM=VALUE", "'half_width_rad'"]),
+        (["--effect", "backlash@1 half_width_rad=-1"], ["--effect", "half_width_rad", "-1"]),
+        (["--effect", "backlash@1 half_width_rad=nan"], ["half_width_rad"]),
+        (["--effect", "backlash@1", "--effect", "backlash@1"], ["backlash@1 once", "twice"]),
+        (["--effect", ""], ["expected one of", "backlash"]),
+        (["--from", "-1"], ["--from", "not below zero", "-1"]),
+        (["--from", "9"], ["--from", "less than 5", "9 s"]),
+        (["--from", "3", "--to", "2"], ["--from", "less than 2 s", "3 s"]),
+        (["--to", "0"], ["--to", "positive"]),
+        (["--to", "0.5"], ["--from, --to", "at least 1 s", "0.5 s"]),
         (["--start", "0,zero,0"], ["--start", "numbers", "0,zero,0"]),
         (["--start", "0,0"], ["start_rad", "3"]),
         (["--method", "euler"], ["method", "rodas4", "euler"]),
@@ -285,6 +295,16 @@ def test_simulate_writes_what_there_is_of_a_failed_run(case):
     assert result.exit_code == 1
     assert "step_size_collapsed" in result.output
     assert 1 < len(pd.read_parquet(out)) < 2000
+
+
+def test_simulate_uses_the_part_asked_for(case):
+    # The case's robot begins at rest wherever the references do.
+    got = simulated(case, "--from", "1", "--to", "2.5")
+    source = pd.read_parquet(case / "logs" / "moves.parquet")
+    part = source.iloc[2000:5000]
+    assert len(got) == 3000
+    assert got["time_s"][0] == 0.0
+    assert np.array_equal(columns(got, "velocity_ref"), columns(part, "velocity_ref"))
 
 
 def test_effects_are_listed():

@@ -63,6 +63,22 @@ def rigid(tmp_path_factory) -> Path:
     return folder
 
 
+def test_rigid_body_uses_the_part_asked_for(rigid, tmp_path: Path) -> None:
+    out = tmp_path / "found.toml"
+    first = rigid / "run1.parquet"
+    common = ("rigid-body", rigid / "robot.toml")
+    run(*common, first, "--consistent", "--from", 1, "--to", 5.5, "-o", out)
+    part = pd.read_parquet(first).iloc[1000:5500].reset_index(drop=True)
+    part["time_s"] -= part["time_s"][0]
+    part.to_parquet(tmp_path / "part.parquet", index=False)
+    run(*common, tmp_path / "part.parquet", "--consistent", "-o", tmp_path / "same.toml")
+    assert robot_parameters(load_robot(out)) == robot_parameters(load_robot(tmp_path / "same.toml"))
+    settings = load_identified(out).provenance.settings
+    assert (settings["start_s"], settings["stop_s"]) == (1.0, 5.5)
+    text = run(*common, first, "--from", 1, "--to", 1.5, code=2)
+    assert "--from, --to: expected at least 1 s between, got 0.5 s of the log" in text
+
+
 def test_rigid_body_prints_and_writes(rigid, tmp_path: Path) -> None:
     out = tmp_path / "found.toml"
     first, second, third = (rigid / f"run{i}.parquet" for i in (1, 2, 3))

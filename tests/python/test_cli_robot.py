@@ -1,9 +1,11 @@
 """Effects that a robot file states: which commands use them, and what they say."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +15,7 @@ from typer.testing import CliRunner
 from axisight import Effect, Log, load_robot, montecarlo, simulate
 from axisight.cli import app
 from axisight.errors import InputError
+from axisight.gap import verdict_schema
 from axisight.gap.candidates import all_candidates
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.starts import Situation
@@ -175,7 +178,9 @@ def diagnosed(axis: Path, friction_nm: float, *more: object) -> tuple[dict, str]
     held = ["--validation", paths.pop()]
     verdict = folder / "verdict.json"
     text = run("diagnose", *paths, *held, "--model", axis, "--json", verdict, *more)
-    return json.loads(verdict.read_text()), text
+    found = json.loads(verdict.read_text())
+    jsonschema.validate(found, verdict_schema())
+    return found, text
 
 
 def test_diagnose_knows_what_was_identified(axis: Path) -> None:
@@ -200,6 +205,104 @@ def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypa
     shutil.copy(log, log.with_name("log2.parquet"))
     assert "with the effects of" in run("diagnose", axis.parent, code=2)
     assert seen == [(SPRING, COULOMB, NEUTRAL), (SPRING, COULOMB, NEUTRAL)]
+
+
+GIVEN = "coulomb_friction@1 coulomb_nm=0.2"
+
+
+def stopped(monkeypatch, attribute: str = "robot") -> list:
+    """What `diagnose` is called with, and nothing more."""
+    seen: list = []
+
+    def stop(**inputs) -> None:
+        seen.append(inputs if attribute == "all" else inputs[attribute])
+        raise InputError("seen")
+
+    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
+    return seen
+
+
+def test_diagnose_takes_effects_of_the_command_line(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch)
+    more = ("--effect", GIVEN, "--effect", "payload mass_kg=2")
+    text = run("diagnose", log, log, "--model", axis, *more, code=2)
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in text
+    labels = {e.label: e for e in seen[0].effects}
+    assert set(labels) == {SPRING.label, COULOMB.label, NEUTRAL.label, "payload"}
+    assert labels["coulomb_friction@1"].parameters["coulomb_nm"] == 0.2
+    assert labels["payload"].parameters["mass_kg"] == 2.0
+    refused = run("diagnose", log, log, "--model", axis, "--effect", "backlash@7", code=2)
+    assert "--effect" in refused and "expected an axis from 1 to 1, got axis 7" in refused
+
+
+def test_a_given_effect_is_no_longer_missing(axis: Path) -> None:
+    bare = write_robot(axis.with_name("bare.toml"))
+    effects = "coulomb_friction@1 coulomb_nm=0.5 smoothing_rad_s=0.05"
+    more = ("--effect", effects, "--effect", "nonlinear_stiffness@1 cubic_nm_rad3=3.7e10")
+    found, _ = diagnosed(bare, 0.5, *more)
+    assert found["verdict"] == "none"
+    assert found["provenance"]["robot_effects"] == ["coulomb_friction@1", "nonlinear_stiffness@1"]
+
+
+def open_loop(path: Path) -> Path:
+    frame = pd.read_parquet(path).drop(columns="velocity_ref_1")
+    out = path.with_name(f"open_{path.name}")
+    frame.to_parquet(out, index=False)
+    return out
+
+
+def test_diagnose_uses_the_part_asked_for(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    free = open_loop(log)
+    run("diagnose", free, free, "--model", axis, "--from", 2, "--to", 4.5, code=2)
+    (inputs,) = seen
+    whole = read_log(free)
+    for used in (*inputs["estimation"], *inputs["validation"]):
+        np.testing.assert_array_equal(used.position_rad, whole.position_rad[4000:9000])
+        assert used.notes == ("from 2 s to 4.5 s",)
+    # An end alone leaves the start at rest, where a closed loop begins.
+    run("diagnose", log, log, "--model", axis, "--to", 4.5, code=2)
+    assert seen[1]["estimation"][0].n_samples == 9000
+    assert "--from" in run("diagnose", free, free, "--model", axis, "--from", 7, code=2)
+    assert len(seen) == 2
+
+
+def test_options_of_the_search_arrive(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "settings")
+    options = ("--cutoff-hz", 12.5, "--max-causes", 2, "--threads", 1, "--seed", 3)
+    run("diagnose", log, log, "--model", axis, *options, code=2)
+    run("diagnose", log, log, "--model", axis, code=2)
+    given, default = seen
+    assert (given.cutoff_hz, given.max_causes, given.threads, given.seed) == (12.5, 2, 1, 3)
+    assert (default.cutoff_hz, default.threads) == (None, os.cpu_count())
+
+
+@pytest.mark.parametrize("cutoff_hz", [0, -3, 1000])
+def test_a_cutoff_that_is_none_is_refused(axis: Path, log: Path, cutoff_hz: float) -> None:
+    free = open_loop(log)
+    text = run("diagnose", free, free, "--model", axis, "--cutoff-hz", cutoff_hz, code=2)
+    wanted = "cutoff_hz: expected between 0 and the Nyquist frequency 1000 Hz"
+    assert f"{wanted}, got {cutoff_hz} Hz" in text
+
+
+def test_a_closed_loop_cannot_begin_in_motion(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    text = run("diagnose", log, log, "--model", axis, "--from", 2, code=2)
+    assert "--from: expected a time at which every axis stands as at the start" in text
+    assert "got 2 s, where axis 1 moves" in text
+    assert not seen
+    # A second at rest in front may go; at another place it may not.
+    made = pd.read_parquet(log)
+    n = 2000
+    still = pd.concat([made.iloc[[0] * n], made], ignore_index=True)
+    still["time_s"] = np.arange(len(still)) * 5e-4
+    later = log.with_name("later.parquet")
+    still.to_parquet(later, index=False)
+    run("diagnose", later, later, "--model", axis, "--from", 1, code=2)
+    np.testing.assert_array_equal(seen[0]["estimation"][0].torque_nm, made[["torque_cmd_1"]])
+    still.loc[n // 2 :, "position_1"] += 5.0
+    still.to_parquet(later, index=False)
+    assert "stands 5 rad off" in run("diagnose", later, later, "--model", axis, "--from", 1, code=2)
 
 
 def test_candidates_begin_where_the_simulator_is(axis: Path, log: Path) -> None:
@@ -238,7 +341,7 @@ def test_diagnose_names_other_values_of_an_identified_effect(axis, friction_nm: 
     assert cause["parameters"]["coulomb_nm"]["value"] == pytest.approx(friction_nm, rel=0.05)
     # With its own friction besides, the simulator would be further off than before.
     assert found["gap"]["after"] < 1.2 * found["gap"]["floor"]
-    assert "lacks the machine's values of coulomb friction on axis 1" in text
+    assert "lacks the machine's values of Coulomb friction on axis 1" in text
 
 
 # Studies and excitations.
@@ -277,6 +380,27 @@ def test_montecarlo_takes_them(axis: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(stored, python["arithmetic_mean"].values)
 
 
+def test_montecarlo_takes_effects_of_the_command_line(axis: Path, tmp_path: Path) -> None:
+    study = study_file(tmp_path, axis, "nonlinear")
+    common = ("montecarlo", study, "--threads", 1)
+    run(*common, "--out", tmp_path / "with", "--effect", GIVEN)
+    given = montecarlo.read_study(study)
+    entry = montecarlo.EffectEntry(name="coulomb_friction", axis=1, parameters={"coulomb_nm": 0.2})
+    wanted = montecarlo.run(given.model_copy(update={"effect": [entry]}), threads=1)
+    np.testing.assert_array_equal(mean_of(tmp_path / "with"), wanted["arithmetic_mean"].values)
+    refused = run(*common, "--out", tmp_path / "not", "--effect", "wobble@1", code=2)
+    assert "--effect 'wobble@1'" in refused
+    # The study's own of that name and axis gives way.
+    own = study.with_name("own.toml")
+    own.write_text(given.model_copy(update={"effect": [entry]}).to_toml())
+    run(
+        "montecarlo", own, "--threads", 1, "--out", tmp_path / "own",
+        "--effect", "coulomb_friction@1 coulomb_nm=0.3",
+    )  # fmt: skip
+    stored = (tmp_path / "own" / "study.toml").read_text()
+    assert stored.count("coulomb_friction") == 1 and "coulomb_nm = 0.3" in stored
+
+
 def mean_of(folder: Path) -> np.ndarray:
     store = xr.open_zarr(folder / "study.zarr", group="result", consolidated=False)
     return store["arithmetic_mean"].values
@@ -308,6 +432,16 @@ def test_excite_checks_limits_with_them(axis: Path, tmp_path: Path) -> None:
     options = ["--robot", axis, *CHIRP, "--out", tmp_path / "refs.parquet", "--force"]
     assert "with the effects" not in run("excite", *options)
     assert LINE.format(axis) in run("excite", *options, "--torque-limit", 0.1)
+
+
+def test_excite_checks_limits_with_effects_of_the_command_line(axis: Path, tmp_path: Path) -> None:
+    options = ["--robot", axis, *CHIRP, "--out", tmp_path / "refs.parquet", "--force"]
+    plain = run("excite", *options, "--torque-limit", 0.1)
+    loaded = run(
+        "excite", *options, "--torque-limit", 0.1, "--effect", "coulomb_friction@1 coulomb_nm=5"
+    )
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in loaded
+    assert loaded.split("experiments")[1] != plain.split("experiments")[1]
 
 
 # Tolerances of the file.

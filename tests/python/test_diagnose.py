@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
 import axisight
 from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, simulate
 from axisight.errors import CaseError, InputError
+from axisight.gap import verdict_schema
 
 SECONDS = 6.0
 
@@ -69,12 +71,14 @@ HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
 def run(effects: list[Effect], seed: int = 4) -> axisight.Diagnosis:
     robot = bare_axis()
     machine = scattered(robot, seed)
-    return diagnose(
+    found = diagnose(
         robot=robot,
         estimation=logs_of(machine, effects, PLAN),
         validation=logs_of(machine, effects, HELD),
         settings=Settings(bootstrap=200),
     )
+    jsonschema.validate(found.to_verdict(), verdict_schema())
+    return found
 
 
 def test_scatter_alone_is_none():
@@ -106,6 +110,9 @@ def test_a_withheld_effect_is_named(effect):
     assert cause.probability > 0.8
     assert cause.gap_reduction.value > 0.9
     assert found.gap.after < 1.2 * found.gap.floor
+    # With the cause in nothing stands out of the floor any more.
+    assert found.remainder.where == ()
+    assert found.gap.pooled.after < 1.2 * found.gap.pooled.floor
     amplitude = next(iter(effect.parameters))
     if not amplitude.startswith("order"):
         # The simulator's own parameters are free within one per cent or so, and trade with it.
@@ -148,6 +155,12 @@ def test_a_force_that_follows_no_law_is_not_explained():
 
     found = diagnose(robot=robot, estimation=disturbed(PLAN, 1), validation=disturbed(HELD, 2))
     assert found.verdict in ("unknown", "undecidable")
+    jsonschema.validate(found.to_verdict(), verdict_schema())
+    # What no cause takes away remains, and has its place.
+    assert found.remainder.gap == pytest.approx(
+        np.sqrt(found.gap.after**2 - found.gap.floor**2), rel=1e-9
+    )
+    assert [w.axis for w in found.remainder.where] == [1]
 
 
 def test_another_axis_count_is_refused():

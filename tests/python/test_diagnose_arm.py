@@ -1,9 +1,11 @@
 """The diagnosis of a six-axis arm by inverse dynamics, friction missing from its simulator."""
 
+import jsonschema
 import numpy as np
 import pytest
 
 from axisight import Settings, diagnose
+from axisight.gap import verdict_schema
 from axisight.gap.cutoff import chosen_cutoff_hz, highest_cutoff_hz
 from axisight.gap.inverse import motion, predicted_torque
 from axisight.gap.torques import AS_GIVEN
@@ -36,7 +38,11 @@ def test_friction_missing_everywhere_is_twelve_causes(everywhere):
         # which a thousandth of 8 Nm passes for 3 % of the slope.
         assert level == pytest.approx(coulomb, rel=0.02)
         assert slope == pytest.approx(viscous, rel=0.05)
-    assert "coulomb friction on axes 1, 2, 3, 4, 5 and 6" in everywhere.headline
+    assert "Coulomb and viscous friction on all six axes" in everywhere.headline
+
+
+def test_the_verdict_obeys_its_schema(everywhere):
+    jsonschema.validate(everywhere.to_verdict(), verdict_schema())
 
 
 def test_every_axis_has_its_line(everywhere):

@@ -1,12 +1,15 @@
 """Where the gap lies: bands and regimes found where an error was put."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from axisight import Settings
 from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
 from axisight.gap.orders import strongest_orders
+from axisight.gap.remainder import parameters_at_edge, remainder_of
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Log
 
@@ -93,6 +96,105 @@ def test_gap_is_the_root_mean_square_over_axes_and_logs(base):
     assert gap.before == pytest.approx(np.sqrt((0.09 + 0.16) / 2))
     np.testing.assert_allclose(gap.before_per_axis, [0.3, 0.4])
     assert gap.after == 0.0
+
+
+def test_pooled_is_the_norm_of_the_errors_over_that_of_the_torques(base):
+    log, error, _ = base
+    other = a_log(3.0 + log.torque_nm[:7000], log.position_rad[:7000])
+    logs, errors = [log, other], [error, 2 * error[:7000]]
+    every = np.vstack(errors)
+    torque = np.vstack([x.torque_nm for x in logs])
+    given = stage(logs, errors, 1.0)
+    filtered = [0.5 * x.torque_nm for x in logs]
+    half = stage(logs, errors, 1.0, filtered)
+    zero = stage(logs, [0 * e for e in errors], 1.0)
+    gap = gap_figures(Stages(given, half, zero, zero))
+    # As papers give it: the Frobenius norms, with the mean torque in.
+    assert gap.pooled.before == pytest.approx(np.linalg.norm(every) / np.linalg.norm(torque))
+    assert gap.pooled.refitted == pytest.approx(2 * gap.pooled.before)
+    assert (gap.pooled.after, gap.pooled.floor) == (0.0, 0.0)
+    assert gap_figures(Stages(given, half, zero, zero), one_unit=False).pooled is None
+
+
+def test_a_remainder_has_its_place(base):
+    log, error, noise = base
+    error[:, 1] += 0.2 * np.sin(2 * np.pi * 9.0 * log.time_s)
+    given, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(given, given, given, floor)
+    gap = gap_figures(stages)
+    left = remainder_of(stages, gap, [ErrorLog(log, error, noise)], Settings())
+    assert left.gap == pytest.approx(np.sqrt(gap.after**2 - gap.floor**2))
+    # The sine alone: 0.2 / sqrt(2) over the deviation of the torque.
+    assert left.per_axis[1] == pytest.approx(0.2 / np.sqrt(2) / log.torque_nm[:, 1].std(), rel=0.02)
+    assert left.per_axis[0] < 0.01
+    assert [(w.axis, w.band_hz) for w in left.where] == [(2, (6.0, 15.0))]
+
+
+def test_a_remainder_says_what_it_varies_with(base):
+    log, error, noise = base
+    error[:, 0] += 0.3 * (log.position_rad[:, 0] > 10.0)
+    given, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(given, given, given, floor)
+    left = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
+    assert left.varies_with == "position"
+    assert left.where[0].regime == "position: high"
+
+
+def test_a_remainder_in_a_few_stretches_has_its_axis_at_least(base):
+    log, error, noise = base
+    error[:, 0] += 0.5 * (log.time_s > 18.0)
+    given, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(given, given, given, floor)
+    left = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
+    (place,) = left.where
+    assert (place.axis, place.band_hz) == (1, None)
+    assert place.share > 0.99
+    assert "in no band steadily" in place.evidence
+
+
+def test_noise_leaves_no_remainder(base):
+    log, error, noise = base
+    left, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(left, left, left, floor)
+    found = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
+    assert found.where == () and found.varies_with is None
+    assert found.gap < 0.005
+
+
+def test_a_simulation_that_broke_off_has_no_place(base):
+    log, error, noise = base
+    error[-10:] = np.nan
+    broken, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(broken, broken, broken, floor)
+    found = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
+    assert np.isnan(found.gap) and found.where == ()
+    # Nor where the run that tells the noise broke off.
+    error[:] = 0.1
+    left = stage([log], [error], 1.0)
+    stages = Stages(left, left, left, floor)
+    short = [ErrorLog(log, error, noise[:-500])]
+    assert remainder_of(stages, gap_figures(stages), short, Settings()).where == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "bound", "words"),
+    [
+        (0.02, False, None),
+        (-0.046, False, "3.1 of its tolerance of 1.5 %"),
+        (0.01, True, "at the bound of the fit"),
+    ],
+)
+def test_a_parameter_at_the_edge_is_a_finding(change, bound, words):
+    fitted = SimpleNamespace(
+        robot_values={"axis1.mass": 100 * (1 + change), "axis2.mass": 50.0},
+        at_bound=((None, "axis1.mass"), (0, "coulomb_nm")) if bound else (),
+    )
+    nominal = {"axis1.mass": 100.0, "axis2.mass": 50.0}
+    found = parameters_at_edge(fitted, nominal, {"mass": 0.015})
+    assert [(f.kind, f.about) for f in found] == (
+        [("parameter_at_edge", "axis1.mass")] if words else []
+    )
+    assert all(words in f.message and f"{100 * change:+.3g} %" in f.message for f in found)
 
 
 def test_gap_reduction_is_the_share_of_the_explainable_gap(base):

@@ -1,4 +1,4 @@
-"""The command line: diagnose, check, simulate, effects, excite, identify, montecarlo, reproduce, demo."""
+"""The command line: diagnose, check, simulate, effects, schema, excite, identify, montecarlo, reproduce, demo."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from json import dumps
 from pathlib import Path
 from typing import Annotated
 
@@ -16,17 +18,19 @@ from rich.table import Table
 
 from axisight.cli.common import ERR as _err
 from axisight.cli.common import OUT as _out
+from axisight.cli.common import From, To
 from axisight.cli.common import errors as _errors
 from axisight.cli.demo import write_demo_case
 from axisight.cli.excite import excite_command
 from axisight.cli.identify import identify_app
 from axisight.cli.montecarlo import montecarlo_command
 from axisight.cli.reproduce import reproduce_command
-from axisight.cli.robot import load_simulator
+from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
+from axisight.cli.show import show_diagnosis
 from axisight.cli.simulate import simulate_command
 from axisight.effects import effect_table
 from axisight.errors import InputError
-from axisight.gap import Diagnosis, Settings, diagnose
+from axisight.gap import Diagnosis, Settings, diagnose, verdict_schema
 from axisight.gap.inputs import read_inputs
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.logs import check_log, render
@@ -120,11 +124,16 @@ def diagnose_command(
         int | None, typer.Option(min=1, help="Candidates tried at a time. Default: all cores.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
+    effect: GivenEffects = None,
+    start_s: From = 0.0,
+    stop_s: To = None,
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     with _errors():
         given = _tolerances(tolerance or [])
-        inputs = read_inputs(case_or_logs, model, validation or [], columns, load_simulator)
+        load = partial(load_simulator, given=parse_effects(effect))
+        part = (start_s, stop_s)
+        inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -145,60 +154,13 @@ def diagnose_command(
 
 
 def _write(found: Diagnosis, json: Path | None, report: Path | None) -> None:
-    _show(found)
+    show_diagnosis(found)
     if json is not None:
         found.save_verdict(json)
         _out.print(f"verdict: {json}", soft_wrap=True)
     if report is not None:
         save_report(found, report)
         _out.print(f"report: {report}", soft_wrap=True)
-
-
-def _show(found: Diagnosis) -> None:
-    _out.print(f"[bold]{found.verdict}[/]: {found.headline}")
-    if found.causes:
-        _out.print(_causes(found))
-    _out.print(_gaps(found))
-    if not found.ranking:
-        return
-    table = Table("effect", "axis", "probability", "held-out score", "significance")
-    table.title = "candidates where there was most to explain"
-    for c in found.ranking[:8]:
-        axis = "arm" if c.axis is None else str(c.axis)
-        table.add_row(
-            c.effect, axis, f"{c.probability:.3f}", f"{c.score:.3f}", f"{c.significance:.1f}"
-        )
-    _out.print(table)
-
-
-def _causes(found: Diagnosis) -> Table:
-    table = Table("cause", "axis", "parameter", "value", "95 % interval", "unit", "probability")
-    for cause in found.causes:
-        axis = "arm" if cause.axis is None else str(cause.axis)
-        first = (cause.effect, axis)
-        for name, p in cause.parameters.items():
-            shown = f"{cause.probability:.3f}" if first[0] else ""
-            interval = f"{p.low:.4g} to {p.high:.4g}"
-            table.add_row(*first, name, f"{p.value:.4g}", interval, cause.units[name], shown)
-            first = ("", "")
-    return table
-
-
-def _gaps(found: Diagnosis) -> Table:
-    table = Table("axis", "verdict", "gap before", "re-fitted", "after", "noise alone")
-    gap = found.gap
-    columns = (
-        gap.before_per_axis,
-        gap.refitted_per_axis,
-        gap.after_per_axis,
-        gap.floor_per_axis,
-    )
-    verdicts = {a.axis: a.verdict for a in found.axes}
-    for i, row in enumerate(zip(*columns, strict=True), start=1):
-        table.add_row(str(i), verdicts.get(i, ""), *(f"{100 * x:.3g} %" for x in row))
-    whole = (gap.before, gap.refitted, gap.after, gap.floor)
-    table.add_row("all", found.verdict, *(f"{100 * x:.3g} %" for x in whole))
-    return table
 
 
 @app.command()
@@ -211,6 +173,12 @@ def check(
         _out.print(render(found))
         if not found.ok:
             raise typer.Exit(1)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of the verdict that `diagnose --json` writes."""
+    typer.echo(dumps(verdict_schema(), indent=2))
 
 
 @app.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -13,6 +14,17 @@ from axisight.errors import AxisightError, InputError
 
 OUT = Console()
 ERR = Console(stderr=True)
+
+From = Annotated[
+    float,
+    typer.Option("--from", metavar="SECONDS", help="Leave out what comes before in each log."),
+]
+To = Annotated[
+    float | None,
+    typer.Option(
+        "--to", metavar="SECONDS", help="Leave out what comes after in each log. Default: its end."
+    ),
+]
 
 
 @contextmanager

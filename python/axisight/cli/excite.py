@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli.common import OUT, errors, numbers
-from axisight.cli.robot import say_effects
+from axisight.cli.robot import GivenEffects, parse_effects, say_effects, with_given
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.plots import plot_references, plot_signal
@@ -63,6 +63,7 @@ def excite_command(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
+    effect: GivenEffects = None,
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
     with errors():
@@ -86,11 +87,12 @@ def excite_command(
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
         data |= {name: value for name, value in top.items() if value is not None}
         checked = read_design(data, "options" if design is None else str(design))
+        given = parse_effects(effect)
         machine = load_robot(checked.robot)
         # Without limits or a controller nothing is simulated.
         if checked.limits is not None and machine.controller_kind != "none":
-            say_effects(machine, checked.robot)
-        made = excite(checked, machine)
+            say_effects(machine, checked.robot, given)
+        made = excite(checked, with_given(machine, given))
         _show(made)
         if made.report is not None and not made.report.ok and not force:
             OUT.print("nothing was written; --force writes in spite of limits")

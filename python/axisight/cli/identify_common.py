@@ -11,6 +11,7 @@ import typer
 
 from axisight.cli.common import OUT, numbers
 from axisight.errors import InputError
+from axisight.gap.inputs import part_of
 from axisight.logs import Log, check_log, read_log
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import (
@@ -50,9 +51,14 @@ def load_source(robot: str) -> Robot:
 
 
 def read_logs(
-    paths: Sequence[Path], columns: Path | None, robot: Robot | None, *, unchecked: bool
+    paths: Sequence[Path],
+    columns: Path | None,
+    robot: Robot | None,
+    *,
+    unchecked: bool,
+    part: tuple[float, float | None] = (0.0, None),
 ) -> list[Log]:
-    """Return logs that pass what ``axisight check`` looks at; warnings are printed.
+    """Return the ``part`` [s] of logs that pass what ``axisight check`` looks at; warnings are printed.
 
     Identification fits data in wrong units as well as any. Raises InputError for an error that the
     check finds, unless ``unchecked``, and for an axis that turns where that of the robot slides.
@@ -74,7 +80,7 @@ def read_logs(
                 f"{path.name}: expected axes that {_kinds(robot.axis_is_prismatic)} as the "
                 f"robot's, got axes that {_kinds(slides)} by their units"
             )
-        logs.append(log)
+        logs.append(log if part == (0.0, None) else part_of(log, *part))
     return logs
 
 

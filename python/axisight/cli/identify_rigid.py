@@ -11,7 +11,7 @@ import xarray as xr
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, errors
+from axisight.cli.common import OUT, From, To, errors
 from axisight.cli.identify_common import (
     Columns,
     Force,
@@ -119,6 +119,8 @@ def rigid_body_command(
     ] = 1.0,
     unchecked: Unchecked = False,
     force: Force = False,
+    start_s: From = 0.0,
+    stop_s: To = None,
 ) -> None:
     """Masses, inertias and friction from logs of motor angles and torques, by regression.
 
@@ -130,7 +132,8 @@ def rigid_body_command(
         refuse_in_the_way(out, force)
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
-        read = read_logs(paths, columns, machine, unchecked=unchecked)
+        part = (start_s, stop_s)
+        read = read_logs(paths, columns, machine, unchecked=unchecked, part=part)
         held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
             # They are among the notes that are printed.

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from axisight import montecarlo
 from axisight.cli.common import ERR, OUT, errors
-from axisight.cli.robot import say_effects
+from axisight.cli.robot import GivenEffects, parse_effects, say_effects
 from axisight.effects import Effect
 from axisight.montecarlo.progress import Progress, Report
 from axisight.robot import load_robot
@@ -37,10 +37,11 @@ def montecarlo_command(
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads here. Default: all processors.")
     ] = None,
+    effect: GivenEffects = None,
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
-        design = montecarlo.read_study(study)
+        design = _with_given(montecarlo.read_study(study), parse_effects(effect))
         given = [Effect(**entry.model_dump()) for entry in design.effect]
         say_effects(load_robot(design.robot), design.robot, given)
         with _bar() as progress:
@@ -66,6 +67,19 @@ def montecarlo_command(
         OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
         if counted == 0:
             raise typer.Exit(1)
+
+
+def _with_given(design: montecarlo.Study, given: list[Effect]) -> montecarlo.Study:
+    """Return the study with ``given`` effects in place of its own of the same name and axis."""
+    replaced = {effect.label for effect in given}
+    own = [e for e in design.effect if Effect(**e.model_dump()).label not in replaced]
+    more = [
+        montecarlo.EffectEntry(
+            name=e.name, axis=e.axis, axes=e.axes, parameters=dict(e.parameters or {})
+        )
+        for e in given
+    ]
+    return design.model_copy(update={"effect": [*own, *more]})
 
 
 @contextmanager

@@ -1,21 +1,55 @@
-"""What commands that simulate a robot share: it comes with its effects, and a line says so."""
+"""What commands that simulate a robot share: its effects, its own and those given; a line says so."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Annotated
 
-from axisight.cli.common import OUT
+import typer
+
+from axisight.cli.common import OUT, numbers
 from axisight.effects import Effect
+from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import refuse_effects_beside
 
+GivenEffects = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        metavar="'NAME@AXIS PARAM=VALUE ...'",
+        help="Effect that the simulator has too (repeatable), e.g. 'coulomb_friction@2 "
+        "coulomb_nm=0.4'; the whole arm without @AXIS, two axes as @5,6, neutral values for "
+        "parameters left out. It takes the place of one of the robot of that name and axis.",
+    ),
+]
 
-def load_simulator(source: Path | str, given: Iterable[Effect] = ()) -> Robot:
-    """Return the robot to simulate, and say which effects of its own act; see `say_effects`."""
+
+def load_simulator(source: Path | str, given: Sequence[Effect] = ()) -> Robot:
+    """Return the robot to simulate with the ``given`` effects, and say which of its own act.
+
+    Raises InputError as `say_effects`, and for a given effect that the robot cannot have.
+    """
     robot = load_robot(source)
     say_effects(robot, source, given)
-    return robot
+    return with_given(robot, given)
+
+
+def with_given(robot: Robot, given: Sequence[Effect]) -> Robot:
+    """Return the robot with ``given`` effects in place of its own of the same name and axis.
+
+    Raises InputError for an effect that the robot cannot have.
+    """
+    if not given:
+        return robot
+    replaced = {effect.label for effect in given}
+    own = [effect for effect in robot.effects if effect.label not in replaced]
+    try:
+        return robot.with_effects([*own, *given])
+    except InputError as error:
+        raise InputError(f"--effect: {error}") from None
 
 
 def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) -> None:
@@ -29,3 +63,45 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
     if acting:
         text = f"with the effects of {source}: {', '.join(acting)}"
         OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
+    """Return the effects of a repeated ``--effect``; raises InputError as `parse_effect`.
+
+    The same effect twice at one place is refused too.
+    """
+    found: dict[str, Effect] = {}
+    for text in texts or []:
+        effect = parse_effect(text)
+        if effect.label in found:
+            raise InputError(f"--effect {text!r}: expected {effect.label} once, got it twice")
+        found[effect.label] = effect
+    return list(found.values())
+
+
+def parse_effect(text: str) -> Effect:
+    """Return the effect that ``NAME@AXIS PARAM=VALUE ...`` describes.
+
+    Axis and parameters may be left out; ``NAME@AXIS:PARAM=VALUE,...`` is read too. Raises
+    InputError quoting ``text``.
+    """
+    head, *rest = re.split(r"[:\s]+", re.sub(r"\s*=\s*", "=", text.strip()), maxsplit=1)
+    name, at, place = head.partition("@")
+    axes = place.split(",") if at else []
+    if not all(axis.isdecimal() for axis in axes) or len(axes) > 2:
+        raise InputError(f"--effect {text!r}: expected an axis number after @, got {place!r}")
+    numbered = [int(axis) for axis in axes]
+    parameters: dict[str, float] = {}
+    for item in re.split(r"[,\s]+", rest[0]) if rest and rest[0] else []:
+        key, equals, value = item.partition("=")
+        if not equals:
+            raise InputError(f"--effect {text!r}: expected PARAM=VALUE, got {item!r}")
+        if key in parameters:
+            raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
+        (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
+    try:
+        if len(numbered) == 2:
+            return Effect(name, None, parameters, (numbered[0], numbered[1]))
+        return Effect(name, numbered[0] if numbered else None, parameters)
+    except InputError as error:
+        raise InputError(f"--effect {text!r}: {error}") from None

@@ -11,10 +11,10 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli.common import OUT, errors, numbers
-from axisight.cli.robot import load_simulator
-from axisight.effects import Effect
+from axisight.cli.common import OUT, From, To, errors, numbers
+from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
+from axisight.gap.inputs import part_of
 from axisight.logs import Log, read_log
 from axisight.robot import Robot
 from axisight.simulation import Method, Model, simulate
@@ -36,15 +36,7 @@ def simulate_command(
     torque: Annotated[
         bool, typer.Option("--torque", help="Drive with the log's torques, without controller.")
     ] = False,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME@AXIS:PARAM=VALUE,...",
-            help="Further effect (repeatable), e.g. coulomb_friction@2:coulomb_nm=0.5; the whole "
-            "arm without @AXIS, two axes as @5,6, neutral values for parameters left out. It takes "
-            "the place of one of the robot of that name and axis.",
-        ),
-    ] = None,
+    effect: GivenEffects = None,
     start: Annotated[
         str | None,
         typer.Option(
@@ -70,16 +62,17 @@ def simulate_command(
     resolution: Annotated[
         float, typer.Option(help="Step of the position sensor (rad), motor side.")
     ] = 0.0,
+    start_s: From = 0.0,
+    stop_s: To = None,
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
-        added = [parse_effect(text) for text in effect or []]
-        machine = load_simulator(robot, added)
-        inputs = _inputs(read_log(log, columns, n_axes=machine.n_axes), machine, torque=torque)
+        machine = load_simulator(robot, parse_effects(effect))
+        used = part_of(read_log(log, columns, n_axes=machine.n_axes), start_s, stop_s)
+        inputs = _inputs(used, machine, torque=torque)
         result = simulate(
             machine,
             **inputs,
-            effects=added,
             start_rad=None if start is None else numbers("--start", start),
             model=cast(Model, model),
             method=cast(Method, method),
@@ -120,30 +113,3 @@ def _log_table(result: xr.Dataset, inputs: dict[str, NDArray[np.float64]]) -> pd
         data[f"torque_cmd_{i + 1}"] = result["torque_cmd_nm"].values[:, i]
         data[f"position_{i + 1}"] = result["position_rad"].values[:, i]
     return pd.DataFrame(data)
-
-
-def parse_effect(text: str) -> Effect:
-    """Return the effect that ``NAME@AXIS:PARAM=VALUE,...`` describes.
-
-    Axis and parameters may be left out. Raises InputError quoting ``text``.
-    """
-    head, _, tail = text.partition(":")
-    name, at, place = head.partition("@")
-    axes = place.split(",") if at else []
-    if not all(axis.isdecimal() for axis in axes) or len(axes) > 2:
-        raise InputError(f"--effect {text!r}: expected an axis number after @, got {place!r}")
-    numbered = [int(axis) for axis in axes]
-    parameters: dict[str, float] = {}
-    for item in tail.split(",") if tail else []:
-        key, equals, value = item.partition("=")
-        if not equals:
-            raise InputError(f"--effect {text!r}: expected PARAM=VALUE, got {item!r}")
-        if key in parameters:
-            raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
-        (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
-    try:
-        if len(numbered) == 2:
-            return Effect(name, None, parameters, (numbered[0], numbered[1]))
-        return Effect(name, numbered[0] if numbered else None, parameters)
-    except InputError as error:
-        raise InputError(f"--effect {text!r}: {error}") from None

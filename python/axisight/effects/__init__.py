@@ -2,14 +2,19 @@
 
 from axisight.effects.effect import Effect, EffectTuple, core_effects, effect_of_core
 from axisight.effects.table import EffectInfo, EffectParameter, effect_info, effect_table
+from axisight.effects.words import article, noun, phrase, title
 
 __all__ = [
     "Effect",
     "EffectInfo",
     "EffectParameter",
     "EffectTuple",
+    "article",
     "core_effects",
     "effect_info",
     "effect_of_core",
     "effect_table",
+    "noun",
+    "phrase",
+    "title",
 ]

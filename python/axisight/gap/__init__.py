@@ -1,17 +1,35 @@
 """Diagnosis of the gap between a simulator and measured logs: where, which, how far."""
 
 from axisight.gap.pipeline import diagnose
-from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, Overlay, Where
+from axisight.gap.result import (
+    AxisVerdict,
+    Candidate,
+    Cause,
+    Diagnosis,
+    Finding,
+    Gap,
+    Interval,
+    Overlay,
+    Pooled,
+    Remainder,
+    Where,
+)
+from axisight.gap.schema import verdict_schema
 from axisight.gap.settings import Settings
 
 __all__ = [
+    "AxisVerdict",
     "Candidate",
     "Cause",
     "Diagnosis",
+    "Finding",
     "Gap",
     "Interval",
     "Overlay",
+    "Pooled",
+    "Remainder",
     "Settings",
     "Where",
     "diagnose",
+    "verdict_schema",
 ]

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.result import Gap
 from axisight.gap.settings import Settings
 from axisight.gap.verdict import Conclusion
+
+Array = NDArray[np.float64]
 
 # A gap on one log and axis this much above the floor is seen by eye: a simulator without a fault,
 # re-fitted within its tolerances, leaves less, the errors of its formulas included.
@@ -57,7 +60,15 @@ def carried_over(
     )
 
 
-def _squares(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def above_floor(left: Stage, floor: Stage) -> Array:
+    """Return by how much mean squares (n_logs, n_axes) exceed what passes for the floor [1].
+
+    Where it is positive, log and axis stand above the floor by more than the errors of formulas.
+    """
+    return _squares(left) - _FACTOR**2 * _squares(floor) - _SEEN**2
+
+
+def _squares(stage: Stage) -> Array:
     return np.array(stage.per_log())
 
 
@@ -80,7 +91,7 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
 def _above_floor(stages: Stages, names: Sequence[str]) -> str | None:
     """Say where the re-fitted simulator leaves more than noise."""
     left, noise = _squares(stages.refitted), _squares(stages.floor)
-    excess = left - _FACTOR**2 * noise - _SEEN**2
+    excess = above_floor(stages.refitted, stages.floor)
     if not np.any(excess > 0):
         return None
     log, axis = divmod(int(np.argmax(excess)), excess.shape[1])

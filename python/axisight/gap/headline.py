@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 
-from axisight.effects import Effect
+from axisight.effects import Effect, article, noun, phrase
 from axisight.gap.result import Cause, Gap, Where
 from axisight.gap.verdict import Conclusion
 
@@ -36,32 +35,60 @@ def headline(
         f"{percent(gap.before)} to {percent(gap.after)} of the torque (noise alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
-        rivals = " or ".join(conclusion.equivalent[0])
+        rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])
         return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
-    return f"The simulator lacks {named(causes, own)}: {shrinks}"
+    missing = named(causes, own, len(gap.before_per_axis))
+    return f"The simulator lacks {missing}: {shrinks}"
 
 
-def named(causes: Sequence[Cause], own: Sequence[Effect] = ()) -> str:
-    """Return causes in words, one phrase an effect: "coulomb friction on axes 1, 2 and 5"."""
+def in_order(causes: Sequence[Cause]) -> list[Cause]:
+    """Return causes by effect, in the order in which effects first come, then by axis."""
+    first = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
+    return sorted(causes, key=lambda c: (first[c.effect], c.axis or 0))
+
+
+def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) -> str:
+    """Return causes in words, one phrase an effect: "Coulomb friction on axes 1, 2 and 5".
+
+    ``own``: effects that the simulator has already; ``n_axes``: of the robot. Effects that differ
+    by an adjective and have the same axes share a phrase: "Coulomb and viscous friction".
+    """
     present = {(e.name, e.axis) for e in own if e.acts}
-    order = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
-    phrases = []
-    for effect, group in groupby(
-        sorted(causes, key=lambda c: (order[c.effect], c.axis or 0)), key=lambda c: c.effect
-    ):
-        mine = list(group)
-        axes = [str(c.axis) for c in mine if c.axis is not None]
-        known = any((c.effect, c.axis) in present for c in mine)
-        start = "the machine's values of " if known else ""
-        phrases.append(start + _placed(effect, axes))
-    return _listed(phrases)
+    axes: dict[str, list[int]] = {}
+    for c in in_order(causes):
+        axes.setdefault(c.effect, []).extend([] if c.axis is None else [c.axis])
+    phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
+    for effect, mine in axes.items():
+        known = any((c.effect, c.axis) in present for c in causes if c.effect == effect)
+        start = "the machine's values of" if known else article(effect)
+        adjective, _, head = noun(effect).rpartition(" ")
+        # Two delays are two things; friction of two kinds is one.
+        shared = head if start not in ("a", "an") else noun(effect)
+        key = (start, shared, tuple(mine))
+        phrases.setdefault(key, []).append(adjective if shared == head else "")
+    return _listed(
+        [
+            " ".join(x for x in (start, _listed(adjectives), head, _place(where, n_axes)) if x)
+            for (start, head, where), adjectives in phrases.items()
+        ]
+    )
 
 
-def _placed(effect: str, axes: Sequence[str]) -> str:
-    words = effect.replace("_", " ")
+def _placed(label: str) -> str:
+    """Return a candidate ``effect@axis`` in words."""
+    effect, _, axis = label.partition("@")
+    return f"{phrase(effect)} on axis {axis}" if axis else phrase(effect)
+
+
+def _place(axes: Sequence[int], n_axes: int) -> str:
     if not axes:
-        return f"a {words}"
-    return f"{words} on {'axis' if len(axes) == 1 else 'axes'} {_listed(axes)}"
+        return ""
+    if 1 < len(axes) == n_axes:
+        return "on both axes" if n_axes == 2 else f"on all {_COUNTS.get(n_axes, n_axes)} axes"
+    return f"on {'axis' if len(axes) == 1 else 'axes'} {_listed([str(a) for a in axes])}"
+
+
+_COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
 def _listed(items: Sequence[str]) -> str:

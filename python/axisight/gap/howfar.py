@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.result import Gap, Interval, Overlay
+from axisight.gap.result import Gap, Interval, Overlay, Pooled
 from axisight.gap.torques import combine, relative_squares
 from axisight.logs import Log
 
@@ -17,9 +17,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Stage:
-    """Squared relative errors of one simulator, per log as block means (n_blocks, n_axes)."""
+    """Squared relative errors of one simulator, per log as block means (n_blocks, n_axes).
+
+    ``pooled``: sqrt(sum e^2 / sum u^2) over all samples, axes and logs, as in `Pooled` [1].
+    """
 
     blocks: tuple[Array, ...]
+    pooled: float
 
     def per_log(self) -> list[Array]:
         """Return the mean square (n_axes,) of each log."""
@@ -30,16 +34,26 @@ class Stage:
         return float(np.mean([b[d].mean(axis=0) for b, d in zip(self.blocks, draws, strict=True)]))
 
 
-def stage(logs: Sequence[Log], errors: Sequence[Array], block_s: float) -> Stage:
-    """Return the stage of a simulator from its torque errors (n, n_axes) on each log."""
+def stage(
+    logs: Sequence[Log],
+    errors: Sequence[Array],
+    block_s: float,
+    measured: Sequence[Array] | None = None,
+) -> Stage:
+    """Return the stage of a simulator from its torque errors (n, n_axes) [Nm] on each log.
+
+    ``measured``: the torque errors are taken from, (n, n_axes) of each log; default as logged.
+    """
     blocks = []
+    torques = [log.torque_nm for log in logs] if measured is None else measured
     for log, error in zip(logs, errors, strict=True):
         squares = relative_squares(log, error)
         length = max(1, int(block_s / log.sample_time_s))
         count = max(1, len(squares) // length)
         parts = np.array_split(squares, count)
         blocks.append(np.array([p.mean(axis=0) for p in parts]))
-    return Stage(tuple(blocks))
+    torque, left = (sum(float(np.sum(x**2)) for x in of) for of in (torques, errors))
+    return Stage(tuple(blocks), float(np.sqrt(left / max(torque, 1e-300))))
 
 
 @dataclass(frozen=True)
@@ -52,12 +66,18 @@ class Stages:
     floor: Stage
 
 
-def gap_figures(stages: Stages) -> Gap:
-    """Return the gap before, re-fitted and after, and its floor."""
+def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
+    """Return the gap before, re-fitted and after, and its floor.
+
+    ``one_unit``: whether all axes are driven by torques, or all by forces; what is pooled over
+    both would mean nothing.
+    """
+    every = (stages.given, stages.refitted, stages.after, stages.floor)
     (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
-        combine(s.per_log()) for s in (stages.given, stages.refitted, stages.after, stages.floor)
+        combine(s.per_log()) for s in every
     )
-    return Gap(before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes)
+    pooled = Pooled(*(s.pooled for s in every)) if one_unit else None
+    return Gap(before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes, pooled)
 
 
 def gap_reduction(

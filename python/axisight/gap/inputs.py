@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from axisight.errors import InputError
+from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
 from axisight.robot import Robot, load_robot
 
@@ -27,12 +30,70 @@ def read_inputs(
     validation: Sequence[Path],
     columns: Path | None,
     load: Callable[[Path | str], Robot] = load_robot,
+    part: tuple[float, float | None] = (0.0, None),
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
-    Without ``validation`` the last of several logs is held out. Raises
-    InputError when nothing is left to hold out or the model is missing.
+    Without ``validation`` the last of several logs is held out. ``part``: from and to which time
+    [s] each log is used. Raises InputError when nothing is left to hold out, the model is missing,
+    or the part cannot be used.
     """
+    read = _read(paths, model, validation, columns, load)
+    if part == (0.0, None):
+        return read
+    logs = (*read.estimation, *read.validation)
+    cut = [part_of(log, *part) for log in logs]
+    if is_closed_loop(read.robot, logs):
+        for log in logs:
+            _check_at_rest(log, part[0])
+    n = len(read.estimation)
+    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]))
+
+
+def part_of(log: Log, start_s: float, stop_s: float | None) -> Log:
+    """Return what ``--from`` and ``--to`` [s] leave of a log; raises InputError naming them."""
+    try:
+        return log.part(start_s, stop_s)
+    except InputError as error:
+        text = str(error).replace("start_s", "--from").replace("stop_s", "--to")
+        raise InputError(f"{log.source}: {text}") from None
+
+
+# How long before the cut a log has to stand still, and how still, as a share of its range.
+_STILL_S = 0.1
+_STILL = 0.01
+
+
+def _check_at_rest(log: Log, start_s: float) -> None:
+    """Refuse a cut in motion: in closed loop a simulation begins at rest where the log begins."""
+    first = round(start_s / log.sample_time_s)
+    rows = slice(max(0, first - round(_STILL_S / log.sample_time_s)), first + 1)
+    position, reference = log.position_rad, log.velocity_ref_rad_s
+    # Twice differenced, motion is gone and noise of standard deviation s has 2.4 s: ten of them.
+    noise = 4 * np.std(np.diff(position, n=2, axis=0), axis=0)
+    allowed = np.maximum(_STILL * np.ptp(position, axis=0), noise)
+    off = np.abs(position[rows] - position[0]).max(axis=0)
+    moving = np.zeros(log.n_axes, bool)
+    if reference is not None:
+        largest = np.abs(reference).max(axis=0)
+        moving = np.abs(reference[rows]).max(axis=0) > _STILL * largest
+    for axis in np.flatnonzero((off > allowed) | moving):
+        unit = "m" if log.axis_kinds[axis] == "prismatic" else "rad"
+        raise InputError(
+            f"{log.source}: --from: expected a time at which every axis stands as at the start "
+            f"(in closed loop the simulator begins there, at rest), got {start_s:g} s, where axis "
+            f"{axis + 1} {'moves' if moving[axis] else f'stands {off[axis]:.3g} {unit} off'}; "
+            f"without velocity references any time will do"
+        )
+
+
+def _read(
+    paths: Sequence[Path],
+    model: str | None,
+    validation: Sequence[Path],
+    columns: Path | None,
+    load: Callable[[Path | str], Robot],
+) -> Inputs:
     if len(paths) == 1 and paths[0].is_dir():
         case = read_case(paths[0], columns)
         robot = load(model if model is not None else case.robot_path)

@@ -30,9 +30,9 @@ class InverseView(View):
     """Torque predicted from the measured motion."""
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        cutoff = settings.cutoff_hz or chosen_cutoff_hz(
-            logs, motion, lambda m: predicted_torque(robot, AS_GIVEN, m)
-        )
+        cutoff = settings.cutoff_hz
+        if cutoff is None:
+            cutoff = chosen_cutoff_hz(logs, motion, lambda m: predicted_torque(robot, AS_GIVEN, m))
         if not 0 < cutoff < 0.5 / robot.sample_time_s:
             raise InputError(
                 f"cutoff_hz: expected between 0 and the Nyquist frequency "

@@ -18,6 +18,7 @@ from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
+from axisight.gap.remainder import parameters_at_edge, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
@@ -125,14 +126,15 @@ def _check_log(robot: Robot, log: Log) -> None:
         )
 
 
-def _errors(view: View, torques: Sequence[Array], logs: Sequence[Log]) -> list[Array]:
-    return [torque - view.measured(log) for torque, log in zip(torques, logs, strict=True)]
+def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:
+    return [torque - u for torque, u in zip(torques, measured, strict=True)]
 
 
 def _error_logs(view: View, found: Search) -> list[ErrorLog]:
     """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
     refit = view.torques(Variant(found.baseline.robot_values), view.logs)
-    errors, noises = _errors(view, refit, view.logs), view.noises(view.logs, 0)
+    errors = _errors(refit, [view.measured(log) for log in view.logs])
+    noises = view.noises(view.logs, 0)
     return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
 
 
@@ -155,6 +157,7 @@ class Reach:
     stages: Stages
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
+    left: tuple[ErrorLog, ...]
 
 
 def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings: Settings) -> Reach:
@@ -162,15 +165,17 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
     model = found.model
     variants = [Variant(model.robot_values, model.effects[: i + 1]) for i in range(named)]
     refit = Variant(found.baseline.robot_values)
+    measured = [view.measured(log) for log in logs]
+    noise = view.noises(logs, len(view.logs))
 
     def measure(errors: Sequence[Array]) -> Stage:
-        return stage(logs, errors, settings.block_s)
+        return stage(logs, errors, settings.block_s, measured)
 
     before = view.torques(AS_GIVEN, logs)
     steps = [view.torques(v, logs) for v in (refit, *variants)]
-    given = measure(_errors(view, before, logs))
-    refitted, *stages = [measure(_errors(view, torques, logs)) for torques in steps]
-    floor = measure(view.noises(logs, len(view.logs)))
+    given = measure(_errors(before, measured))
+    refitted, *stages = [measure(_errors(torques, measured)) for torques in steps]
+    floor = measure(noise)
     after = stages[-1] if stages else refitted
     # The first cause is credited from the simulator as given: that is what the user had.
     earlier = [given, *stages]
@@ -178,8 +183,13 @@ def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings:
         gap_reduction(a, b, given, floor, draws=settings.bootstrap, seed=settings.seed)
         for a, b in zip(earlier, stages, strict=False)
     ]
-    drawn = overlays(logs, before, steps[-1])
-    return Reach(Stages(given, refitted, after, floor), reductions, drawn)
+    remaining = zip(logs, _errors(steps[-1], measured), noise, strict=True)
+    return Reach(
+        Stages(given, refitted, after, floor),
+        reductions,
+        overlays(logs, before, steps[-1]),
+        tuple(ErrorLog(*each) for each in remaining),
+    )
 
 
 def _assemble(
@@ -195,7 +205,7 @@ def _assemble(
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
     reach = _reach(view, held_logs, found, len(conclusion.causes), settings)
-    gap = gap_figures(reach.stages)
+    gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
     conclusion = carried_over(conclusion, reach.stages, gap, names, settings)
     causes = tuple(
@@ -213,6 +223,9 @@ def _assemble(
     )
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     nominal = robot_parameters(robot)
+    # Where nothing was named, `after` is the simulator re-fitted alone.
+    fitted = found.model if reach.reductions else found.baseline
+    tolerances = settings.tolerances_of(robot)
     return Diagnosis(
         name=name,
         mode=view.mode,
@@ -228,11 +241,14 @@ def _assemble(
         band_map=bands,
         regime_maps=regimes,
         overlays=reach.overlays,
-        refit={k: _relative(found.model, k, nominal[k]) for k in found.model.robot_values},
+        refit={k: _relative(fitted, k, nominal[k]) for k in fitted.robot_values},
         checks=(*conclusion.checks, *_filtered(view)),
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
+        remainder=remainder_of(reach.stages, gap, reach.left, settings),
+        findings=parameters_at_edge(fitted, nominal, tolerances),
+        settings=settings.as_dict(robot),
         provenance={
             "axisight_version": version("axisight"),
             "seed": settings.seed,

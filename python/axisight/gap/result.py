@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+import math
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,13 +29,29 @@ class Interval:
 
 
 @dataclass(frozen=True)
+class Pooled:
+    """Torque error of the whole arm as identification papers give it: sqrt(sum e^2 / sum u^2) [1].
+
+    Sums over all samples, axes and validation logs; e is simulated minus measured torque, u the
+    measured torque itself, not about its mean. Heavy axes weigh more than in `Gap`. ``before``,
+    ``refitted``, ``after`` and ``floor`` as there.
+    """
+
+    before: float
+    refitted: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True)
 class Gap:
     """Relative torque error on the validation logs, rms over axes and logs [1].
 
     ``before``: the simulator as given; ``refitted``: its own parameters fitted
     within their tolerances, no effect added; ``after``: with the causes added;
     ``floor``: what a perfect model would still leave (sensor noise). The
-    ``*_per_axis`` arrays have shape (n_axes,).
+    ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where axes that turn
+    and axes that slide cannot be summed.
     """
 
     before: float
@@ -45,6 +62,7 @@ class Gap:
     refitted_per_axis: Array
     after_per_axis: Array
     floor_per_axis: Array
+    pooled: Pooled | None = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +77,35 @@ class Where:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What stands above the floor on the validation logs with the causes in.
+
+    ``gap``: sqrt(after^2 - floor^2) [1], zero where noise is all there is; ``per_axis``: the same by
+    axis, (n_axes,). ``where``: the places that stand out of the floor, shares of the squared
+    remainder; none where no axis stands out. ``varies_with``: the variable that it follows at the
+    first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``), if any.
+    """
+
+    gap: float
+    per_axis: Array
+    where: tuple[Where, ...] = ()
+    varies_with: str | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a reader should know before believing the rest.
+
+    ``kind``: ``parameter_at_edge``, a parameter of the simulator that the re-fit took to the edge of
+    its tolerance; ``about``: what it is about, such as the parameter's name; ``message``: in words.
+    """
+
+    kind: str
+    about: str
+    message: str
+
+
+@dataclass(frozen=True)
 class Cause:
     """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm."""
 
@@ -70,6 +117,11 @@ class Cause:
     gap_reduction: Interval
     family: str = ""
     family_probability: float = 1.0
+
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return self.effect if self.axis is None else f"{self.effect}@{self.axis}"
 
 
 @dataclass(frozen=True)
@@ -133,6 +185,8 @@ class Diagnosis:
     each a Dataset with ``share`` (of that axis's squared baseline error above
     the floor), ``excess`` (ratio of the squared error to the floor) and
     ``significance`` (in standard errors). Band and bin coordinates are labels.
+    ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
+    the names of `Settings`.
     """
 
     name: str
@@ -154,38 +208,24 @@ class Diagnosis:
     axes: tuple[AxisVerdict, ...] = ()
     p_none: float = 0.0
     p_unknown: float = 0.0
+    remainder: Remainder | None = None
+    findings: tuple[Finding, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def to_verdict(self) -> dict[str, Any]:
-        """Return the verdict as ``axisight.verdict/1`` (plus keys that readers may ignore)."""
-        gap = self.gap
-        return {
+        """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.
+
+        Numbers that are not finite, as the gap of a simulation that broke off, become None.
+        """
+        out = {
             "schema": "axisight.verdict/1",
+            "name": self.name,
             "mode": self.mode,
             "verdict": self.verdict,
             "headline": self.headline,
-            "gap": {
-                "before": gap.before,
-                "after": gap.after,
-                "floor": gap.floor,
-                "refitted": gap.refitted,
-                "per_axis": {
-                    "before": gap.before_per_axis.tolist(),
-                    "after": gap.after_per_axis.tolist(),
-                    "floor": gap.floor_per_axis.tolist(),
-                    "refitted": gap.refitted_per_axis.tolist(),
-                },
-            },
-            "where": [
-                {
-                    "axis": w.axis,
-                    "share": w.share,
-                    "band_hz": None if w.band_hz is None else list(w.band_hz),
-                    "regime": w.regime,
-                    "evidence": w.evidence,
-                }
-                for w in self.where
-            ],
+            "gap": _gap(self.gap),
+            "where": [_where(w) for w in self.where],
             "causes": [_cause(c) for c in self.causes],
             "alternatives": [
                 {"effect": c.effect, "axis": c.axis, "probability": c.probability}
@@ -195,28 +235,76 @@ class Diagnosis:
             "next_experiment": self.next_experiment,
             "p_none": self.p_none,
             "p_unknown": self.p_unknown,
-            "axes": [
-                {
-                    "axis": a.axis,
-                    "verdict": a.verdict,
-                    "gap": {
-                        "before": float(gap.before_per_axis[a.axis - 1]),
-                        "after": float(gap.after_per_axis[a.axis - 1]),
-                        "floor": float(gap.floor_per_axis[a.axis - 1]),
-                    },
-                    "explained": a.explained,
-                    "causes": list(a.causes),
-                }
-                for a in self.axes
-            ],
+            "axes": [_axis(a, self.gap) for a in self.axes],
+            "remainder": None if self.remainder is None else _remainder(self.remainder),
+            "refit": {name: _interval(change) for name, change in self.refit.items()},
             "ranking": [_ranked(c) for c in self.ranking],
             "checks": list(self.checks),
+            "findings": [asdict(f) for f in self.findings],
+            "settings": self.settings,
             "provenance": self.provenance,
         }
+        finite: dict[str, Any] = _finite(out)
+        return finite
 
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
         write_whole(Path(path), json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    """Return a document with None in place of numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+_STAGES = ("before", "after", "floor", "refitted")
+
+
+def _gap(gap: Gap) -> dict[str, Any]:
+    return {
+        **{stage: getattr(gap, stage) for stage in _STAGES},
+        "pooled": None if gap.pooled is None else asdict(gap.pooled),
+        "per_axis": {stage: getattr(gap, f"{stage}_per_axis").tolist() for stage in _STAGES},
+    }
+
+
+def _where(where: Where) -> dict[str, Any]:
+    return {
+        "axis": where.axis,
+        "share": where.share,
+        "band_hz": None if where.band_hz is None else list(where.band_hz),
+        "regime": where.regime,
+        "evidence": where.evidence,
+    }
+
+
+def _axis(axis: AxisVerdict, gap: Gap) -> dict[str, Any]:
+    mine = {stage: float(getattr(gap, f"{stage}_per_axis")[axis.axis - 1]) for stage in _STAGES}
+    return {
+        "axis": axis.axis,
+        "verdict": axis.verdict,
+        "gap": mine,
+        "excess": axis.excess,
+        "explained": axis.explained,
+        "causes": list(axis.causes),
+    }
+
+
+def _remainder(remainder: Remainder) -> dict[str, Any]:
+    return {
+        "gap": remainder.gap,
+        "per_axis": remainder.per_axis.tolist(),
+        "where": [_where(w) for w in remainder.where],
+        "varies_with": remainder.varies_with,
+    }
+
+
+def _interval(interval: Interval) -> dict[str, Any]:
+    return {"value": interval.value, "ci95": [interval.low, interval.high]}
 
 
 def _ranked(candidate: Candidate) -> dict[str, Any]:
@@ -238,15 +326,8 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "family": cause.family,
         "family_probability": cause.family_probability,
         "parameters": {
-            name: {
-                "value": p.value,
-                "ci95": [p.low, p.high],
-                "unit": cause.units.get(name, "1"),
-            }
+            name: {**_interval(p), "unit": cause.units.get(name, "1")}
             for name, p in cause.parameters.items()
         },
-        "gap_reduction": {
-            "value": cause.gap_reduction.value,
-            "ci95": [cause.gap_reduction.low, cause.gap_reduction.high],
-        },
+        "gap_reduction": _interval(cause.gap_reduction),
     }

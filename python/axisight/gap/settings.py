@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
+from typing import Any
 
 from axisight.robot import Robot
 
@@ -69,3 +70,11 @@ class Settings:
         if self.tolerances is not None:
             return self.tolerances
         return {**DEFAULT_TOLERANCES, **robot.tolerances}
+
+    def as_dict(self, robot: Robot) -> dict[str, Any]:
+        """Return the settings by name as plain values; threads are none, they change no result."""
+        names = [f.name for f in fields(self) if f.name != "threads"]
+        return {
+            **{name: getattr(self, name) for name in names},
+            "tolerances": dict(self.tolerances_of(robot)),
+        }

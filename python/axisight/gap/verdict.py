@@ -162,7 +162,7 @@ def _named(
     place = effect.axis
     kin = [r for r in rivals if r.family == info.family and r.trial.candidate.effect.axis == place]
     alone = ranked.probability / whole
-    family = max(sum(r.probability for r in kin) / whole, alone)
+    family = min(max(sum(r.probability for r in kin) / whole, alone), 1.0)
     return NamedCause(effect.name, effect.axis, alone, intervals, units, info.family, family)
 
 
@@ -178,9 +178,6 @@ def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, .
         f"Share of the explainable error removed on held-out estimation data: {100 * explained:.1f} %.",
     ]
     out += [f"Candidate {k} could not be tried: {v}" for k, v in sorted(found.skipped.items())]
-    bound = [n for e, n in found.model.at_bound if e is None]
-    if bound:
-        out.append(f"On the edge of their tolerance after the fit: {', '.join(bound)}.")
     return tuple(out)
 
 

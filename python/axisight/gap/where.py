@@ -214,26 +214,44 @@ def findings(
     of significant bands that holds most of it, its regime the bin whose share
     stands out most from an even spread of the error.
     """
-    squares = np.maximum(bands["square"].values, 0.0)
-    significant = bands["significance"].values > significance
-    held = np.where(significant, squares, 0.0)
+    held = _held(bands, significance)
     total = held.sum()
     out = []
-    for i, axis in enumerate(bands["axis"].values):
-        mine = held[i].sum()
-        if total <= 0 or mine / total < _SMALLEST_SHARE:
-            continue
-        low, high = _main_band(held[i])
-        band = (float(bands["low_hz"][low]), float(bands["high_hz"][high]))
-        regime, text = _main_regime(regimes, i, significance)
-        z = float(bands["significance"].values[i, low : high + 1].max())
-        evidence = (
-            f"{100 * mine / total:.0f} % of the squared gap above the floor, "
-            f"{100 * held[i, low : high + 1].sum() / mine:.0f} % of that in "
-            f"{band[0]:g}-{band[1]:g} Hz ({z:.0f} standard errors){text}"
-        )
-        out.append(Where(int(axis), float(mine / total), band, regime, evidence))
+    for i in range(len(held)):
+        share = float(held[i].sum() / total) if total > 0 else 0.0
+        if share >= _SMALLEST_SHARE:
+            out.append(placed(bands, regimes, i, share, significance))
     return tuple(sorted(out, key=lambda w: -w.share))
+
+
+def placed(
+    bands: xr.Dataset, regimes: dict[str, xr.Dataset], i: int, share: float, significance: float
+) -> Where:
+    """Return the place on axis ``i`` (from 0) of an error that holds ``share`` of the whole.
+
+    Without a significant band or regime these are None: the error is there, but in a few
+    stretches of time only.
+    """
+    axis = int(bands["axis"].values[i])
+    regime, text = _main_regime(regimes, i, significance)
+    held = _held(bands, significance)[i]
+    told = f"{100 * share:.0f} % of the squared gap above the floor"
+    if not held.any():
+        return Where(axis, share, None, regime, f"{told}, in no band steadily{text}")
+    low, high = _main_band(held)
+    band = (float(bands["low_hz"][low]), float(bands["high_hz"][high]))
+    z = float(bands["significance"].values[i, low : high + 1].max())
+    evidence = (
+        f"{told}, {100 * held[low : high + 1].sum() / held.sum():.0f} % of that in "
+        f"{band[0]:g}-{band[1]:g} Hz ({z:.0f} standard errors){text}"
+    )
+    return Where(axis, share, band, regime, evidence)
+
+
+def _held(bands: xr.Dataset, significance: float) -> Array:
+    """Return the squared error above the floor (n_axes, n_bands) where it is significant, else 0."""
+    squares = np.maximum(bands["square"].values, 0.0)
+    return np.where(bands["significance"].values > significance, squares, 0.0)
 
 
 def _main_band(held: Array) -> tuple[int, int]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.arguments import not_negative, positive
 from axisight.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,6 +98,41 @@ class Log:
     def duration_s(self) -> float:
         """Samples times sample time (s): a whole period of n samples lasts n sample times."""
         return self.n_samples * self.sample_time_s
+
+    def part(self, start_s: float = 0.0, stop_s: float | None = None) -> Log:
+        """Return the samples from `start_s` to before `stop_s` (s), time starting at 0 again.
+
+        None is the end of the log, and so is a time after it. A part shorter than the period is
+        not periodic. Raises InputError for times that are not in order, a start after the end, and
+        less than one second between.
+        """
+        start = not_negative("start_s", start_s)
+        stop = self.duration_s if stop_s is None else positive("stop_s", stop_s)
+        if start >= min(stop, self.duration_s):
+            raise InputError(
+                f"start_s: expected less than {min(stop, self.duration_s):g} s, got {start:g} s"
+            )
+        # Times are meant to the sample; rounding errors of a hundredth of one are not.
+        first, last = (math.ceil(t / self.sample_time_s - 0.01) for t in (start, stop))
+        last = min(last, self.n_samples)
+        seconds = (last - first) * self.sample_time_s
+        if seconds < 1.0 - 1e-9:
+            raise InputError(
+                f"start_s, stop_s: expected at least 1 s between, got {seconds:g} s of the log"
+            )
+        arrays = {name: getattr(self, name) for name in _VARIABLES}
+        kept: dict[str, Any] = {
+            name: None if x is None else x[first:last] for name, x in arrays.items()
+        }
+        periodic = self.period_s is not None and self.period_s <= seconds * (1 + 1e-9)
+        note = f"from {first * self.sample_time_s:g} s to {last * self.sample_time_s:g} s"
+        return dataclasses.replace(
+            self,
+            **kept,
+            time_s=self.time_s[: last - first],
+            period_s=self.period_s if periodic else None,
+            notes=(*self.notes, note),
+        )
 
     def to_xarray(self) -> xr.Dataset:
         """Return a Dataset with dims (time, axis), 1-based `axis`, `units` and provenance attrs.

@@ -199,6 +199,8 @@ def _layout(height: int) -> dict[str, Any]:
         "font": {"family": _FONT, "size": 13, "color": "#222222"},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "#ffffff",
+        # Without its colours the bar of tools is a dark block: paper is transparent.
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "#9a9aa0", "activecolor": AFTER},
         "hoverlabel": {"font": {"family": _FONT, "size": 13}, "align": "left"},
     }
 

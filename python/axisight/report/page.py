@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,19 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from axisight.gap.result import Candidate, Cause, Diagnosis, Gap, Interval, VerdictKind
+from axisight.effects import effect_table
+from axisight.gap.headline import in_order
+from axisight.gap.result import (
+    Candidate,
+    Cause,
+    Diagnosis,
+    Gap,
+    Interval,
+    Pooled,
+    Remainder,
+    VerdictKind,
+    Where,
+)
 from axisight.palette import cell_colors
 from axisight.report.figures import (
     TOP,
@@ -51,6 +63,8 @@ _VERDICTS: dict[VerdictKind, tuple[str, str]] = {
         "Two or more effects explain the gap equally well on this data.",
     ),
 }
+# Values beside the headline: about its height with a few causes, all friction of a six-axis arm.
+_MOST_VALUES = 12
 _MODES = {
     "closed_loop": "Closed loop: the simulator ran under the same references and controller.",
     "inverse_dynamics": "Inverse dynamics: torque predicted from the measured motion.",
@@ -89,13 +103,14 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "meaning": meaning,
         "mode": _MODES[diagnosis.mode],
         "numbers": _numbers(diagnosis),
-        "gap_rows": _gap_rows(diagnosis.gap),
-        "where": [
-            {"title": where_text(w), "share": percent(w.share), "evidence": w.evidence}
-            for w in diagnosis.where
-        ],
+        "gap_rows": _gap_rows(diagnosis),
+        "pooled": diagnosis.gap.pooled is not None,
+        "values": _values(diagnosis.causes),
+        "findings": [finding.message for finding in diagnosis.findings],
+        "where": _places(diagnosis.where),
+        "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "maps": _maps(gap_maps(diagnosis)),
-        "causes": [_cause(cause) for cause in diagnosis.causes],
+        "causes": [_cause(cause) for cause in in_order(diagnosis.causes)],
         "ranking": [_candidate(c) for c in ranking],
         "top": TOP,
         "ranking_json": Markup(page_json(ranking_figure(diagnosis).to_plotly_json())),
@@ -110,6 +125,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "checks": diagnosis.checks,
         "refit": _refit(diagnosis.refit),
         "provenance": _flat(diagnosis.provenance),
+        "settings": _flat(diagnosis.settings),
         "plotly": Markup(get_plotlyjs()),
     }
 
@@ -137,15 +153,69 @@ def _numbers(diagnosis: Diagnosis) -> list[dict[str, str]]:
     ]
 
 
-def _gap_rows(gap: Gap) -> list[list[str]]:
+def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
+    """Return axis, verdict and the gap at each stage: by axis, for all, and pooled."""
+    gap = diagnosis.gap
     columns = (
         gap.before_per_axis,
         gap.refitted_per_axis,
         gap.after_per_axis,
         gap.floor_per_axis,
     )
-    rows = zip(*columns, strict=True)
-    return [[str(i), *(percent(float(x)) for x in row)] for i, row in enumerate(rows, 1)]
+    verdicts: dict[int, str] = {a.axis: a.verdict for a in diagnosis.axes}
+    rows = [
+        [str(i), verdicts.get(i, NO_VALUE), *(percent(float(x)) for x in row)]
+        for i, row in enumerate(zip(*columns, strict=True), 1)
+    ]
+    wholes: list[tuple[str, str, Gap | Pooled | None]] = [
+        ("all", diagnosis.verdict, gap),
+        ("pooled", NO_VALUE, gap.pooled),
+    ]
+    for name, verdict, whole in wholes:
+        if whole is not None:
+            figures = (whole.before, whole.refitted, whole.after, whole.floor)
+            rows.append([name, verdict, *(percent(x) for x in figures)])
+    return rows
+
+
+def _places(places: Sequence[Where]) -> list[dict[str, str]]:
+    return [
+        {"title": where_text(w), "share": percent(w.share), "evidence": w.evidence} for w in places
+    ]
+
+
+def _remainder(remainder: Remainder) -> dict[str, Any]:
+    if not remainder.where:
+        text = "Nothing stands out of the floor on the held-out logs with what was found."
+    else:
+        varies = remainder.varies_with
+        text = (
+            f"With what was found {percent(remainder.gap)} of the torque on the held-out logs "
+            f"remain above the floor{'' if varies is None else f'; that varies with {varies}'}."
+        )
+    return {"text": text, "where": _places(remainder.where)}
+
+
+def _values(causes: Sequence[Cause]) -> dict[str, Any]:
+    """Return the values that stand beside the headline: sizes of the causes, and how many are below."""
+    rows: list[dict[str, str]] = []
+    title = ""
+    for cause in in_order(causes):
+        parameters = _cause(cause)["parameters"]
+        shapes = _shapes(cause.effect)
+        for row in [r for r in parameters if r["name"] not in shapes] or parameters:
+            effect = plain_name(cause.effect)
+            unit = "" if row["unit"] == NO_VALUE else row["unit"]
+            shown = {"title": "" if effect == title else effect, "place": place(cause.axis)}
+            rows.append({**row, **shown, "unit": unit})
+            title = effect
+    return {"rows": rows[:_MOST_VALUES], "left_out": max(0, len(rows) - _MOST_VALUES)}
+
+
+def _shapes(effect: str) -> set[str]:
+    """Return the parameters of an effect that are no sizes; of an unknown effect none."""
+    info = effect_table().get(effect)
+    return set() if info is None else {p.name for p in info.parameters if p.role == "shape"}
 
 
 def _maps(maps: list[GapMap]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.effects import title
 from axisight.gap.result import Candidate, Cause, Diagnosis, Interval, Where
 
 Floats = NDArray[np.float64]
@@ -18,15 +19,12 @@ NO_VALUE = "–"
 SIGNIFICANT_SE = 3.0
 """Standard errors above which a cell of a map counts, unless the map's attrs say otherwise."""
 
-_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
 _REGIMES = {"abs_speed": "speed magnitude", "speed": "speed", "accel": "acceleration"}
 
 
 def plain_name(name: str) -> str:
     """``coulomb_friction`` as ``Coulomb friction``: words, first letter capital."""
-    words = [_PROPER.get(word, word) for word in name.split("_")]
-    text = " ".join(words).strip()
-    return text[:1].upper() + text[1:]
+    return title(name)
 
 
 def place(axis: int | None) -> str:

@@ -1,16 +1,20 @@
 (function () {
   "use strict";
-  var config = { responsive: true, displaylogo: false,
+  // Nothing leaves the page: plotly would offer to upload a chart to its makers.
+  var config = { responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   function data(id) {
     var element = document.getElementById(id);
     return element ? JSON.parse(element.textContent) : null;
   }
-  function draw(id, figure) {
-    return Plotly.react(id, figure.data, figure.layout, config);
+  function draw(id, figure, changed) {
+    return Plotly.react(id, figure.data, figure.layout, Object.assign({}, config, changed));
   }
   var ranking = data("ranking-data");
-  if (ranking && document.getElementById("ranking-figure")) { draw("ranking-figure", ranking); }
+  if (ranking && document.getElementById("ranking-figure")) {
+    // There is nothing to zoom in a ranking.
+    draw("ranking-figure", ranking, { displayModeBar: false });
+  }
 
   var overlays = data("overlay-data");
   var logs = document.getElementById("overlay-log");

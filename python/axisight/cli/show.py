@@ -1,0 +1,122 @@
+"""A diagnosis on the screen."""
+
+from __future__ import annotations
+
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.table import Table
+
+from axisight.cli.common import OUT
+from axisight.gap import Diagnosis, Gap, Interval, Where
+from axisight.gap.headline import in_order
+
+_RANKED = 8
+_REFITTED = 10
+
+
+def show_diagnosis(found: Diagnosis) -> None:
+    """Print verdict, causes with values, the gap, what remains, and what to do next."""
+    OUT.print(f"[bold]{found.verdict}[/]: ", end="")
+    _say(found.headline)
+    if found.causes:
+        OUT.print(_causes(found))
+    OUT.print(_gaps(found))
+    _show_places(found)
+    for finding in found.findings:
+        _say(f"finding: {finding.message}")
+    if found.next_experiment is not None:
+        _say(f"next experiment: {found.next_experiment}")
+    if found.refit:
+        OUT.print(_refitted(found.refit))
+    if found.ranking:
+        OUT.print(_ranking(found))
+
+
+def _say(text: str) -> None:
+    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def _show_places(found: Diagnosis) -> None:
+    for place in found.where:
+        _say(f"where: {_place(place)}")
+    left = found.remainder
+    if left is None or not left.where:
+        return
+    varies = "" if left.varies_with is None else f"; it varies with {left.varies_with}"
+    _say(f"remains above noise: {_percent(left.gap)} of the torque{varies}")
+    for place in left.where:
+        _say(f"remains: {_place(place)}")
+
+
+def _place(where: Where) -> str:
+    return f"axis {where.axis}, {where.evidence}"
+
+
+def _percent(x: float) -> str:
+    return f"{100 * x:.3g} %"
+
+
+def _causes(found: Diagnosis) -> Table:
+    # Narrow enough for a terminal of 80 columns; longer names fold, for a cut one is of no use.
+    table = Table(box=SIMPLE_HEAD)
+    for name in ("cause and its values", "value", "95 % interval", "probability"):
+        table.add_column(name, overflow="fold")
+    for cause in in_order(found.causes):
+        table.add_row(escape(cause.label), "", "", f"{cause.probability:.3f}")
+        for name, p in cause.parameters.items():
+            unit = cause.units.get(name, "1")
+            value = f"{p.value:.4g}" if unit == "1" else f"{p.value:.4g} {unit}"
+            table.add_row(f"  {escape(name)}", escape(value), f"{p.low:.4g} to {p.high:.4g}", "")
+    return table
+
+
+def _gaps(found: Diagnosis) -> Table:
+    table = Table("axis", "verdict", "gap before", "re-fitted", "after", "noise alone")
+    gap = found.gap
+    columns = (
+        gap.before_per_axis,
+        gap.refitted_per_axis,
+        gap.after_per_axis,
+        gap.floor_per_axis,
+    )
+    verdicts = {a.axis: a.verdict for a in found.axes}
+    for i, row in enumerate(zip(*columns, strict=True), start=1):
+        table.add_row(str(i), verdicts.get(i, ""), *(_percent(x) for x in row))
+    table.add_row("all", found.verdict, *_stages(gap))
+    if gap.pooled is not None:
+        p = gap.pooled
+        pooled = (p.before, p.refitted, p.after, p.floor)
+        table.add_row("pooled", "", *(_percent(x) for x in pooled))
+        table.caption = "pooled: sqrt(sum of squared errors / sum of squared torques)"
+    return table
+
+
+def _stages(gap: Gap) -> list[str]:
+    return [_percent(x) for x in (gap.before, gap.refitted, gap.after, gap.floor)]
+
+
+def _refitted(refit: dict[str, Interval]) -> Table:
+    table = Table("parameter", "change", "95 % interval", title="re-fitted within tolerances")
+    largest = sorted(refit.items(), key=lambda item: -abs(item[1].value))
+    for name, p in largest[:_REFITTED]:
+        interval = f"{100 * p.low:+.2g} to {100 * p.high:+.2g} %"
+        table.add_row(escape(name), f"{100 * p.value:+.2g} %", interval)
+    if len(largest) > _REFITTED:
+        table.caption = f"and {len(largest) - _REFITTED} more that changed less"
+    return table
+
+
+def _ranking(found: Diagnosis) -> Table:
+    table = Table(title="candidates where there was most to explain")
+    for name in ("effect", "axis", "probability", "held-out score", "significance"):
+        table.add_column(name, overflow="fold")
+    for c in found.ranking[:_RANKED]:
+        axis = "arm" if c.axis is None else str(c.axis)
+        table.add_row(
+            escape(c.effect),
+            axis,
+            f"{c.probability:.3f}",
+            f"{c.score:.3f}",
+            f"{c.significance:.1f}",
+        )
+    return table

@@ -1,0 +1,50 @@
+"""Effects in sentences: proper names, articles, capitals; derived from the name, for any effect."""
+
+from __future__ import annotations
+
+import re
+
+from axisight.effects.table import effect_info
+
+_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
+
+# Last words of names that take no article: one says "friction", but "a delay".
+_UNCOUNTED = re.compile(
+    r"\b(friction|backlash|play|stiffness|damping|inertia|ripple|drag|saturation|compensation"
+    r"|hysteresis|compliance|coupling|quantization|eccentricity|motion|geometry|tilt|drift"
+    r"|sag|warmup)$"
+)
+
+
+def noun(name: str) -> str:
+    """Return a name as words: ``coulomb_friction`` as ``Coulomb friction``, ``input_delay`` as it reads."""
+    words = [_PROPER.get(word, word) for word in name.split("_")]
+    return " ".join(words).replace(" dependent", "-dependent").strip()
+
+
+def title(name: str) -> str:
+    """Return a name as words with a capital first letter: ``Input delay``."""
+    text = noun(name)
+    return text[:1].upper() + text[1:]
+
+
+def article(name: str) -> str:
+    """Return what stands before the noun of an effect: ``a``, ``an``, ``the machine's`` or nothing.
+
+    An effect that changes what every simulator has by a share (stiffness, a torque constant) is the
+    machine's own value of it. Raises InputError for an unknown effect.
+    """
+    if effect_info(name).parameters[0].name.startswith("relative_"):
+        return "the machine's"
+    words = noun(name)
+    if _UNCOUNTED.search(words):
+        return ""
+    return "an" if words[0].lower() in "aeiou" else "a"
+
+
+def phrase(name: str) -> str:
+    """Return an effect as what a simulator lacks: ``a payload``, ``backlash``, ``an input delay``.
+
+    Raises InputError for an unknown effect.
+    """
+    return f"{article(name)} {noun(name)}".strip()

@@ -1,0 +1,71 @@
+"""What is left once the causes are in, and the re-fitted parameters that look suspicious."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from axisight.gap.carried import above_floor
+from axisight.gap.howfar import Stages
+from axisight.gap.model import Evidence
+from axisight.gap.result import Finding, Gap, Remainder
+from axisight.gap.settings import Settings
+from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
+
+# A parameter this many of its tolerances off is one machine in four hundred: rather something
+# unmodelled that pulls at it.
+_EDGE = 3.0
+
+
+def remainder_of(
+    stages: Stages, gap: Gap, logs: Sequence[ErrorLog], settings: Settings
+) -> Remainder:
+    """Return what stands above the floor with the causes in.
+
+    ``logs``: the validation logs with the error that remains and noise alone. Axes that stand above
+    the floor of no log, and simulations that broke off, have no place.
+    """
+    per_axis = np.sqrt(np.maximum(gap.after_per_axis**2 - gap.floor_per_axis**2, 0.0))
+    total = float(np.sqrt(max(gap.after**2 - gap.floor**2, 0.0)))
+    standing = np.any(above_floor(stages.after, stages.floor) > 0, axis=0)
+    whole = all(len(x.noise) == len(x.error) for x in logs)
+    if not np.any(standing) or not np.isfinite(total) or not whole:
+        return Remainder(total, per_axis)
+    bands = band_map(logs, settings.block_s)
+    regimes = regime_maps(logs, settings.bandwidth_hz, settings.block_s)
+    shares = per_axis**2 / max(float(np.sum(per_axis**2)), 1e-300)
+    where = sorted(
+        (
+            placed(bands, regimes, int(i), float(shares[i]), settings.significance)
+            for i in np.flatnonzero(standing)
+        ),
+        key=lambda w: -w.share,
+    )
+    regime = where[0].regime
+    return Remainder(
+        total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
+    )
+
+
+def parameters_at_edge(
+    fitted: Evidence, nominal: Mapping[str, float], tolerances: Mapping[str, float]
+) -> tuple[Finding, ...]:
+    """Return a finding for each re-fitted parameter three tolerances off, or at its bound.
+
+    ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity.
+    """
+    out = []
+    for name, value in fitted.robot_values.items():
+        tolerance = tolerances[name.rsplit(".", 1)[1]]
+        change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
+        bound = (None, name) in fitted.at_bound
+        if bound or abs(change) >= _EDGE * tolerance:
+            message = (
+                f"{name} ended {100 * change:+.3g} % off the simulator's value, "
+                f"{abs(change) / tolerance:.1f} of its tolerance of {100 * tolerance:g} %"
+                f"{', at the bound of the fit' if bound else ''}: the value or the tolerance is "
+                f"wrong, or something that no effect stands for pulls at it."
+            )
+            out.append(Finding("parameter_at_edge", name, message))
+    return tuple(out)

@@ -1,0 +1,57 @@
+"""What `axisight diagnose` prints: values, the gap by axis and pooled, what remains, what to do next."""
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from axisight.cli import show
+from diagnosis_data import explained, hostile, of
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    def render(diagnosis, width: int = 200) -> str:
+        console = Console(width=width, record=True, file=StringIO())
+        monkeypatch.setattr(show, "OUT", console)
+        show.show_diagnosis(diagnosis)
+        return " ".join(console.export_text().split())
+
+    return render
+
+
+def test_a_diagnosis_says_it_all(shown):
+    text = shown(replace(explained(), next_experiment="Move slowly."))
+    for words in (
+        "explained: Axis 2 has Coulomb friction",
+        "coulomb_friction@2 0.970 coulomb_nm 0.612 Nm 0.583 to 0.641",
+        "│ 2 │ explained │ 46.5 % │ 43.5 % │ 6.2 % │ 5 %",
+        "│ all │ explained │ 31 % │ 29 % │ 6.2 % │ 5 %",
+        "│ pooled │ │ 21.7 % │ 20.3 % │ 4.34 % │ 3.5 %",
+        "sqrt(sum of squared errors / sum of squared torques)",
+        "where: axis 2, residual steps with velocity sign",
+        "remains above noise: 3.7 % of the torque; it varies with speed",
+        "remains: axis 1, 70 % of the squared gap above the floor",
+        "finding: axis2.damping ended +32 % off, at the bound",
+        "next experiment: Move slowly.",
+        "stiffness_2 │ -2.1 % │ -3.5 to -0.7 %",
+    ):
+        assert words in text, words
+
+
+def test_what_is_not_there_is_not_said(shown):
+    text = shown(replace(of("none"), gap=replace(of("none").gap, pooled=None)))
+    for words in ("pooled", "remains", "finding", "next experiment", "re-fitted within", "cause"):
+        assert words not in text, words
+
+
+def test_nothing_is_cut_on_a_narrow_screen(shown):
+    text = shown(explained(), width=80)
+    assert "…" not in text
+    assert "coulomb_friction@2 0.970 coulomb_nm 0.612 Nm 0.583 to 0.641" in text
+
+
+def test_names_are_no_markup(shown):
+    assert "[red]" in shown(replace(explained(), headline="a [red] arm"))
+    shown(hostile())
