@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -156,6 +157,8 @@ def _write(found: Diagnosis, json: Path | None, report: Path | None) -> None:
 
 def _show(found: Diagnosis) -> None:
     _out.print(f"[bold]{found.verdict}[/]: {found.headline}")
+    for finding in found.findings:
+        _out.print(f"[yellow]data:[/] {escape(str(finding))}", highlight=False, soft_wrap=True)
     if found.causes:
         _out.print(_causes(found))
     _out.print(_gaps(found))

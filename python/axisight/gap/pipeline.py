@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.carried import carried_over
+from axisight.gap.faults import InputFinding
+from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
@@ -26,7 +28,7 @@ from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
-from axisight.logs import Case, Log, check_same_rate, read_case
+from axisight.logs import Case, Log, read_case
 from axisight.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -65,19 +67,23 @@ def diagnose(
 
     Raises
     ------
-    CaseError, LogError, RobotError, InputError for bad input.
+    CaseError, LogError, RobotError, InputError for bad input; RefusedInputError, which is the first two
+    of them, with the name of every fault, where logs or robot cannot be what they claim.
 
     """
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    progress("looking at the logs", 0, 1)
+    noted = pass_gate(machine, fit_logs, held_logs)
+    progress("looking at the logs", 1, 1)
     view = view_of(machine, fit_logs, held_logs, chosen)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs))
     out = _assemble(
-        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen
+        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen, noted
     )
     progress("measuring the gap", 1, 1)
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
@@ -107,22 +113,7 @@ def _inputs(
             f"{name}: expected at least one estimation and one validation log, "
             f"got {len(fit_logs)} and {len(held_logs)}"
         )
-    check_same_rate([*fit_logs, *held_logs])
-    for log in [*fit_logs, *held_logs]:
-        _check_log(machine, log)
     return name, machine, fit_logs, held_logs
-
-
-def _check_log(robot: Robot, log: Log) -> None:
-    if log.n_axes != robot.n_axes:
-        raise CaseError(
-            f"{log.source}: expected {robot.n_axes} axes as in the robot, got {log.n_axes}"
-        )
-    if abs(log.sample_time_s / robot.sample_time_s - 1) > 1e-4:
-        raise CaseError(
-            f"{log.source}: expected the robot's sample time {robot.sample_time_s:g} s, "
-            f"got {log.sample_time_s:g} s"
-        )
 
 
 def _errors(view: View, variant: Variant, logs: Sequence[Log]) -> list[Array]:
@@ -196,6 +187,7 @@ def _assemble(
     error_logs: Sequence[ErrorLog],
     conclusion: Conclusion,
     settings: Settings,
+    noted: tuple[InputFinding, ...],
 ) -> Diagnosis:
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
@@ -234,7 +226,8 @@ def _assemble(
         regime_maps=regimes,
         overlays=reach.overlays,
         refit={k: _relative(found.model, k, nominal[k]) for k in found.model.robot_values},
-        checks=(*conclusion.checks, *_filtered(view)),
+        checks=(*conclusion.checks, *_filtered(view), *map(str, noted)),
+        findings=noted,
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,

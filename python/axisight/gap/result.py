@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.gap.faults import InputFinding
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
@@ -133,6 +134,8 @@ class Diagnosis:
     each a Dataset with ``share`` (of that axis's squared baseline error above
     the floor), ``excess`` (ratio of the squared error to the floor) and
     ``significance`` (in standard errors). Band and bin coordinates are labels.
+    ``findings``: faults of robot file and logs with which a diagnosis still makes sense;
+    ``checks`` has them in words, after those of the diagnosis itself.
     """
 
     name: str
@@ -152,6 +155,7 @@ class Diagnosis:
     refit: dict[str, Interval]
     checks: tuple[str, ...]
     axes: tuple[AxisVerdict, ...] = ()
+    findings: tuple[InputFinding, ...] = ()
     p_none: float = 0.0
     p_unknown: float = 0.0
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -211,6 +215,7 @@ class Diagnosis:
             ],
             "ranking": [_ranked(c) for c in self.ranking],
             "checks": list(self.checks),
+            "findings": [f.to_dict() for f in self.findings],
             "provenance": self.provenance,
         }
 
