@@ -21,6 +21,7 @@ NAMED = 0.95
 # the second range is worth a word.
 _OTHER_GAINS = (0.4, 2.5)
 _SAME_GAINS = (0.8, 1.25)
+_ANGLES = ("position_in_degrees", "position_in_revolutions")
 _CHANNELS = {"torque": "torque_cmd", "velocity_ref": "velocity_ref", "position": "position"}
 
 
@@ -116,6 +117,9 @@ def _factors(robot: Robot, log: Log, i: int, fit: LawFit) -> list[InputFinding]:
         # Reference and position agree: it is the torque.
         if _within(b, _OTHER_GAINS):
             return [_scaled(log, i, "torque", b, ratio, severity="flag")]
+        if scale_name("position", 1.0 / b, ratio) in _ANGLES:
+            # Both in the same wrong unit are as good as a torque that is too small.
+            return [_wrong(log, i, "position", 1.0 / b, ratio)]
         return [_wrong(log, i, "torque", b, ratio)]
     if _within(b, _OTHER_GAINS):
         return [_wrong(log, i, "velocity_ref", 1.0 / a, ratio)]

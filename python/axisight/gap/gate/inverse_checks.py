@@ -9,6 +9,7 @@ from axisight.gap.cutoff import Motion, highest_cutoff_hz
 from axisight.gap.faults import GateSeverity, InputFinding
 from axisight.gap.gate.mistakes import Mistake, predict, undone
 from axisight.gap.gate.scales import scale_name
+from axisight.gap.gate.passive import check_passive
 from axisight.gap.gate.small_errors import check_small_errors
 from axisight.gap.gate.torque_fit import TorqueFit, torque_fit
 from axisight.gap.inverse import motion
@@ -25,10 +26,10 @@ _SUSPICIOUS = 0.3
 # A mistake is named where undoing it takes off half of what was left on all axes, no less than so
 # much of one axis, and explains the axes concerned as simulators do.
 _REMOVED = 0.5
-_LEAST_REMOVED = 0.2
+_LEAST_REMOVED = 0.08
 _EXPLAINED = 0.3
 # A factor of the torque is known where the prediction carries so much of its variance.
-_CARRIES = 0.3
+_CARRIES = 0.1
 # A payload or gravity that is compensated in the arm changes torques by up to two; more is a unit.
 _SAME = (0.4, 2.5)
 _IMPOSSIBLE = (0.2, 5.0)
@@ -43,11 +44,16 @@ def check_inverse(robot: Robot, log: Log) -> list[InputFinding]:
     if fast:
         return fast
     given = torque_fit(at[3], predict(robot, at), at)
-    if np.any(given.left > _SUSPICIOUS):
+    turned = (given.slope < 0.0) & (given.gain > _CARRIES)
+    if np.any((given.left > _SUSPICIOUS) | turned):
         found = _most_likely(robot, at, given)
         if found is not None:
             return [_named(log, found, given)]
-    return [*_scales(robot, log, given), *check_small_errors(robot, log, at)]
+    return [
+        *check_passive(robot, log, at),
+        *_scales(robot, log, given),
+        *check_small_errors(robot, log, at),
+    ]
 
 
 def _too_fast(robot: Robot, log: Log, at: Motion) -> list[InputFinding]:
@@ -93,7 +99,7 @@ def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[InputFinding]:
     for axis in range(robot.n_axes):
         slope = float(given.slope[axis])
         known = given.gain[axis] > _CARRIES and given.left[axis] < _SUSPICIOUS
-        if not known or _SAME[0] < slope < _SAME[1]:
+        if not known or slope < 0.0 or _SAME[0] < slope < _SAME[1]:
             continue
         severity: GateSeverity = "flag" if _IMPOSSIBLE[0] < slope < _IMPOSSIBLE[1] else "refuse"
         name = scale_name("torque", slope, float(robot.gear_ratio[axis]))

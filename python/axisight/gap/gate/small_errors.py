@@ -27,15 +27,15 @@ _LEAST_S = 8e-3
 _LEAST_RAD = 0.03
 # By itself it has to take so much of what is left, and stand out of its scatter between tenths of
 # the log: payloads and friction of another shape take less, or not evenly.
-_REMOVED = 0.3
+_REMOVED = 0.05
 _SIGNIFICANT = 6.0
 _PARTS = 10
 
 
 def check_small_errors(robot: Robot, log: Log, at: Motion) -> list[InputFinding]:
     """Return flags about the time of torques, the time of single axes and their zero."""
-    names, effects = _effects(robot, log, at)
     base = predict(robot, at)
+    names, effects = _effects(robot, log, at, base)
     target, columns = _projected(at, base, effects)
     out = []
     left = float((target**2).sum())
@@ -57,16 +57,18 @@ def check_small_errors(robot: Robot, log: Log, at: Motion) -> list[InputFinding]
     return out
 
 
-def _effects(robot: Robot, log: Log, at: Motion) -> tuple[list[tuple[str, int]], list[Array]]:
+def _effects(
+    robot: Robot, log: Log, at: Motion, base: Array
+) -> tuple[list[tuple[str, int]], list[Array]]:
     """Return what each error adds to the measured torque, per unit, (n, n_axes) each."""
     position, speed, acceleration, torque = at
     n = robot.n_axes
     step = max(1, round(_STEP_S / log.sample_time_s))
     seconds = step * log.sample_time_s
     names: list[tuple[str, int]] = [("time_shifted", -1)]
-    rate = np.gradient(torque, log.sample_time_s, axis=0)
     # Torque read late by s is the torque of s earlier.
-    effects = [-rate]
+    effects = [-np.gradient(torque, log.sample_time_s, axis=0)]
+    rate = np.gradient(base, log.sample_time_s, axis=0)
     for i in range(n):
         turn = np.zeros(n)
         turn[i] = _STEP_RAD * (1.0 / abs(float(robot.gear_ratio[i])))
@@ -77,7 +79,8 @@ def _effects(robot: Robot, log: Log, at: Motion) -> tuple[list[tuple[str, int]],
         names.append(("position_offset", i))
         effects.append((moved[1] - moved[0]) / (2 * _STEP_RAD))
         late = [predict(robot, _shifted(at, i, s * step)) for s in (1, -1)]
-        # Its columns are late: the machine was further on, and so was its own torque.
+        # Its columns are late: the machine was further on. Its own torque is late too, and so are
+        # motion and friction it goes with; only the other axes were further on then.
         effect = (late[0] - late[1]) / (2 * seconds)
         effect[:, i] -= rate[:, i]
         names.append(("axis_delayed", i))
