@@ -76,7 +76,7 @@ class InputFinding:
 
     ``name``: one of ``MEANINGS``; ``severity``: ``"refuse"`` where the data cannot be what they
     claim, ``"flag"`` where a diagnosis still makes sense; ``log``: name of the log, None for the
-    robot; ``axis``: from 1, None where it concerns all or none; ``field``: column or key;
+    robot file or all logs; ``axis``: from 1, None where it concerns all or none; ``field``: column or key;
     ``message``: what was expected, what came, and what to do.
     """
 
@@ -89,7 +89,7 @@ class InputFinding:
 
     def __str__(self) -> str:
         """One line for a person, the name first."""
-        where = self.log or "robot"
+        where = self.log or "robot and logs"
         return f"{self.name}: {where}: {self.field}: {self.message}"
 
     def to_dict(self) -> dict[str, Any]:

@@ -114,18 +114,21 @@ def _factors(robot: Robot, log: Log, i: int, fit: LawFit) -> list[InputFinding]:
         return []
     ratio = float(robot.gear_ratio[i])
     if abs(a / b - 1.0) < 0.2:
-        # Reference and position agree: it is the torque.
-        if _within(b, _OTHER_GAINS):
-            return [_scaled(log, i, "torque", b, ratio, severity="flag")]
-        if scale_name("position", 1.0 / b, ratio) in _ANGLES:
-            # Both in the same wrong unit are as good as a torque that is too small.
-            return [_wrong(log, i, "position", 1.0 / b, ratio)]
-        return [_wrong(log, i, "torque", b, ratio)]
+        return [_both(log, i, b, ratio)]
     if _within(b, _OTHER_GAINS):
         return [_wrong(log, i, "velocity_ref", 1.0 / a, ratio)]
     if _within(a, _OTHER_GAINS):
         return [_wrong(log, i, "position", 1.0 / b, ratio)]
     return [_wrong(log, i, "torque", b, ratio), _wrong(log, i, "velocity_ref", b / a, ratio)]
+
+
+def _both(log: Log, i: int, factor: float, ratio: float) -> InputFinding:
+    """Return the finding where reference and position agree: the torque, or the unit of both."""
+    if _within(factor, _OTHER_GAINS):
+        return _scaled(log, i, "torque", factor, ratio, severity="flag")
+    if scale_name("position", 1.0 / factor, ratio) in _ANGLES:
+        return _wrong(log, i, "position", 1.0 / factor, ratio)
+    return _wrong(log, i, "torque", factor, ratio)
 
 
 def _within(x: float, limits: tuple[float, float]) -> bool:

@@ -51,8 +51,11 @@ def check_inputs(
         return tuple(found)
     found += _references(robot, logs)
     closed = is_closed_loop(robot, logs)
-    for log in logs:
-        found += check_closed_loop(robot, log) if closed else check_inverse(robot, log)
+    if closed:
+        for log in logs:
+            found += check_closed_loop(robot, log)
+    else:
+        found += check_inverse(robot, logs)
     if refused(found):
         return tuple(found)
     if closed:

@@ -7,6 +7,9 @@ One regression has them all, beside a factor of the prediction, friction and an 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +17,6 @@ from axisight.gap.cutoff import Motion
 from axisight.gap.faults import GateSeverity, InputFinding
 from axisight.gap.gate.mistakes import predict
 from axisight.gap.gate.torque_fit import nuisance
-from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -25,50 +27,60 @@ _STEP_RAD = 0.05
 # What is worth a word: above the skew of real recorders (a few ms) and the play of zero marks.
 _LEAST_S = 8e-3
 _LEAST_RAD = 0.03
+# What is larger is not of first order, and something else.
+_MOST_S = 0.2
+_MOST_RAD = 0.6
 # By itself it has to take so much of what is left, and stand out of its scatter between tenths of
 # the log: payloads and friction of another shape take less, or not evenly.
 _REMOVED = 0.05
 _SIGNIFICANT = 6.0
 _PARTS = 10
+# Logs with less than a tenth of the effect of the strongest say nothing; the others agree this well.
+_TELLS = 0.1
+_ALIKE = (0.5, 2.0)
 
 
-def check_small_errors(robot: Robot, log: Log, at: Motion) -> list[InputFinding]:
-    """Return flags about the time of torques, the time of single axes and their zero."""
-    base = predict(robot, at)
-    names, effects = _effects(robot, log, at, base)
-    target, columns = _projected(at, base, effects)
+def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[InputFinding]:
+    """Return flags about the time of torques, the time of single axes and their zero.
+
+    ``motions``: sample time [s] and low-passed motion of every log; an error has to be in all of them.
+    """
+    parts = []
+    names: list[tuple[str, int]] = []
+    for sample_time_s, at in motions:
+        base = predict(robot, at)
+        names, effects = _effects(robot, sample_time_s, at, base)
+        parts.append(_projected(at, base, effects))
+    targets = [target for target, _ in parts]
+    limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
     out = []
-    left = float((target**2).sum())
     # The one that takes most first; the others on what it leaves.
     for _ in range(len(names)):
-        best = _strongest(target, columns)
-        if best is None:
+        columns = [[part[i] for _, part in parts] for i in range(len(names))]
+        best = _strongest(targets, columns, limits)
+        if best is None or best.share < _REMOVED or best.significance < _SIGNIFICANT:
             break
-        index, size, significance = best
-        taken = float((target**2).sum()) - float(((target - size * columns[index]) ** 2).sum())
-        if taken < _REMOVED * left or significance < _SIGNIFICANT:
-            break
-        finding = _finding(robot, log, names[index], size, taken / left)
+        finding = _finding(names[best.index], best.size, best.share)
         if finding is None:
             break
         out.append(finding)
-        target = target - size * columns[index]
-        left = float((target**2).sum())
+        taken = columns[best.index]
+        targets = [t - best.size * c for t, c in zip(targets, taken, strict=True)]
     return out
 
 
 def _effects(
-    robot: Robot, log: Log, at: Motion, base: Array
+    robot: Robot, sample_time_s: float, at: Motion, base: Array
 ) -> tuple[list[tuple[str, int]], list[Array]]:
     """Return what each error adds to the measured torque, per unit, (n, n_axes) each."""
     position, speed, acceleration, torque = at
     n = robot.n_axes
-    step = max(1, round(_STEP_S / log.sample_time_s))
-    seconds = step * log.sample_time_s
+    step = max(1, round(_STEP_S / sample_time_s))
+    seconds = step * sample_time_s
     names: list[tuple[str, int]] = [("time_shifted", -1)]
     # Torque read late by s is the torque of s earlier.
-    effects = [-np.gradient(torque, log.sample_time_s, axis=0)]
-    rate = np.gradient(base, log.sample_time_s, axis=0)
+    effects = [-np.gradient(torque, sample_time_s, axis=0)]
+    rate = np.gradient(base, sample_time_s, axis=0)
     for i in range(n):
         turn = np.zeros(n)
         turn[i] = _STEP_RAD * (1.0 / abs(float(robot.gear_ratio[i])))
@@ -114,29 +126,61 @@ def _projected(at: Motion, base: Array, effects: list[Array]) -> tuple[Array, li
     return target, columns
 
 
-def _strongest(target: Array, columns: list[Array]) -> tuple[int, float, float] | None:
-    """Return index, size and significance of the effect that takes most of the target by itself."""
-    best: tuple[float, int, float] | None = None
+@dataclass(frozen=True)
+class _Strongest:
+    """An error by its number, its size, the share of what is left that it takes, its significance."""
+
+    index: int
+    size: float
+    share: float
+    significance: float
+
+
+def _strongest(
+    targets: list[Array], columns: list[list[Array]], limits: list[float]
+) -> _Strongest | None:
+    """Return what takes most of the targets, within limits and alike in all logs.
+
+    ``targets`` and every one of ``columns`` hold an array per log.
+    """
+    power = sum(float((t**2).sum()) for t in targets)
+    best = None
     for index, column in enumerate(columns):
-        energy = float((column**2).sum())
+        # Energies of ten parts of every log: the scatter of the estimate between them (the
+        # sandwich of one number) is its error.
+        cells = [
+            [
+                (float((c * t).sum()), float((c * c).sum()))
+                for c, t in zip(_cut(own), _cut(target), strict=True)
+            ]
+            for own, target in zip(column, targets, strict=True)
+        ]
+        sums = np.array(cells).reshape(len(targets), -1, 2)
+        product, energy = sums.sum(axis=(0, 1))
         if not energy > 0.0:
             continue
-        size = float((column * target).sum()) / energy
-        if best is None or size**2 * energy > best[0]:
-            best = size**2 * energy, index, size
-    if best is None:
-        return None
-    _, index, size = best
-    parts = zip(np.array_split(columns[index], _PARTS), np.array_split(target, _PARTS), strict=True)
-    sums = np.array([[(c * t).sum(), (c * c).sum()] for c, t in parts])
-    # Scatter of the estimate over parts of the log (the sandwich of one number).
-    scatter = float(np.sqrt(((sums[:, 0] - size * sums[:, 1]) ** 2).sum()) / sums[:, 1].sum())
-    return index, size, abs(size) / max(scatter, 1e-300)
+        size = product / energy
+        if abs(size) > limits[index] or not _alike(sums.sum(axis=1), size):
+            continue
+        scatter = np.sqrt(((sums[..., 0] - size * sums[..., 1]) ** 2).sum()) / energy
+        share = size * product / max(power, 1e-300)
+        if best is None or share > best.share:
+            best = _Strongest(index, float(size), float(share), abs(size) / max(scatter, 1e-300))
+    return best
 
 
-def _finding(
-    robot: Robot, log: Log, name: tuple[str, int], size: float, share: float
-) -> InputFinding | None:
+def _cut(x: Array) -> list[Array]:
+    return np.array_split(x, _PARTS)
+
+
+def _alike(per_log: Array, size: float) -> bool:
+    """Whether every log that tells (its product and energy are a row) tells about the same size."""
+    tells = per_log[:, 1] > _TELLS * per_log[:, 1].max()
+    ratio = per_log[tells, 0] / per_log[tells, 1] / (size or 1.0)
+    return bool(np.all((ratio > _ALIKE[0]) & (ratio < _ALIKE[1])))
+
+
+def _finding(name: tuple[str, int], size: float, share: float) -> InputFinding | None:
     kind, axis = name
     severity: GateSeverity = "flag"
     if kind == "position_offset":
@@ -147,7 +191,7 @@ def _finding(
             f"off: it explains {100 * share:.3g} % of what is left; check the zero mark, or the load "
             "of the robot file"
         )
-        return InputFinding(kind, severity, message, log.name, axis + 1, f"position_{axis + 1}")
+        return InputFinding(kind, severity, message, None, axis + 1, f"position_{axis + 1}")
     if abs(size) < _LEAST_S:
         return None
     who = "torques" if axis < 0 else f"the columns of axis {axis + 1}"
@@ -156,4 +200,4 @@ def _finding(
         f"other channels: it explains {100 * share:.3g} % of what is left; record on one clock"
     )
     field = "torque_cmd" if axis < 0 else f"position_{axis + 1}"
-    return InputFinding(kind, severity, message, log.name, axis + 1 or None, field)
+    return InputFinding(kind, severity, message, None, axis + 1 or None, field)
