@@ -48,7 +48,7 @@ def references(kind: str, seed: int, n: int, step_s: float) -> np.ndarray:
         return np.column_stack(
             [
                 v * (bump((phase - s) / 0.35) - bump((phase - s - 0.5) / 0.35))
-                for v, s in zip(top, start)
+                for v, s in zip(top, start, strict=True)
             ]
         )
     lines = np.arange(1.0, 40.0, 0.5)
@@ -250,7 +250,7 @@ def torque_in_millinewtonmetres_arm(case: Case) -> Case:
     return every(case, "torque_nm", None, lambda x: 1000 * x)
 
 
-@mistake("torque_scaled", axis=1)
+@mistake("torque_scaled", axis=1, severity="flag")
 def torque_in_percent_of_rated(case: Case) -> Case:
     return every(case, "torque_nm", None, lambda x: 100 * x / 26.0)
 
@@ -260,7 +260,7 @@ def torque_in_percent_of_rated_arm(case: Case) -> Case:
     return every(case, "torque_nm", None, lambda x: 100 * x / 15.0)
 
 
-@mistake("torque_scaled", axis=1)
+@mistake("torque_scaled", axis=1, severity="flag")
 def current_in_amperes_called_torque(case: Case) -> Case:
     return every(case, "torque_nm", None, lambda x: x / 0.38)
 

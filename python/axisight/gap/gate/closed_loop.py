@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from axisight.gap.faults import InputFinding
+from axisight.gap.faults import GateSeverity, InputFinding
 from axisight.gap.gate.control_law import ControlLaw, LawFit
 from axisight.gap.gate.follows import check_follows
 from axisight.gap.gate.scales import scale_name
@@ -13,14 +13,16 @@ from axisight.gap.gate.shifts import Shift, best_shift
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# The law holds to a thousandth on logs of simulated machines with any effect, limits included. A
-# drive that filters what it reports leaves a few per cent; a wrong column explains less than half.
-EXPLAINED = 0.9
-NAMED = 0.95
-# Factors of a controller that is otherwise tuned than the file says pass within these; a factor in
-# the second range is worth a word.
-_OTHER_GAINS = (0.4, 2.5)
+# The law holds to a thousandth on logs of simulated machines with any effect, limits included; what is
+# named has to hold as well, with factors of one. Other gains than those of the file, filters and
+# feed-forward leave more, and are flagged.
+HOLDS = 0.99
+_EXPLAINED = 0.9
+_ONE = (0.9, 1.1)
 _SAME_GAINS = (0.8, 1.25)
+_OTHER_GAINS = (0.2, 5.0)
+# A controller may read its sensor this late by itself: an effect, for the diagnosis to find.
+_LATE_S = 0.012
 _ANGLES = ("position_in_degrees", "position_in_revolutions")
 _CHANNELS = {"torque": "torque_cmd", "velocity_ref": "velocity_ref", "position": "position"}
 
@@ -40,20 +42,19 @@ class _Axis:
 def check_closed_loop(robot: Robot, log: Log) -> list[InputFinding]:
     """Return findings about channels that do not fit one another by the controller's law."""
     law = ControlLaw(robot, log)
-    axes = [_look(law, i, robot.n_axes) for i in range(robot.n_axes)]
+    looked = [_look(law, i, robot.n_axes) for i in range(robot.n_axes)]
     out: list[InputFinding] = []
     unexplained = []
-    for axis in axes:
+    for axis in looked:
         if not math.isfinite(axis.as_given.explained):
             continue
-        if axis.as_given.explained >= EXPLAINED:
+        if axis.as_given.explained >= HOLDS:
             out += _factors(robot, log, axis.index, axis.as_given)
-        elif axis.best.explained >= NAMED:
+        elif (axis.reference, axis.position) != (axis.index, axis.index):
             out += _other_columns(log, axis)
-            out += _factors(robot, log, axis.index, axis.best)
         elif axis.shift is not None:
-            out += _shifted(log, axis, [a.shift for a in axes])
-        else:
+            out += _shifted(log, axis, [a.shift for a in looked])
+        elif axis.as_given.explained < _EXPLAINED:
             unexplained.append(axis)
     followed = check_follows(robot, log, [a.index for a in unexplained])
     out += followed
@@ -63,23 +64,24 @@ def check_closed_loop(robot: Robot, log: Log) -> list[InputFinding]:
 
 def _look(law: ControlLaw, i: int, n_axes: int) -> _Axis:
     as_given = law.fit(i, i, i)
-    if not as_given.explained < EXPLAINED:
+    if not as_given.explained < HOLDS:
         return _Axis(i, as_given, i, i, as_given, None)
-    # The least that was mistaken first: one column before two.
-    pairs = [(j, k) for j in range(n_axes) for k in range(n_axes) if (j, k) != (i, i)]
-    pairs.sort(key=lambda p: (p[0] != i) + (p[1] != i) - (p[0] == p[1]))
-    fits = [(law.fit(i, j, k), j, k) for j, k in pairs]
-    good = [f for f in fits if f[0].explained >= NAMED and _plain(f[0])]
-    best, j, k = max(good or fits or [(as_given, i, i)], key=lambda f: f[0].explained)
-    if best.explained >= NAMED:
+    # One column that was mistaken: reference, position, or torque with the gains of its own axis.
+    others = [j for j in range(n_axes) if j != i]
+    fits = [(law.fit(i, j, i), j, i) for j in others]
+    fits += [(law.fit(i, i, j), i, j) for j in others]
+    fits += [(law.fit(i, j, j, gains=j), j, j) for j in others]
+    good = [f for f in fits if _believed(f[0])]
+    if good:
+        best, j, k = max(good, key=lambda f: f[0].explained)
         return _Axis(i, as_given, j, k, best, None)
-    return _Axis(i, as_given, i, i, as_given, best_shift(law, i, NAMED))
+    return _Axis(i, as_given, i, i, as_given, best_shift(law, i, _believed))
 
 
-def _plain(fit: LawFit) -> bool:
-    """Whether both factors are one, up to sign and other gains: swapped columns have right units."""
-    low, high = _OTHER_GAINS
-    return all(not math.isfinite(x) or low < abs(x) < high for x in (fit.reference, fit.position))
+def _believed(fit: LawFit) -> bool:
+    """Whether a law holds: as well as it does without mistakes, with factors of one."""
+    factors = [x for x in (fit.reference, fit.position) if math.isfinite(x)]
+    return fit.explained >= HOLDS and all(_within(x, _ONE) for x in factors)
 
 
 def _column(field: str, axis: int) -> str:
@@ -115,9 +117,9 @@ def _factors(robot: Robot, log: Log, i: int, fit: LawFit) -> list[InputFinding]:
     ratio = float(robot.gear_ratio[i])
     if abs(a / b - 1.0) < 0.2:
         return [_both(log, i, b, ratio)]
-    if _within(b, _OTHER_GAINS):
+    if _within(b, _SAME_GAINS):
         return [_wrong(log, i, "velocity_ref", 1.0 / a, ratio)]
-    if _within(a, _OTHER_GAINS):
+    if _within(a, _SAME_GAINS):
         return [_wrong(log, i, "position", 1.0 / b, ratio)]
     return [_wrong(log, i, "torque", b, ratio), _wrong(log, i, "velocity_ref", b / a, ratio)]
 
@@ -136,7 +138,7 @@ def _within(x: float, limits: tuple[float, float]) -> bool:
 
 
 def _wrong(log: Log, i: int, field: str, factor: float, ratio: float) -> InputFinding:
-    if factor < 0.0 and _within(-factor, _OTHER_GAINS):
+    if factor < 0.0 and _within(-factor, _SAME_GAINS):
         message = (
             f"expected the sign of the robot's axis, got the other one (factor {factor:.4g} by the "
             "controller's law): turn it round"
@@ -146,14 +148,14 @@ def _wrong(log: Log, i: int, field: str, factor: float, ratio: float) -> InputFi
 
 
 def _scaled(
-    log: Log, i: int, field: str, factor: float, ratio: float, *, severity: str
+    log: Log, i: int, field: str, factor: float, ratio: float, *, severity: GateSeverity
 ) -> InputFinding:
     name = scale_name(field, factor, ratio)
     message = (
         f"expected SI units, got numbers {factor:.4g} times what the controller of the robot file "
         f"makes of the other channels: {_advice(name)}"
     )
-    return InputFinding(name, severity, message, log.name, i + 1, _column(field, i))  # type: ignore[arg-type]
+    return InputFinding(name, severity, message, log.name, i + 1, _column(field, i))
 
 
 def _advice(name: str) -> str:
@@ -172,12 +174,15 @@ def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[InputFin
     late = "late" if shift.seconds > 0 else "early"
     message = (
         f"expected channels of one clock, got the {words} {abs(shift.seconds) * 1e3:.4g} ms {late} "
-        f"against the others (the controller's law then explains {100 * shift.explained:.4g} % of the "
+        f"against the others (the controller's law then explains {100 * shift.fit.explained:.4g} % of the "
         f"torque, as given {100 * max(axis.as_given.explained, 0):.3g} %): shift it back, or record on "
         "one clock"
     )
     column = _column(shift.field, axis.index)
-    return [InputFinding(name, "refuse", message, log.name, axis.index + 1, column)]
+    # On a smooth motion, of which nearly all is explained as given, other gains look like a shift.
+    doubtful = abs(shift.seconds) <= _LATE_S or axis.as_given.explained > _EXPLAINED
+    severity: GateSeverity = "flag" if doubtful else "refuse"
+    return [InputFinding(name, severity, message, log.name, axis.index + 1, column)]
 
 
 def _off(log: Log, axis: _Axis) -> InputFinding:

@@ -50,9 +50,9 @@ class LawFit:
 
 
 class ControlLaw:
-    """The shares of references and positions in the commands of one log, low-passed and thinned.
+    """The shares of references and positions in the commands of one log, low-passed.
 
-    ``step``: samples of the log per sample here; ``kept`` (n, n_axes): samples that no limit cut.
+    ``step``: every so many samples are compared; ``kept`` (n, n_axes): samples that no limit cut.
     """
 
     def __init__(self, robot: Robot, log: Log) -> None:
@@ -61,29 +61,21 @@ class ControlLaw:
         time = log.sample_time_s
         band = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
         self.step = max(1, int(1.0 / (time * band * _SAMPLES_PER_BAND)))
-        self.sample_time_s = time * self.step
+        self.sample_time_s = time
+        self._band_hz = band
         self._gains = robot.controller_gains
-        self._n_axes = robot.n_axes
-        self._full_time = time
-
-        def thin(x: Array) -> Array:
-            return lowpass(np.ascontiguousarray(x), time, band)[:: self.step]
-
         position = log.position_rad - log.position_rad[0]
         speed = np.diff(position, axis=0, prepend=position[:1]) / time
         self._reference = self._states(reference, _before(reference) * time)
         self._position = self._states(-speed, -position)
-        self._thin = thin
-        self.torque = thin(log.torque_nm)
+        self.torque = lowpass(log.torque_nm, time, band)
         self._shares: dict[tuple[str, int, int], Array] = {}
         width = int(_SMEARED_PERIODS / (band * time))
-        self.kept = np.column_stack(
-            [_free(log.torque_nm[:, i], width) for i in range(self._n_axes)]
-        )[:: self.step]
+        self.kept = np.column_stack([_free(x, width) for x in log.torque_nm.T])
 
     def _states(self, speed: Array, angle: Array) -> tuple[Array, Array, Array]:
         """Return speed, angle, and the angle summed once more (for the integral of a cascade)."""
-        return speed, angle, _before(angle) * self._full_time
+        return speed, angle, _before(angle) * self.sample_time_s
 
     def share(self, kind: str, axis: int, source: int) -> Array:
         """Return what channel ``source`` adds to the command of ``axis``, (n,) [Nm], from 0.
@@ -96,11 +88,13 @@ class ControlLaw:
             speed, angle, area = (x[:, source] for x in states)
             kp, ki, kv = (self._gain(name, axis) for name in ("kp", "ki", "kv"))
             if "kv" in self._gains:
-                travel = angle if kind == "reference" else _before(speed) * self._full_time
+                travel = angle if kind == "reference" else _before(speed) * self.sample_time_s
                 out = kp * (speed + kv * angle) + ki * (travel + kv * area)
             else:
                 out = kp * speed + ki * angle
-            self._shares[key] = self._thin(out)
+            self._shares[key] = lowpass(
+                np.ascontiguousarray(out), self.sample_time_s, self._band_hz
+            )
         return self._shares[key]
 
     def _gain(self, name: str, axis: int) -> float:
@@ -108,23 +102,32 @@ class ControlLaw:
         return 0.0 if values is None else float(values[axis])
 
     def fit(
-        self, axis: int, reference: int, position: int, shifts: tuple[int, int, int] = (0, 0, 0)
+        self,
+        axis: int,
+        reference: int,
+        position: int,
+        *,
+        gains: int | None = None,
+        shifts: tuple[int, int, int] = (0, 0, 0),
     ) -> LawFit:
         """Regress the torque of ``axis`` on a reference and a position, axes from 0.
 
-        ``shifts``: samples (of this class) by which torque, reference and position are read later.
+        ``gains``: of which axis, its own by default; ``shifts``: samples by which torque, reference and
+        position are read later.
         """
+        own = axis if gains is None else gains
         reach = max(abs(s) for s in shifts)
         n = len(self.torque) - 2 * reach
 
         def read(x: Array, lag: int) -> Array:
-            return x[reach + lag : reach + lag + n]
+            return x[reach + lag : reach + lag + n : self.step]
 
+        kept = self.kept[reach + shifts[0] : reach + shifts[0] + n : self.step, axis]
         return _regress(
             read(self.torque[:, axis], shifts[0]),
-            read(self.share("reference", axis, reference), shifts[1]),
-            read(self.share("position", axis, position), shifts[2]),
-            self.kept[reach + shifts[0] : reach + shifts[0] + n, axis],
+            read(self.share("reference", own, reference), shifts[1]),
+            read(self.share("position", own, position), shifts[2]),
+            kept,
         )
 
 
