@@ -150,7 +150,10 @@ def explained(n_axes: int = 3) -> Diagnosis:
         ),
         findings=(
             Finding(
-                "parameter_at_edge", "axis2.damping", "axis2.damping ended +32 % off, at the bound"
+                "parameter_at_edge",
+                "flag",
+                "ended +32 % off, at the bound",
+                field="axis2.damping",
             ),
         ),
         settings=Settings().as_dict(load_robot("two_mass_axis")),
@@ -228,6 +231,6 @@ def hostile() -> Diagnosis:
         regime_maps={bad: base.regime_maps["speed"].assign_coords(relabel)},
         overlays=(replace(base.overlays[0], log=bad), *base.overlays[1:]),
         refit={bad: Interval(0.1, 0.0, 0.2)}, provenance={bad: {bad: bad}},
-        findings=(Finding("parameter_at_edge", bad, bad),),
+        findings=(Finding("parameter_at_edge", "flag", bad, field=bad),),
         remainder=Remainder(0.1, np.full(3, 0.1), (Where(2, 0.5, (1.0, 2.0), bad, bad),), bad),
     )  # fmt: skip

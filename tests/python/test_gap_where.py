@@ -191,7 +191,7 @@ def test_a_parameter_at_the_edge_is_a_finding(change, bound, words):
     )
     nominal = {"axis1.mass": 100.0, "axis2.mass": 50.0}
     found = parameters_at_edge(fitted, nominal, {"mass": 0.015})
-    assert [(f.kind, f.about) for f in found] == (
+    assert [(f.name, f.field) for f in found] == (
         [("parameter_at_edge", "axis1.mass")] if words else []
     )
     assert all(words in f.message and f"{100 * change:+.3g} %" in f.message for f in found)

@@ -23,7 +23,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     OUT.print(_gaps(found))
     _show_places(found)
     for finding in found.findings:
-        _say(f"finding: {finding.message}")
+        _say(f"finding: {finding}")
     if found.next_experiment is not None:
         _say(f"next experiment: {found.next_experiment}")
     if found.refit:

@@ -1,12 +1,13 @@
 """Diagnosis of the gap between a simulator and measured logs: where, which, how far."""
 
+from axisight.gap.faults import Finding, RefusedInputError
+from axisight.gap.gate import check_inputs
 from axisight.gap.pipeline import diagnose
 from axisight.gap.result import (
     AxisVerdict,
     Candidate,
     Cause,
     Diagnosis,
-    Finding,
     Gap,
     Interval,
     Overlay,
@@ -28,8 +29,10 @@ __all__ = [
     "Overlay",
     "Pooled",
     "Remainder",
+    "RefusedInputError",
     "Settings",
     "Where",
+    "check_inputs",
     "diagnose",
     "verdict_schema",
 ]

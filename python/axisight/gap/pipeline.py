@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.carried import carried_over
+from axisight.gap.faults import Finding
+from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
@@ -27,7 +29,7 @@ from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
-from axisight.logs import Case, Log, check_same_rate, read_case
+from axisight.logs import Case, Log, read_case
 from axisight.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -66,19 +68,23 @@ def diagnose(
 
     Raises
     ------
-    CaseError, LogError, RobotError, InputError for bad input.
+    CaseError, LogError, RobotError, InputError for bad input; RefusedInputError, which is the first two
+    of them, with the name of every fault, where logs or robot cannot be what they claim.
 
     """
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    progress("looking at the logs", 0, 1)
+    noted = pass_gate(machine, fit_logs, held_logs)
+    progress("looking at the logs", 1, 1)
     view = view_of(machine, fit_logs, held_logs, chosen)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs))
     out = _assemble(
-        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen
+        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen, noted
     )
     progress("measuring the gap", 1, 1)
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
@@ -108,22 +114,7 @@ def _inputs(
             f"{name}: expected at least one estimation and one validation log, "
             f"got {len(fit_logs)} and {len(held_logs)}"
         )
-    check_same_rate([*fit_logs, *held_logs])
-    for log in [*fit_logs, *held_logs]:
-        _check_log(machine, log)
     return name, machine, fit_logs, held_logs
-
-
-def _check_log(robot: Robot, log: Log) -> None:
-    if log.n_axes != robot.n_axes:
-        raise CaseError(
-            f"{log.source}: expected {robot.n_axes} axes as in the robot, got {log.n_axes}"
-        )
-    if abs(log.sample_time_s / robot.sample_time_s - 1) > 1e-4:
-        raise CaseError(
-            f"{log.source}: expected the robot's sample time {robot.sample_time_s:g} s, "
-            f"got {log.sample_time_s:g} s"
-        )
 
 
 def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:
@@ -201,6 +192,7 @@ def _assemble(
     error_logs: Sequence[ErrorLog],
     conclusion: Conclusion,
     settings: Settings,
+    noted: tuple[Finding, ...],
 ) -> Diagnosis:
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
@@ -247,7 +239,7 @@ def _assemble(
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
         remainder=remainder_of(reach.stages, gap, reach.left, settings),
-        findings=parameters_at_edge(fitted, nominal, tolerances),
+        findings=(*noted, *parameters_at_edge(fitted, nominal, tolerances)),
         settings=settings.as_dict(robot),
         provenance={
             "axisight_version": version("axisight"),

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from axisight.gap.carried import above_floor
+from axisight.gap.faults import Finding
 from axisight.gap.howfar import Stages
 from axisight.gap.model import Evidence
-from axisight.gap.result import Finding, Gap, Remainder
+from axisight.gap.result import Gap, Remainder
 from axisight.gap.settings import Settings
 from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
 
@@ -62,10 +63,10 @@ def parameters_at_edge(
         bound = (None, name) in fitted.at_bound
         if bound or abs(change) >= _EDGE * tolerance:
             message = (
-                f"{name} ended {100 * change:+.3g} % off the simulator's value, "
+                f"ended {100 * change:+.3g} % off the simulator's value, "
                 f"{abs(change) / tolerance:.1f} of its tolerance of {100 * tolerance:g} %"
                 f"{', at the bound of the fit' if bound else ''}: the value or the tolerance is "
                 f"wrong, or something that no effect stands for pulls at it."
             )
-            out.append(Finding("parameter_at_edge", name, message))
+            out.append(Finding("parameter_at_edge", "flag", message, field=name))
     return tuple(out)

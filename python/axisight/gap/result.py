@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.gap.faults import Finding
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
@@ -90,19 +91,6 @@ class Remainder:
     per_axis: Array
     where: tuple[Where, ...] = ()
     varies_with: str | None = None
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What a reader should know before believing the rest.
-
-    ``kind``: ``parameter_at_edge``, a parameter of the simulator that the re-fit took to the edge of
-    its tolerance; ``about``: what it is about, such as the parameter's name; ``message``: in words.
-    """
-
-    kind: str
-    about: str
-    message: str
 
 
 @dataclass(frozen=True)
@@ -187,6 +175,8 @@ class Diagnosis:
     ``significance`` (in standard errors). Band and bin coordinates are labels.
     ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
     the names of `Settings`.
+    ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
+    parameters that the re-fit took to the edge of their tolerance.
     """
 
     name: str
@@ -240,7 +230,7 @@ class Diagnosis:
             "refit": {name: _interval(change) for name, change in self.refit.items()},
             "ranking": [_ranked(c) for c in self.ranking],
             "checks": list(self.checks),
-            "findings": [asdict(f) for f in self.findings],
+            "findings": [f.to_dict() for f in self.findings],
             "settings": self.settings,
             "provenance": self.provenance,
         }

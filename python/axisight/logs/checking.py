@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,10 +11,11 @@ import numpy as np
 from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap
 from axisight.logs.findings import Finding
-from axisight.logs.gather import Gathered, gather
+from axisight.logs.gather import Channel, Gathered, gather
 from axisight.logs.log import Floats
 from axisight.logs.quality import check_signal
 from axisight.logs.reading import grid_of
+from axisight.logs.rows import check_rows
 from axisight.logs.unit_guess import check_units
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
@@ -63,7 +65,10 @@ def check_log(path: Path | str, columns: ColumnMap | Path | str | None = None) -
         findings.append(Finding("ok", "rate", f"uniform at {rate:.6g} Hz for {seconds:.6g} s"))
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("ok", name, "not a native column, not used") for name in found.unused]
-    findings += _look_at_signals(found)
+    findings += look_at_signals(found.signals, found.labels, _prismatic(found))
+    sound = all(finding.severity != "error" for finding in findings)
+    if sound and rate is not None and grid.stamps_s is None:
+        findings += check_rows(found.signals, found.labels, 1.0 / rate)
     if rate is not None and grid.stamps_s is None:
         findings += _look_at_units(found, 1.0 / rate)
     return LogReport(path, tuple(findings), rate, grid.n_samples, len(found.columns.axis))
@@ -73,14 +78,24 @@ def _usable(values: Floats | None) -> bool:
     return values is not None and values.size > 0 and bool(np.isfinite(values).all())
 
 
-def _look_at_signals(found: Gathered) -> list[Finding]:
+def _prismatic(found: Gathered) -> list[bool]:
+    return [axis.prismatic for axis in found.columns.axis]
+
+
+def look_at_signals(
+    signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], prismatic: Sequence[bool]
+) -> list[Finding]:
+    """Return findings about every signal (n,) for itself: constant, saturated, quantized.
+
+    `signals` and `labels` by field and axis from 0, in SI units; `prismatic` for each axis.
+    """
     findings = []
-    for channel, values in found.signals.items():
+    for channel, values in signals.items():
         field, axis = channel
-        unit = _UNITS[field][int(found.columns.axis[axis].prismatic)]
+        unit = _UNITS[field][int(prismatic[axis])]
         finite = values[np.isfinite(values)]  # gaps and NaN are reported apart
         if finite.size:
-            findings += check_signal(field, found.labels[channel], finite, unit)
+            findings += check_signal(field, labels[channel], finite, unit, axis + 1)
     return findings
 
 

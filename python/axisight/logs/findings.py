@@ -14,11 +14,17 @@ Severity = Literal["ok", "warning", "error"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One observation: how bad, about which column, and what was expected and seen."""
+    """One observation: how bad, about which column, and what was expected and seen.
+
+    `name` is the stable name of a fault that has one (`rows_missing`, `samples_frozen`, ...), empty
+    otherwise; `axis` counts from 1, None for what concerns all axes or none.
+    """
 
     severity: Severity
     column: str
     message: str
+    name: str = ""
+    axis: int | None = None
 
 
 def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
@@ -27,4 +33,5 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
     if not errors:
         return
     more = f" (and {len(errors) - 1} more, see check_log)" if len(errors) > 1 else ""
-    raise LogError(f"{path}: {errors[0].column}: {errors[0].message}{more}")
+    named = f" [{errors[0].name}]" if errors[0].name else ""
+    raise LogError(f"{path}: {errors[0].column}: {errors[0].message}{named}{more}")

@@ -30,9 +30,9 @@ class Grid:
     findings: list[Finding] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def error(self, column: str, message: str) -> None:
-        """Note an error."""
-        self.findings.append(Finding("error", column, message))
+    def error(self, column: str, message: str, name: str) -> None:
+        """Note an error of a stable name."""
+        self.findings.append(Finding("error", column, message, name))
 
 
 def make_grid(
@@ -64,7 +64,9 @@ def make_grid(
         duration = grid.n_samples * grid.sample_time_s
         if duration < SHORTEST_S * (1.0 - 1e-6):
             grid.error(
-                label, f"expected at least {SHORTEST_S:g} s of samples, got {duration:.6g} s"
+                label,
+                f"expected at least {SHORTEST_S:g} s of samples, got {duration:.6g} s",
+                "log_too_short",
             )
     return grid
 
@@ -72,12 +74,14 @@ def make_grid(
 def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
     """Check that stamps are finite and increase strictly."""
     if time_s.size < 2:
-        grid.error(label, f"expected at least 2 time stamps, got {time_s.size}")
+        grid.error(label, f"expected at least 2 time stamps, got {time_s.size}", "log_too_short")
         return False
     bad = np.flatnonzero(~np.isfinite(time_s))
     if bad.size:
         grid.error(
-            label, f"expected finite time stamps, got {bad.size} NaN/inf, first at index {bad[0]}"
+            label,
+            f"expected finite time stamps, got {bad.size} NaN/inf, first at index {bad[0]}",
+            "not_finite",
         )
         return False
     back = np.flatnonzero(np.diff(time_s) <= 0)
@@ -87,6 +91,7 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
             label,
             f"expected strictly increasing time, got {back.size} steps that do not increase, first "
             f"at index {first + 1} ({time_s[first]:.9g} s then {time_s[first + 1]:.9g} s)",
+            "time_not_increasing",
         )
         return False
     return True
@@ -104,6 +109,7 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
             label,
             f"expected uniform sampling, got {gaps.size} gaps ({lost} samples missing), first "
             f"after index {first} ({steps[first]:.6g} s instead of {typical:.6g} s)",
+            "rows_missing",
         )
         return
     mean = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
@@ -118,6 +124,7 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
             f"expected uniform sampling within {JITTER_SAMPLES:.0%} of a sample, got a step of "
             f"{steps[worst]:.6g} s instead of {mean:.6g} s after index {worst}; if the samples are "
             "in truth uniform, give sample_rate_hz and no time column; if not, give resample_hz",
+            "time_jitter",
         )
     elif jitter.max() > 1e-6:
         grid.notes.append(
@@ -151,6 +158,7 @@ def _agree(grid: Grid, rate_hz: float, label: str) -> None:
         grid.error(
             label,
             f"expected time stamps at sample_rate_hz = {rate_hz:g} Hz, got {measured:.6g} Hz",
+            "sample_time_differs",
         )
     else:
         grid.sample_time_s = 1.0 / rate_hz

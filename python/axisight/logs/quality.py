@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from axisight.logs.findings import Finding
+from axisight.logs.findings import Finding, Severity
 from axisight.logs.log import Floats
 
 SATURATED_SAMPLES = 5
@@ -64,14 +64,17 @@ def quantization(values: Floats) -> Quantization | None:
     return Quantization(step=step, bits=math.log2(span / step + 1.0))
 
 
-def check_signal(field: str, label: str, values: Floats, unit: str) -> list[Finding]:
-    """Return findings about one finite signal (n,) in SI `unit`.
+def check_signal(
+    field: str, label: str, values: Floats, unit: str, axis: int | None = None
+) -> list[Finding]:
+    """Return findings about one finite signal (n,) in SI `unit`, of an `axis` from 1.
 
     Saturation is looked for in torque only: positions rest and references run at their extremes.
     """
     if is_constant(values):
         message = f"constant at {values[0]:.6g} {unit} over all {values.size} samples"
-        return [Finding("ok" if field == "temperature" else "warning", label, message)]
+        severity: Severity = "ok" if field == "temperature" else "warning"
+        return [Finding(severity, label, message, "channel_constant", axis)]
     findings = []
     if field == "torque":
         for name, runs, extreme in zip(
@@ -85,12 +88,13 @@ def check_signal(field: str, label: str, values: Floats, unit: str) -> list[Find
                     f"saturates: {runs} times at least {SATURATED_SAMPLES} samples at its {name} "
                     f"{extreme:.6g} {unit}"
                 )
-                findings.append(Finding("warning", label, message))
+                findings.append(Finding("warning", label, message, "torque_saturated", axis))
     found = quantization(values)
     if found is not None:
         coarse = 2.0**found.bits < COARSE_LEVELS and field != "temperature"
         message = (
             f"quantized in steps of {found.step:.4g} {unit} ({found.bits:.1f} bits over its range)"
         )
-        findings.append(Finding("warning" if coarse else "ok", label, message))
+        name = f"quantized_{field}" if coarse else ""
+        findings.append(Finding("warning" if coarse else "ok", label, message, name, axis))
     return findings

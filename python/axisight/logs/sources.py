@@ -46,7 +46,7 @@ def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise LogError(
             f"{path}: expected a readable {suffix[1:]} file, got one that is truncated, corrupt or "
-            f"of another format ({reason})"
+            f"of another format ({reason}) [file_unreadable]"
         ) from error
 
 

@@ -10,7 +10,7 @@ from axisight.errors import LogError
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Gathered
 from axisight.logs.grid import RATE_TOLERANCE
-from axisight.logs.log import Log
+from axisight.logs.log import Floats, Log
 
 
 def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
@@ -18,7 +18,11 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
     findings = []
     got = len(found.columns.axis)
     if n_axes is not None and got != n_axes:
-        findings.append(Finding("error", "axis", f"expected {n_axes} axes, got columns for {got}"))
+        findings.append(
+            Finding(
+                "error", "axis", f"expected {n_axes} axes, got columns for {got}", "axes_differ"
+            )
+        )
     with_ref = [
         number for number, axis in enumerate(found.columns.axis, 1) if axis.velocity_ref is not None
     ]
@@ -30,6 +34,8 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
                 f"velocity_ref_{missing[0]}",
                 f"expected a velocity reference for all {got} axes or for none, got it for axes "
                 f"{', '.join(map(str, with_ref))}",
+                "reference_missing",
+                missing[0],
             )
         )
     return findings
@@ -54,18 +60,21 @@ def check_finite(found: Gathered) -> list[Finding]:
     """Check every signal for NaN and infinities."""
     findings = []
     for channel, values in found.signals.items():
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            nan = int(np.isnan(values).sum())
-            findings.append(
-                Finding(
-                    "error",
-                    found.labels[channel],
-                    f"expected finite values, got {nan} NaN and {bad.size - nan} inf among "
-                    f"{values.size}, first at index {bad[0]}",
-                )
-            )
+        findings += not_finite(values, found.labels[channel], channel[1] + 1)
     return findings
+
+
+def not_finite(values: Floats, label: str, axis: int) -> list[Finding]:
+    """Return a finding if `values` (n,) of an axis (from 1) hold NaN or infinities."""
+    bad = np.flatnonzero(~np.isfinite(values))
+    if not bad.size:
+        return []
+    nan = int(np.isnan(values).sum())
+    message = (
+        f"expected finite values, got {nan} NaN and {bad.size - nan} inf among {values.size}, "
+        f"first at index {bad[0]}"
+    )
+    return [Finding("error", label, message, "not_finite", axis)]
 
 
 def check_same_rate(logs: Sequence[Log]) -> None:
@@ -74,5 +83,14 @@ def check_same_rate(logs: Sequence[Log]) -> None:
         if abs(log.sample_time_s / logs[0].sample_time_s - 1.0) > RATE_TOLERANCE:
             raise LogError(
                 f"{log.source}: sample rate: expected {logs[0].sample_rate_hz:.6g} Hz as in "
-                f"{logs[0].name}, got {log.sample_rate_hz:.6g} Hz"
+                f"{logs[0].name}, got {log.sample_rate_hz:.6g} Hz{time_unit(log, logs[0])} "
+                "[rates_differ]"
             )
+
+
+def time_unit(log: Log, other: Log) -> str:
+    """Return a question about the unit of time if two sample times differ by a thousand or a million."""
+    for factor, unit in ((1e3, "ms"), (1e6, "us")):
+        if abs(log.sample_time_s / other.sample_time_s / factor - 1.0) < 0.01:
+            return f": time in {unit}?"
+    return ""

@@ -106,7 +106,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "gap_rows": _gap_rows(diagnosis),
         "pooled": diagnosis.gap.pooled is not None,
         "values": _values(diagnosis.causes),
-        "findings": [finding.message for finding in diagnosis.findings],
+        "findings": [str(finding) for finding in diagnosis.findings],
         "where": _places(diagnosis.where),
         "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "maps": _maps(gap_maps(diagnosis)),

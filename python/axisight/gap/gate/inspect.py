@@ -1,0 +1,78 @@
+"""All checks in their order: what later ones rest on first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.faults import Finding, RefusedInputError, refused
+from axisight.gap.gate.closed_loop import check_closed_loop
+from axisight.gap.gate.copies import check_copies
+from axisight.gap.gate.inverse_checks import check_inverse
+from axisight.gap.gate.log_only import check_log_alone
+from axisight.gap.gate.machine import check_machine
+from axisight.gap.gate.noise_level import check_noise
+from axisight.gap.gate.start import check_start
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+def pass_gate(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+) -> tuple[Finding, ...]:
+    """Return what is to be said of a simulator and its logs; raise RefusedInputError if they cannot be.
+
+    Arguments as in :func:`check_inputs`.
+    """
+    findings = check_inputs(robot, estimation, validation)
+    if refused(findings):
+        raise RefusedInputError(findings)
+    return findings
+
+
+def check_inputs(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+) -> tuple[Finding, ...]:
+    """Return every fault of a simulator and its logs that shows without a fit.
+
+    ``robot``: the simulator; ``estimation``, ``validation``: logs of it. First what the robot file says
+    of all logs, then each log for itself, then logs against one another, then against the simulator:
+    by the controller's law in closed loop, by inverse dynamics otherwise. What is refused at one of
+    these stages is not taken further, for what follows rests on it.
+    """
+    logs = [*estimation, *validation]
+    found = check_machine(robot, logs)
+    if refused(found):
+        return tuple(found)
+    for log in logs:
+        found += check_log_alone(log)
+    found += check_copies(estimation, validation)
+    if refused(found):
+        return tuple(found)
+    found += _references(robot, logs)
+    closed = is_closed_loop(robot, logs)
+    if closed:
+        for log in logs:
+            found += check_closed_loop(robot, log)
+    else:
+        found += check_inverse(robot, logs)
+    if refused(found):
+        return tuple(found)
+    if closed:
+        found += check_start(robot, logs)
+    return (*found, *check_noise(robot, logs))
+
+
+def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Flag references missing in some logs: the comparison falls back to inverse dynamics."""
+    missing = [log for log in logs if log.velocity_ref_rad_s is None]
+    if robot.controller_kind == "none" or not missing or len(missing) == len(logs):
+        return []
+    message = (
+        "expected velocity references as in the other logs, got none: all logs are compared by "
+        "inverse dynamics, without the controller; add them or leave this log out"
+    )
+    return [
+        Finding("reference_missing", "flag", message, log.name, None, "velocity_ref")
+        for log in missing
+    ]

@@ -1,0 +1,144 @@
+"""What is wrong with one log for itself: what ``axisight check`` knows, on a log already read."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.faults import GateSeverity, Finding
+from axisight.logs import Finding, Log
+from axisight.logs.checking import look_at_signals
+from axisight.logs.grid import make_grid
+from axisight.logs.native import NATIVE_STEMS
+from axisight.logs.rows import check_rows
+from axisight.logs.unit_guess import check_units
+from axisight.logs.validate import not_finite
+from axisight.records.clipping import clipped_samples
+
+Array = NDArray[np.float64]
+Channel = tuple[str, int]
+
+# Log field -> attribute; the optional ones may be NaN on axes without the sensor.
+_REQUIRED = {"position": "position_rad", "torque": "torque_nm"}
+_REFERENCE = {"velocity_ref": "velocity_ref_rad_s"}
+_OPTIONAL = {"velocity": "velocity_rad_s"}
+# A dead channel of an axis whose reference travels this far [rad, or m] is no axis at rest: a
+# thousand times the noise of a usual motor sensor.
+_TRAVEL = 0.01
+
+
+def channels(log: Log) -> tuple[dict[Channel, Array], dict[Channel, str]]:
+    """Return the signals (n,) of a log by field and axis from 0, and the names of their columns."""
+    signals: dict[Channel, Array] = {}
+    for field, attribute in {**_REQUIRED, **_REFERENCE, **_OPTIONAL}.items():
+        values = getattr(log, attribute)
+        for axis in range(log.n_axes if values is not None else 0):
+            column = np.asarray(values[:, axis])
+            if field not in _OPTIONAL or np.isfinite(column).all():
+                signals[field, axis] = column
+    labels = {(field, axis): f"{NATIVE_STEMS[field][0]}_{axis + 1}" for field, axis in signals}
+    return signals, labels
+
+
+def check_log_alone(log: Log) -> list[Finding]:
+    """Return findings about time stamps, bad values, rows, limits and dead channels of a log."""
+    grid = make_grid(log.time_s, 1.0 / log.sample_time_s, log.n_samples, label="time_s")
+    signals, labels = channels(log)
+    wrong = [*grid.findings]
+    for channel, values in signals.items():
+        wrong += [
+            _reference_missing(f, values)
+            for f in not_finite(values, labels[channel], channel[1] + 1)
+        ]
+    if any(finding.severity == "error" for finding in wrong):
+        return [named(finding, log) for finding in wrong]
+    slides = [kind == "prismatic" for kind in log.axis_kinds]
+    looked = [
+        *look_at_signals(signals, labels, slides),
+        *check_rows(signals, labels, log.sample_time_s),
+    ]
+    out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
+    out = [_dead(finding, log) for finding in out if not _idle_reference(finding)]
+    return [*out, *_clipped(log, labels), *_velocity(log, slides)]
+
+
+def named(finding: Finding, log: Log) -> Finding:
+    """Return a finding about a log as one of the gate; an error is refused."""
+    severity: GateSeverity = "refuse" if finding.severity == "error" else "flag"
+    name = finding.name or "not_finite"
+    return Finding(name, severity, finding.message, log.name, finding.axis, finding.column)
+
+
+def _reference_missing(finding: Finding, values: Array) -> Finding:
+    """A reference that is NaN throughout is one that is missing."""
+    if not finding.column.startswith("velocity_ref") or not np.isnan(values).all():
+        return finding
+    message = (
+        "expected a velocity reference for all axes or for none, got NaN only: write the reference "
+        "of the axis, zero if it rests"
+    )
+    return Finding("error", finding.column, message, "reference_missing", finding.axis)
+
+
+def _idle_reference(finding: Finding) -> bool:
+    """A reference may be constant, or of few levels: it is a choice, not a measurement."""
+    return finding.field.startswith("velocity_ref") and finding.severity == "flag"
+
+
+def _dead(finding: Finding, log: Log) -> Finding:
+    """Refuse a constant channel of an axis that moves, or is told to."""
+    if finding.name != "channel_constant" or finding.axis is None:
+        return finding
+    axis = finding.axis - 1
+    travel = 0.0
+    if finding.field.startswith("torque"):
+        travel = float(np.ptp(log.position_rad[:, axis]))
+    elif finding.field.startswith("position") and log.velocity_ref_rad_s is not None:
+        path = np.cumsum(log.velocity_ref_rad_s[:, axis]) * log.sample_time_s
+        travel = float(np.ptp(path))
+    if travel <= _TRAVEL:
+        return finding
+    message = (
+        f"expected a signal, got one that is {finding.message} while the axis travels "
+        f"{travel:.4g} rad: the channel is dead or was not recorded"
+    )
+    return Finding(finding.name, "refuse", message, log.name, finding.axis, finding.field)
+
+
+def _clipped(log: Log, labels: dict[Channel, str]) -> list[Finding]:
+    out = []
+    for axis in range(log.n_axes):
+        count = clipped_samples(np.ascontiguousarray(log.position_rad[:, axis]))
+        if count:
+            message = (
+                f"expected a motion, got {count} samples cut at the largest or smallest position "
+                "though the axis was about to go on: range of the sensor, or an end stop?"
+            )
+            column = labels["position", axis]
+            out.append(Finding("position_clipped", "flag", message, log.name, axis + 1, column))
+    return out
+
+
+def _velocity(log: Log, slides: list[bool]) -> list[Finding]:
+    """Flag a measured velocity that is not the position's: a diagnosis does not use it."""
+    out = []
+    measured = log.velocity_rad_s
+    for axis in range(log.n_axes if measured is not None else 0):
+        velocity = measured[:, axis] if measured is not None else None
+        if velocity is None or not np.isfinite(velocity).all():
+            continue
+        column = f"{NATIVE_STEMS['velocity'][0]}_{axis + 1}"
+        position = np.ascontiguousarray(log.position_rad[:, axis])
+        for finding in check_units(
+            position,
+            np.ascontiguousarray(velocity),
+            column,
+            log.sample_time_s,
+            prismatic=slides[axis],
+        ):
+            if finding.severity != "ok" and finding.column == column:
+                message = f"{finding.message}; the motion is taken from the position"
+                out.append(
+                    Finding("velocity_inconsistent", "flag", message, log.name, axis + 1, column)
+                )
+    return out

@@ -1,0 +1,58 @@
+"""The robot file against the logs: axes, sample time, gears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.gap.faults import Finding
+from axisight.logs import Log
+from axisight.logs.grid import RATE_TOLERANCE
+from axisight.robot import Robot
+
+# Joint angle per motor angle of a gear that speeds up. One to five exists in principle; beyond, it
+# is the ratio as catalogues print it (50:1 to 300:1).
+_SUSPICIOUS_RATIO = 1.0 + 1e-9
+_IMPOSSIBLE_RATIO = 5.0
+
+
+def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Return findings about axes, sample times and gear ratios."""
+    out = _gears(robot)
+    for log in logs:
+        if log.n_axes != robot.n_axes:
+            message = f"expected {robot.n_axes} axes as in the robot, got {log.n_axes}"
+            out.append(Finding("axes_differ", "refuse", message, log.name, None, "axis"))
+        factor = log.sample_time_s / robot.sample_time_s
+        if abs(factor - 1.0) > RATE_TOLERANCE:
+            out.append(_another_rate(robot, log, factor))
+    return out
+
+
+def _another_rate(robot: Robot, log: Log, factor: float) -> Finding:
+    name, unit = "sample_time_differs", ""
+    for known, known_name, words in ((1e3, "time_in_ms", "ms"), (1e6, "time_in_us", "us")):
+        if abs(factor / known - 1.0) < 0.01:
+            name, unit = known_name, f": time in {words}? It has to be in s"
+    message = (
+        f"expected the robot's sample time {robot.sample_time_s:g} s, got {log.sample_time_s:g} s"
+        f"{unit}"
+    )
+    return Finding(name, "refuse", message, log.name, None, "time_s")
+
+
+def _gears(robot: Robot) -> list[Finding]:
+    out = []
+    for axis, (ratio, slides) in enumerate(
+        zip(robot.gear_ratio, robot.axis_is_prismatic, strict=True), start=1
+    ):
+        if slides or abs(ratio) <= _SUSPICIOUS_RATIO:
+            continue
+        message = (
+            f"expected joint angle per motor angle, at most 1 (0.00446 for a gear of 224:1), got "
+            f"{ratio:g}: write {1 / ratio:.6g}?"
+        )
+        severity = "refuse" if abs(ratio) > _IMPOSSIBLE_RATIO else "flag"
+        out.append(
+            Finding("gear_ratio_inverted", severity, message, None, axis, "gear_ratio")  # type: ignore[arg-type]
+        )
+    return out

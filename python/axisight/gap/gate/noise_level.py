@@ -1,0 +1,51 @@
+"""The floor before it is used: noise and steps of the positions against the robot file's sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from axisight.gap.faults import Finding
+from axisight.gap.noise import position_noise_std
+from axisight.logs import Log
+from axisight.logs.quality import quantization
+from axisight.robot import Robot
+
+# Sensors of one type differ by less; steps are felt from where their noise reaches the sensor's.
+_LOUD = 5.0
+_STEP_NOISE = 1.0 / np.sqrt(12.0)
+# Without a stated noise: fewer levels over the range than an encoder of twelve bits has.
+_FEW_BITS = 12.0
+
+
+def check_noise(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Return flags about positions noisier or coarser than the sensor of the robot file."""
+    stated = robot.position_noise_std
+    out = []
+    for log in logs:
+        for axis in range(log.n_axes):
+            column = f"position_{axis + 1}"
+            found = quantization(log.position_rad[:, axis])
+            step = 0.0 if found is None else found.step
+            coarse = step * _STEP_NOISE > stated if stated > 0 else False
+            few = found is not None and stated <= 0 and found.bits < _FEW_BITS
+            if coarse or few:
+                message = (
+                    f"expected the position's noise of {stated:.3g} rad, got steps of {step:.4g} rad: "
+                    "what is finer does not show, and the floor rises; log the full resolution"
+                )
+                out.append(
+                    Finding("quantized_position", "flag", message, log.name, axis + 1, column)
+                )
+        if stated <= 0:
+            continue
+        measured = position_noise_std([log])
+        for axis in np.flatnonzero(measured > _LOUD * stated).tolist():
+            message = (
+                f"expected noise of {stated:.3g} rad as in the robot file, got {measured[axis]:.3g} rad: "
+                "the floor of the diagnosis rises with it; look for glitches and a coarse encoder"
+            )
+            column = f"position_{axis + 1}"
+            out.append(Finding("position_noise_large", "flag", message, log.name, axis + 1, column))
+    return out

@@ -1,0 +1,54 @@
+"""Factors that are units: which name a channel gets that is that many times too large."""
+
+from __future__ import annotations
+
+import math
+
+# Exact enough for a ratio of filtered signals, far enough from any other unit.
+_TOLERANCE = 0.04
+_DEG = 180.0 / math.pi
+
+_POSITION = {
+    "position_in_degrees": _DEG,
+    "position_in_revolutions": 0.5 / math.pi,
+    "position_in_mrad": 1000.0,
+}
+_VELOCITY_REF = {
+    "velocity_ref_in_deg_s": _DEG,
+    "velocity_ref_in_rpm": 30.0 / math.pi,
+    "velocity_ref_in_rev_s": 0.5 / math.pi,
+    "velocity_ref_in_mrad_s": 1000.0,
+}
+_TORQUE = {"torque_in_mnm": 1000.0, "torque_in_knm": 0.001}
+_LEAST_COUNT_BITS = 8
+_MOST_COUNT_BITS = 30
+
+
+def scale_name(field: str, factor: float, gear_ratio: float) -> str:
+    """Return the name of a channel ``factor`` times too large.
+
+    ``field``: ``position``, ``velocity_ref`` or ``torque``; ``gear_ratio``: joint angle per motor
+    angle of its axis. An unknown factor gives ``position_scaled`` and so on.
+    """
+    factor, ratio = abs(factor), abs(gear_ratio)
+    tables = {"position": _POSITION, "velocity_ref": _VELOCITY_REF, "torque": _TORQUE}
+    for name, known in tables[field].items():
+        if abs(factor / known - 1.0) < _TOLERANCE:
+            return name
+    joint_side = 1.0 / ratio if field == "torque" else ratio
+    if abs(math.log(joint_side)) > 0.1 and abs(factor / joint_side - 1.0) < _TOLERANCE:
+        return f"{field}_joint_side"
+    if field == "position" and _is_count(factor):
+        return "position_in_counts"
+    return f"{field}_scaled"
+
+
+def _is_count(factor: float) -> bool:
+    """Whether a turn has a power of two, or a whole thousand, of units."""
+    per_turn = 2 * math.pi * factor
+    bits = math.log2(per_turn) if per_turn > 0 else 0.0
+    if not _LEAST_COUNT_BITS <= bits <= _MOST_COUNT_BITS:
+        return False
+    thousands = per_turn / 1000.0
+    near = abs(thousands - round(thousands)) < 0.01 * thousands and thousands < 50
+    return abs(2.0 ** (bits - round(bits)) - 1.0) < _TOLERANCE / 2 or near

@@ -1,0 +1,57 @@
+"""Where a closed-loop log starts, and the torque that holds it, against the robot at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from axisight.gap.faults import Finding
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import simulate
+
+# Joint angle between the start of a log and the operating point that changes gravity by a few per
+# cent; a tenth of it is elastic deflection under another load.
+_OFFSET_RAD = 0.02
+# The mean torque of an axis counts as gravity's where it exceeds this share of the torque's rms;
+# turned round, it is that of the simulator within a factor of two (a payload, its absence).
+_GRAVITY_SHARE = 0.5
+_TURNED_ROUND = (-2.0, -0.5)
+
+
+def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Return findings about the first position of the logs, and the sign of gravity."""
+    out = []
+    rest = robot.equilibrium()["motor_angle_rad"].values
+    for log in logs:
+        off = (log.position_rad[0] - rest) * robot.gear_ratio
+        for axis in np.flatnonzero(np.abs(off) > _OFFSET_RAD):
+            message = (
+                f"expected a log that starts at the robot's operating point, got a start "
+                f"{off[axis]:.4g} rad (joint side) beside it: the simulator starts at the operating "
+                "point; put the pose into the robot file, or subtract the offset of the encoder"
+            )
+            column = f"position_{axis + 1}"
+            out.append(Finding("position_offset", "flag", message, log.name, int(axis) + 1, column))
+    return out + _gravity(robot, logs[0])
+
+
+def _gravity(robot: Robot, log: Log) -> list[Finding]:
+    """Compare mean torques: friction and motion leave little in a mean, gravity all it has."""
+    simulated = simulate(robot, log.velocity_ref_rad_s, method="rk4")["torque_cmd_nm"].values
+    if len(simulated) < log.n_samples or not np.isfinite(simulated).all():
+        return []
+    mean, expected = log.torque_nm.mean(axis=0), simulated.mean(axis=0)
+    rms = np.sqrt((simulated**2).mean(axis=0))
+    holds = np.abs(expected) > _GRAVITY_SHARE * rms
+    ratio = mean[holds] / expected[holds]
+    if not holds.any() or not np.all((ratio > _TURNED_ROUND[0]) & (ratio < _TURNED_ROUND[1])):
+        return []
+    axes = ", ".join(str(i + 1) for i in np.flatnonzero(holds))
+    message = (
+        f"expected mean torques as the simulator's, got them with the other sign on every axis that "
+        f"holds a load ({axes}; factors {', '.join(f'{r:.3g}' for r in ratio)}): turn the gravity of "
+        "the robot file round, or the torques of the log"
+    )
+    return [Finding("gravity_flipped", "refuse", message, None, None, "gravity")]

@@ -1,0 +1,183 @@
+"""Positions that jump as no machine moves: rows missing, out of order, turns cut off, glitches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.logs.findings import Finding
+from axisight.logs.frozen import frozen_stretches
+from axisight.logs.gather import Channel
+from axisight.logs.log import Floats
+from axisight.logs.spikes import isolated_spikes
+
+Ints = NDArray[np.int64]
+
+# A speed is compared with the median of seven neighbours. No drive changes the speed of an axis by
+# three tenths of its top speed within one sample of a log that resolves the motion; for logs that
+# hardly do, and for noise, the usual deviation counts (twenty times the median: 13 standard
+# deviations).
+_NEIGHBOURS = 7
+_SHARE_OF_TOP = 0.3
+_USUAL = 20.0
+# Jumps this near to one another are one event; this many in it are rows out of order.
+_EVENT_SAMPLES = 15
+_OUT_OF_ORDER = 4
+# A full turn, up to the motion within one sample.
+_TURN_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A step of a position that its speed does not explain: after sample `index`, of axis from 0."""
+
+    axis: int
+    index: int
+    size: float
+    speed: float
+    """Median step per sample around it."""
+
+
+def check_jumps(
+    signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
+) -> list[Finding]:
+    """Return findings about jumps of positions, and single wrong samples of position and torque.
+
+    `signals` are finite, (n,) each. Jumps at the end of a frozen stretch belong to it.
+    """
+    findings = []
+    jumps: list[Jump] = []
+    tops: dict[int, float] = {}
+    for channel, values in signals.items():
+        field, axis = channel
+        if field not in ("position", "torque"):
+            continue
+        spikes = isolated_spikes(values)
+        if len(spikes):
+            findings.append(_spiked(channel, labels[channel], values, spikes, sample_time_s))
+        if field == "position":
+            known = [end for _, end in frozen_stretches(values)]
+            own, tops[axis] = position_jumps(values, axis, [*spikes.tolist(), *known])
+            jumps += own
+    return findings + _explained(jumps, tops, signals, labels, sample_time_s)
+
+
+def _spiked(
+    channel: Channel, label: str, values: Floats, spikes: Ints, sample_time_s: float
+) -> Finding:
+    field, axis = channel
+    k = int(spikes[0])
+    size = abs(values[k] - 0.5 * (values[k - 1] + values[k + 1]))
+    message = (
+        f"expected a signal without spikes, got {len(spikes)} single samples far off, first at "
+        f"{k * sample_time_s:.4g} s by {size:.4g}: replace them by their neighbours' mean, or cut "
+        "the log there"
+    )
+    severity = "error" if field == "position" else "warning"
+    return Finding(severity, label, message, f"{field}_spike", axis + 1)  # type: ignore[arg-type]
+
+
+def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Jump], float]:
+    """Return the jumps of a position (n,), but those near samples `known`, and its top step."""
+    step = np.diff(values)
+    usual = scipy.ndimage.median_filter(step, _NEIGHBOURS, mode="nearest")
+    off = step - usual
+    top = float(np.quantile(np.abs(usual), 0.999))
+    least = max(_SHARE_OF_TOP * top, _USUAL * float(np.median(np.abs(off))), 1e-9 * np.ptp(values))
+    found = np.flatnonzero(np.abs(off) > least)
+    if known:
+        near = np.abs(found[:, None] - np.array(known)[None]).min(axis=1) <= 2
+        found = found[~near]
+    return [Jump(axis, int(k), float(off[k]), float(usual[k])) for k in found], top
+
+
+def _explained(
+    jumps: list[Jump],
+    tops: Mapping[int, float],
+    signals: Mapping[Channel, Floats],
+    labels: Mapping[Channel, str],
+    sample_time_s: float,
+) -> list[Finding]:
+    wrapped = {a for a in tops if _wraps(signals["position", a], [j for j in jumps if j.axis == a])}
+    findings = [_wrapped(a, labels["position", a], signals["position", a]) for a in sorted(wrapped)]
+    positions = {a: signals["position", a] for a in tops if a not in wrapped}
+    named: dict[str, list[list[Jump]]] = {}
+    for event in _events([j for j in jumps if j.axis not in wrapped]):
+        named.setdefault(_name_of(event, tops, positions), []).append(event)
+    for name, members in named.items():
+        first = members[0][0]
+        lost = [round(abs(j.size / j.speed)) for e in members for j in e[:1] if j.speed]
+        words = {
+            "rows_missing": (
+                f"got {len(members)} jumps that take about {sum(lost)} rows: rows are missing that "
+                "the time stamps do not show; export the log again, with its own time stamps"
+            ),
+            "rows_shuffled": "got rows out of order; sort them by the time they were taken at",
+            "position_jumps": (
+                f"got {len(members)} jumps of this axis alone, of {abs(first.size):.4g}: a counter "
+                "was reset or lost steps; cut the log there"
+            ),
+        }[name]
+        message = (
+            f"expected a motion, {words} (first at {first.index * sample_time_s:.4g} s on "
+            f"axis {first.axis + 1})"
+        )
+        axis = first.axis + 1 if name == "position_jumps" else None
+        findings.append(Finding("error", labels["position", first.axis], message, name, axis))
+    return findings
+
+
+def _wraps(values: Floats, jumps: list[Jump]) -> bool:
+    """Whether all jumps of a position that stays within a turn are full turns."""
+    if not jumps or np.ptp(values) > 2 * np.pi * (1 + _TURN_TOLERANCE):
+        return False
+    sizes = np.abs([j.size for j in jumps])
+    return bool(np.all(np.abs(sizes / (2 * np.pi) - 1) < _TURN_TOLERANCE))
+
+
+def _wrapped(axis: int, label: str, values: Floats) -> Finding:
+    message = (
+        f"expected a position that counts turns, got one that stays within {values.min():.4g} and "
+        f"{values.max():.4g} rad and jumps by whole turns: unwrap it (numpy.unwrap)"
+    )
+    return Finding("error", label, message, "position_wrapped", axis + 1)
+
+
+def _events(jumps: list[Jump]) -> list[list[Jump]]:
+    """Return jumps in groups that lie together in time."""
+    out: list[list[Jump]] = []
+    for jump in sorted(jumps, key=lambda j: (j.index, -abs(j.size))):
+        if out and jump.index - out[-1][-1].index <= _EVENT_SAMPLES:
+            out[-1].append(jump)
+        else:
+            out.append([jump])
+    return out
+
+
+def _name_of(event: list[Jump], tops: Mapping[int, float], positions: Mapping[int, Floats]) -> str:
+    places = {j.index for j in event}
+    axes = {j.axis for j in event}
+    signs = {np.sign(j.size) for j in event if j.axis == event[0].axis}
+    if len(places) >= _OUT_OF_ORDER and len(signs) == 2:
+        return "rows_shuffled"
+    if all(j.size * j.speed < 0 for j in event):
+        # Against the motion: what follows was taken before.
+        return "rows_shuffled" if len(axes) > 1 else "position_jumps"
+    return (
+        "position_jumps" if len(axes) == 1 and _alone(event[0], tops, positions) else "rows_missing"
+    )
+
+
+def _alone(jump: Jump, tops: Mapping[int, float], positions: Mapping[int, Floats]) -> bool:
+    """Whether rows that were missing would have shown on another axis too, which was in motion."""
+    rows = abs(jump.size) / max(abs(jump.speed), 1e-3 * tops[jump.axis])
+    around = slice(max(0, jump.index - _NEIGHBOURS), jump.index + _NEIGHBOURS)
+    return any(
+        rows * abs(float(np.median(np.diff(values[around])))) > 2 * _SHARE_OF_TOP * tops[axis]
+        for axis, values in positions.items()
+        if axis != jump.axis
+    )

@@ -1,0 +1,56 @@
+"""Single samples that leave a signal and come back: bits lost on a bus, glitches of a sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.logs.log import Floats
+
+# What one wrong sample leaves when every sample is compared with the cubic through its four
+# neighbours. A step, a corner or a pulse of a real motion leaves another pattern (a corner
+# correlates with this one by 0.976).
+_PATTERN = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
+_ALIKE = 0.985
+# Gaussian noise reaches neither: 15 standard deviations around it, five times the largest deviation
+# of the log but for five hundredths of a per cent of its samples, or as many as two spikes touch.
+_LOCAL = 15.0
+_WHOLE = 5.0
+_LARGEST = 0.0005
+_TOUCHED = 10
+_NEIGHBOURS = 101
+# More than that is how the signal is (a coarse encoder toggles), not an accident.
+_MOST = 20
+
+
+def isolated_spikes(values: Floats) -> NDArray[np.int64]:
+    """Return the indices of single wrong samples of `values` (n,); none if there are many."""
+    none = np.zeros(0, dtype=np.int64)
+    if len(values) < 2 * _NEIGHBOURS:
+        return none
+    off = np.zeros_like(values)
+    off[2:-2] = values[2:-2] - (4 * (values[1:-3] + values[3:-1]) - values[:-4] - values[4:]) / 6
+    size = np.abs(off)
+    top = np.flatnonzero(size > _WHOLE * _large(size))
+    # The neighbours of a spike are large too; the largest of five is the spike.
+    top = top[size[top] >= scipy.ndimage.maximum_filter1d(size, 5)[top]]
+    if not 0 < len(top) <= _MOST:
+        return none
+    return np.array([k for k in top if _is_spike(off, int(k))], dtype=np.int64)
+
+
+def _large(size: Floats) -> float:
+    left_out = max(_LARGEST, _TOUCHED / len(size))
+    return float(np.quantile(size, 1.0 - left_out))
+
+
+def _is_spike(off: Floats, k: int) -> bool:
+    if not 2 <= k < len(off) - 2:
+        return False
+    part = off[k - 2 : k + 3]
+    alike = abs(float(part @ _PATTERN)) / float(np.linalg.norm(part) * np.linalg.norm(_PATTERN))
+    half = _NEIGHBOURS // 2
+    around = np.abs(np.concatenate((off[max(0, k - half) : k - 2], off[k + 3 : k + half])))
+    scale = 1.4826 * float(np.median(around))
+    return alike > _ALIKE and abs(float(off[k])) > _LOCAL * scale

@@ -1,0 +1,288 @@
+"""Plausible mistakes are refused or flagged by their name before a diagnosis, and nothing else is."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from axisight import Effect, Robot, Settings, diagnose, read_case, simulate
+from axisight.cli import app
+from axisight.errors import CaseError, InputError, LogError
+from axisight.gap import RefusedInputError, check_inputs
+from axisight.gap.faults import MEANINGS
+from axisight.gap.inputs import read_inputs
+from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
+from wrong_inputs import TABLE, Case, clean_arm, clean_loop, each, late, loop_case, write_case
+
+CLEAN = {"loop": clean_loop, "arm": clean_arm}
+GATE = [m for m in TABLE if m.kind != "file"]
+FILES = [m for m in TABLE if m.kind == "file"]
+
+
+def found(case: Case):
+    return check_inputs(case.robot, case.estimation, case.validation)
+
+
+def refusals(case: Case) -> list[str]:
+    return [str(f) for f in found(case) if f.severity == "refuse"]
+
+
+# Mistakes.
+
+
+def test_the_table_has_all_kinds():
+    assert len(TABLE) >= 43
+    assert len({m.id for m in TABLE}) == len(TABLE)
+    assert {m.name for m in TABLE} <= MEANINGS.keys() | {"rates_differ"}
+
+
+@pytest.mark.parametrize("mistake", GATE, ids=lambda m: m.id)
+def test_a_mistake_is_named(mistake):
+    findings = found(mistake.spoil(CLEAN[mistake.kind]()))
+    seen = [(f.name, f.severity, f.axis) for f in findings]
+    of_the_name = [f for f in findings if (f.name, f.severity) == (mistake.name, mistake.severity)]
+    assert of_the_name, seen
+    if mistake.axis is not None:
+        assert mistake.axis in {f.axis for f in of_the_name}, seen
+    for finding in findings:
+        assert finding.name in MEANINGS
+        assert finding.field
+        assert str(finding).startswith(f"{finding.name}: ")
+
+
+@pytest.mark.parametrize("mistake", FILES, ids=lambda m: m.id)
+def test_a_mistake_in_files_is_named(mistake, tmp_path):
+    folder = write_case(clean_loop(), tmp_path / "case")
+    mistake.spoil(folder)
+    with pytest.raises(InputError) as error:
+        read = read_inputs([folder], None, [], None)
+        diagnose(robot=read.robot, estimation=read.estimation, validation=read.validation)
+    names = re.findall(r"\[(\w+)\]", str(error.value)) or str(error.value).split(":")[:1]
+    assert mistake.name in names, str(error.value)
+
+
+def test_milliseconds_in_one_file_are_asked_for(tmp_path):
+    folder = write_case(clean_loop(), tmp_path / "case")
+    next(m for m in FILES if m.spoil.__name__ == "one_file_in_milliseconds").spoil(folder)
+    with pytest.raises(LogError, match="time in ms"):
+        read_case(folder)
+
+
+# Through the whole diagnosis.
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["position_in_degrees", "torques_swapped", "one_glitch_of_a_position", "gravity_upwards"],
+)
+def test_a_diagnosis_refuses_by_name(name):
+    mistake = next(m for m in GATE if m.spoil.__name__ == name)
+    case = mistake.spoil(clean_loop())
+    with pytest.raises(RefusedInputError, match=mistake.name) as error:
+        diagnose(robot=case.robot, estimation=case.estimation, validation=case.validation)
+    assert isinstance(error.value, CaseError) and isinstance(error.value, LogError)
+    assert mistake.name in {f.name for f in error.value.findings}
+    assert "expected" in str(error.value) and "got" in str(error.value)
+
+
+def test_a_flag_is_in_checks_and_verdict():
+    mistake = next(m for m in GATE if m.spoil.__name__ == "zero_of_one_axis_off_arm")
+    case = mistake.spoil(clean_arm())
+    settings = Settings(bootstrap=20, max_causes=1)
+    out = diagnose(
+        robot=case.robot, estimation=case.estimation, validation=case.validation, settings=settings
+    )
+    assert any(check.startswith("position_offset") for check in out.checks)
+    (entry,) = [f for f in out.to_verdict()["findings"] if f["name"] == "position_offset"]
+    assert entry["axis"] == 2 and entry["severity"] == "flag"
+
+
+@pytest.mark.parametrize("name", ["files_in_millinewtonmetres", "truncated_file"])
+def test_the_command_refuses_with_status_2(name, tmp_path):
+    mistake = next(m for m in FILES if m.spoil.__name__ == name)
+    folder = write_case(clean_loop(), tmp_path / "case")
+    mistake.spoil(folder)
+    out = tmp_path / "verdict.json"
+    result = CliRunner().invoke(app, ["diagnose", str(folder), "--json", str(out)])
+    assert result.exit_code == 2, result.output
+    assert mistake.name in result.output
+    assert not out.exists()
+
+
+def test_check_and_identify_know_rows(tmp_path):
+    spoil = next(m for m in GATE if m.spoil.__name__ == "position_frozen_for_200_ms").spoil
+    folder = write_case(spoil(clean_loop()), tmp_path / "case")
+    log = str(folder / "logs" / "multisine_0.parquet")
+    checked = CliRunner().invoke(app, ["check", log])
+    assert checked.exit_code == 1
+    assert "stood still" in " ".join(checked.output.split())
+    robot = str(folder / "robot.toml")
+    identified = CliRunner().invoke(app, ["identify", "rigid-body", robot, log])
+    assert identified.exit_code == 2
+    assert "stood still" in " ".join(identified.output.split())
+
+
+# No false alarms.
+
+
+@pytest.mark.parametrize("kind", CLEAN)
+def test_clean_cases_pass_without_a_word(kind):
+    assert found(CLEAN[kind]()) == ()
+
+
+LARGE = [
+    Effect("coulomb_friction", 2, {"coulomb_nm": 8.0, "smoothing_rad_s": 0.05}),
+    Effect("stribeck_friction", 3, {"coulomb_nm": 3.0, "excess_nm": 3.0}),
+    Effect("presliding_friction", 2, {"coulomb_nm": 5.0}),
+    Effect("viscous_friction", 1, {"viscous_nm_s_rad": 0.2}),
+    Effect("load_dependent_friction", 2, {"coefficient": 0.3}),
+    Effect("payload", None, {"mass_kg": 250.0, "x_m": 1.0, "y_m": 0.0, "z_m": 0.0}),
+    Effect("backlash", 2, {"half_width_rad": 1e-3}),
+    Effect("joint_stiffness", 1, {"relative_change": -0.5}),
+    Effect("input_delay", 2, {"delay_s": 1e-3}),
+    Effect("actuator_bandwidth", 1, {"time_constant_s": 2e-3}),
+    Effect("resolver_ripple", 1, {"order_1": 2.0, "cosine_1_rad": 3e-3, "sine_1_rad": 1e-3}),
+    Effect("torque_ripple", 1, {"order_1": 6.0, "cosine_1_nm": 2.0}),
+    Effect("transmission_error", 3, {"order": 2.0, "cosine_rad": 3e-4}),
+    Effect("torque_constant", 2, {"relative_error": -0.2}),
+    Effect("torque_offset", 3, {"offset_nm": 5.0}),
+    Effect("gravity_compensation", 2, {"sine_nm": 3000.0, "cosine_nm": -3000.0}),
+    Effect("torque_saturation", 1, {"limit_nm": 8.0}),
+]
+
+
+def without_references(case: Case) -> Case:
+    return each(case, lambda log: replace(log, velocity_ref_rad_s=None))
+
+
+@pytest.mark.parametrize("effect", LARGE, ids=lambda e: e.name)
+def test_large_effects_pass(effect):
+    case = loop_case((effect,), seed=2)
+    for seen in (case, without_references(case)):
+        findings = found(seen)
+        assert not [f for f in findings if f.severity == "refuse"]
+        # A limit shows in the log; nothing else does.
+        assert {f.name for f in findings} <= {"torque_saturated"}
+
+
+def other_controller(robot: Robot, kp: float, ki: float) -> Robot:
+    """Return the robot with other gains than its file states."""
+    gains = robot.controller_gains
+    text = re.sub(r"kp = \[.*\]", f"kp = {(gains['kp'] * kp).tolist()}", robot.toml)
+    return Robot.from_toml(re.sub(r"ki = \[.*\]", f"ki = {(gains['ki'] * ki).tolist()}", text))
+
+
+@pytest.mark.parametrize(("kp", "ki"), [(2.0, 1.0), (0.5, 1.0), (1.0, 3.0), (1.0, 0.3), (0.7, 2.0)])
+def test_a_machine_with_other_gains_is_not_refused(kp, ki):
+    case = clean_loop()
+    machine = other_controller(case.robot, kp, ki)
+
+    def rerun(log):
+        out = simulate(machine, log.velocity_ref_rad_s, noise_seed=1, method="rk4")
+        torque, position = out.torque_cmd_nm.values, out.position_rad.values
+        return replace(log, torque_nm=torque, position_rad=position)
+
+    # Runs of one seed have the noise in common, not the references.
+    findings = found(each(case, rerun))
+    assert not [str(f) for f in findings if f.severity == "refuse"]
+
+
+def test_a_cascade_has_its_own_law():
+    case = clean_loop()
+    gains = case.robot.controller_gains
+    text = case.robot.toml.replace('"pi_velocity"', '"cascade"')
+    text = re.sub(
+        r"ki = \[.*\]", f"ki = {(5 * gains['ki']).tolist()}\nkv = [20.0, 20.0, 20.0]", text
+    )
+    robot = Robot.from_toml(text)
+
+    def rerun(log):
+        out = simulate(robot, log.velocity_ref_rad_s, noise_seed=1, method="rk4")
+        torque, position = out.torque_cmd_nm.values, out.position_rad.values
+        return replace(log, torque_nm=torque, position_rad=position)
+
+    cascade = replace(each(case, rerun), robot=robot)
+    assert found(cascade) == ()
+    shifted = each(cascade, lambda log: late(log, 41, None, "torque_nm"))
+    named = {(f.name, f.severity) for f in found(shifted)}
+    assert ("time_shifted", "refuse") in named
+
+
+def test_a_drive_that_filters_its_torque_passes():
+    def filtered(log):
+        step = 80 / 4096
+        share = 1 - np.exp(-2 * np.pi * 300 * log.sample_time_s)
+        torque = log.torque_nm.copy()
+        for k in range(1, len(torque)):
+            torque[k] = torque[k - 1] + share * (log.torque_nm[k] - torque[k - 1])
+        return replace(log, torque_nm=np.round(torque / step) * step)
+
+    assert found(each(clean_loop(), filtered)) == ()
+
+
+@pytest.mark.parametrize("bits", [14, 16, 20])
+def test_an_encoder_of_few_bits_is_no_frozen_channel(bits):
+    step = 2 * np.pi / 2**bits
+
+    def coarse(log):
+        return replace(log, position_rad=np.round(log.position_rad / step) * step)
+
+    assert not refusals(each(clean_loop(), coarse))
+
+
+ARMS = {
+    "friction threefold": (1.0, 0.0, 3.0),
+    "no friction": (1.0, 0.0, 0.0),
+    "masses a fifth larger": (1.2, 0.0, 1.0),
+    "payload of a tenth of the arm": (1.0, 3.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_large_effects_of_an_arm_pass(name):
+    masses, payload_kg, friction = ARMS[name]
+    own = arm().parameters()
+    values = {n: v * masses for n, v in own.items() if n.endswith(".mass")}
+    machine = arm().with_parameters({**values, "j6.mass": values["j6.mass"] + payload_kg})
+    coulomb, viscous = friction * np.array(COULOMB_NM), friction * np.array(VISCOUS)
+    logs = tuple(log_of(machine, seed, coulomb, viscous, seconds=20.0) for seed in range(3))
+    assert found(Case(arm(), logs[:2], logs[2:])) == ()
+
+
+PRACTICE = ["09001", "09002", "09003", "09005", "09011", "09012", "09013", "09014", "09015"]
+
+
+@pytest.mark.parametrize("number", PRACTICE)
+def test_practice_cases_pass(shared, number):
+    folder = shared / "cases" / f"case_{number}"
+    if not folder.is_dir():
+        pytest.skip(f"no practice case {number}")
+    read = read_inputs([folder], None, [], None)
+    case = Case(read.robot, read.estimation, read.validation)
+    assert {f.name for f in found(case)} <= {"torque_saturated"}
+    assert not refusals(case)
+    assert {f.name for f in found(without_references(case))} <= {"torque_saturated"}
+
+
+# The page.
+
+
+def test_every_name_is_on_the_page(repository):
+    page = (repository / "docs" / "refused.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]*) \|", page, re.MULTILINE))
+    assert rows.keys() == MEANINGS.keys()
+    for name, meaning in MEANINGS.items():
+        assert rows[name].strip() == meaning
+
+
+def test_files_of_a_case_stay(tmp_path):
+    folder = write_case(clean_loop(), tmp_path / "case")
+    before = {p: p.read_bytes() for p in Path(folder).rglob("*") if p.is_file()}
+    read = read_inputs([folder], None, [], None)
+    assert check_inputs(read.robot, read.estimation, read.validation) == ()
+    assert {p: p.read_bytes() for p in before} == before
+    shutil.rmtree(folder)
