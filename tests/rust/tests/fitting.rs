@@ -4,8 +4,9 @@ use axisight_core::plant::equilibrium;
 use axisight_core::robot::{EffectSetting, Parameter, RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method, measurement_noise};
 use axisight_identification::logs::{
-    Fit, FitOptions, FitParameter, InverseDynamics, Linearization, Loss, MotionRecord, Problem,
-    ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
+    Column, Fit, FitOptions, FitParameter, InverseDynamics, Linearization, Loss, MotionRecord,
+    Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput,
+    Target, fit,
 };
 use axisight_numerics::Weighting;
 use axisight_tests::{ARM, PRESET, effect, largest, plant, relative, robot, sines, trace};
@@ -374,7 +375,7 @@ fn warm_columns_are_used_and_checked() {
     let warm = [(3, cold.columns[3].clone())];
     let again = fit(&problem, &problem.parameters, FitOptions::default(), &warm).expect("fit");
     assert!(distance(&cold, &again.theta, &cold.theta) < 1e-4 * cold.loss);
-    let short = [(3, vec![0.0; 5])];
+    let short = [(3, Column::new(vec![0.0; 5]))];
     let error =
         fit(&problem, &problem.parameters, FitOptions::default(), &short).expect_err("short");
     assert!(matches!(error, ProblemError::Invalid { field, .. } if field == "warm"));
@@ -411,7 +412,7 @@ fn linearization_takes_warm_columns_over() {
     let problem = arm_problem(10, SIGMA);
     let parameters = &problem.parameters;
     let cold = Linearization::new(&problem, parameters, Loss::Squared, &[]).expect("holds");
-    let other = vec![7.0; cold.residual.len()];
+    let other = Column::new(vec![7.0; cold.residual.len()]);
     let warm = [(2, other.clone())];
     let at = Linearization::new(&problem, parameters, Loss::Squared, &warm).expect("holds");
     assert_eq!(at.columns[2], other);
@@ -419,7 +420,7 @@ fn linearization_takes_warm_columns_over() {
     // rounding, some 1e-16 of the largest entry of either.
     let change = relative(&at.columns[3], &cold.columns[3]);
     assert!(change < 1e-12, "{change:.1e}");
-    let short = [(2, vec![7.0; 5])];
+    let short = [(2, Column::new(vec![7.0; 5]))];
     let error = Linearization::new(&problem, parameters, Loss::Squared, &short).expect_err("short");
     assert!(matches!(error, ProblemError::Invalid { field, .. } if field == "warm"));
 }

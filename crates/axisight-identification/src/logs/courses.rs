@@ -5,11 +5,8 @@
 //! of that is of second order, and what the runs themselves show of it is known and taken off.
 
 use super::problem::ProblemError;
-use super::simulation_error::{Arm, LANES, SimulationErrorProblem, Traces};
-use axisight_core::robot::Course;
-use axisight_scalar::Lanes;
+use super::simulation_error::{Arm, SharedCourse, SimulationErrorProblem, Traces};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Runs of a model over the logs of a problem.
 #[derive(Debug, Clone)]
@@ -20,7 +17,7 @@ pub struct Courses {
 /// Logs in lock-step.
 #[derive(Debug, Clone)]
 pub(super) struct Batch {
-    pub(super) course: Arc<Course<Lanes<LANES>>>,
+    pub(super) course: SharedCourse,
     /// Output of the model less its output with the arm linearised, `[lane * axes + axis]`.
     pub(super) excess: Vec<Vec<f64>>,
 }

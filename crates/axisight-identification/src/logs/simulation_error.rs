@@ -84,6 +84,12 @@ pub struct SimulationErrorProblem {
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
+/// A run that the arm is linearised along.
+pub(super) type SharedCourse = Arc<Course<Lanes<LANES>>>;
+
+/// Is shown every state of a run.
+type Keep<'a, S> = &'a mut dyn FnMut(&[S]);
+
 /// Series per lane and axis, value and derivatives: `[quantity][lane * axes + axis][sample]`.
 pub(super) type Traces = Vec<Vec<Vec<f64>>>;
 
@@ -96,7 +102,7 @@ pub(super) enum Arm<'a> {
     /// As it is.
     Exact,
     /// Linearised.
-    Along(&'a Arc<Course<Lanes<LANES>>>),
+    Along(&'a SharedCourse),
 }
 
 /// From as many derivatives as this, a run of its own to linearise along is worth it.
@@ -157,7 +163,7 @@ impl SimulationErrorProblem {
         &self,
         records: &[usize],
         theta: &[f64],
-    ) -> Result<(Vec<Vec<f64>>, Arc<Course<Lanes<LANES>>>), ProblemError> {
+    ) -> Result<(Vec<Vec<f64>>, SharedCourse), ProblemError> {
         let plant = self.plant::<Lanes<LANES>>(theta, &[])?;
         let joints = plant.joint_slots();
         let rates = plant.n_angles() + joints.start..plant.n_angles() + joints.end;
@@ -180,7 +186,7 @@ impl SimulationErrorProblem {
         plant: &Plant<S>,
         stepper: &mut Stepper<S>,
         n_seeds: usize,
-        mut keep: Option<&mut dyn FnMut(&[S])>,
+        mut keep: Option<Keep<'_, S>>,
     ) -> Result<Traces, ProblemError> {
         let n_axes = plant.axes.len();
         let inputs: Vec<&[f64]> = records
@@ -315,7 +321,7 @@ enum Prepared<'a> {
     /// Along runs of a model nearby.
     Near(&'a Batch),
     /// Along its own run, of which the output is known.
-    Own(Vec<Vec<f64>>, Arc<Course<Lanes<LANES>>>),
+    Own(Vec<Vec<f64>>, SharedCourse),
 }
 
 impl SimulationErrorProblem {

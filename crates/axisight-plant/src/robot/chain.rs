@@ -103,7 +103,8 @@ impl<S: Scalar> Chain<S> {
 
     /// Whether gravity and all masses are those of `other` bit for bit, derivatives aside.
     pub fn same_masses(&self, other: &Chain<S::Real>) -> bool {
-        let same = |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l).to_bits() == b.lane(l).to_bits());
+        let same =
+            |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l).to_bits() == b.lane(l).to_bits());
         let all = |a: &[S], b: &[S::Real]| a.iter().zip(b).all(|(a, b)| same(a, b));
         let bodies = |a: &ChainJoint<S>, b: &ChainJoint<S::Real>| match (&a.body, &b.body) {
             (None, None) => true,

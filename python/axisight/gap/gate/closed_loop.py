@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from axisight.gap.faults import GateSeverity, Finding
+from axisight.gap.faults import Finding, GateSeverity
 from axisight.gap.gate.control_law import ControlLaw, LawFit
 from axisight.gap.gate.follows import check_follows
 from axisight.gap.gate.scales import scale_name

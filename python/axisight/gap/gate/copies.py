@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.faults import GateSeverity, Finding
+from axisight.gap.faults import Finding, GateSeverity
 from axisight.logs import Log
 
 # Rows of different runs agree to the last bit where sensors are coarse and the machine rests, at

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.cutoff import Motion, highest_cutoff_hz
-from axisight.gap.faults import GateSeverity, Finding, refused
+from axisight.gap.faults import Finding, GateSeverity, refused
 from axisight.gap.gate.mistakes import Mistake, predict, undone
 from axisight.gap.gate.passive import check_passive
 from axisight.gap.gate.scales import scale_name

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.faults import GateSeverity, Finding
-from axisight.logs import Finding, Log
+from axisight.gap.faults import Finding, GateSeverity
+from axisight.logs import Finding as LogFinding
+from axisight.logs import Log
 from axisight.logs.checking import look_at_signals
 from axisight.logs.grid import make_grid
 from axisight.logs.native import NATIVE_STEMS
@@ -62,14 +63,14 @@ def check_log_alone(log: Log) -> list[Finding]:
     return [*out, *_clipped(log, labels), *_velocity(log, slides)]
 
 
-def named(finding: Finding, log: Log) -> Finding:
+def named(finding: LogFinding, log: Log) -> Finding:
     """Return a finding about a log as one of the gate; an error is refused."""
     severity: GateSeverity = "refuse" if finding.severity == "error" else "flag"
     name = finding.name or "not_finite"
     return Finding(name, severity, finding.message, log.name, finding.axis, finding.column)
 
 
-def _reference_missing(finding: Finding, values: Array) -> Finding:
+def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
     """A reference that is NaN throughout is one that is missing."""
     if not finding.column.startswith("velocity_ref") or not np.isnan(values).all():
         return finding
@@ -77,7 +78,7 @@ def _reference_missing(finding: Finding, values: Array) -> Finding:
         "expected a velocity reference for all axes or for none, got NaN only: write the reference "
         "of the axis, zero if it rests"
     )
-    return Finding("error", finding.column, message, "reference_missing", finding.axis)
+    return LogFinding("error", finding.column, message, "reference_missing", finding.axis)
 
 
 def _idle_reference(finding: Finding) -> bool:

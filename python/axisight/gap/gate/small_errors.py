@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.cutoff import Motion
-from axisight.gap.faults import GateSeverity, Finding
+from axisight.gap.faults import Finding, GateSeverity
 from axisight.gap.gate.mistakes import predict
 from axisight.gap.gate.torque_fit import nuisance
 from axisight.robot import Robot
