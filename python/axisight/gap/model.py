@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 class FreeEffect:
     """An effect under trial: start values, the parameters to fit, priors and bounds of some.
 
-    ``starts`` are further start values worth trying, for effects whose fit may
-    end in the wrong valley.
+    ``starts`` are further values of the one free parameter worth trying, for effects whose fit
+    may end in the wrong valley.
     """
 
     effect: Effect
@@ -191,9 +191,15 @@ class ModelFitter(ABC):
     ) -> _core.Linearization:
         """Evaluate the model in the core, at the initial values."""
 
-    def runs(self, model: Evidence) -> _core.Courses | None:
-        """Return runs of a model around which others close to it cost less; None without any."""
-        setup = self._setup(model.free, model, None, [False] * len(model.free), lazy=False)
+    def runs(
+        self, model: Evidence, robot_values: Mapping[str, float] | None = None
+    ) -> _core.Courses | None:
+        """Return runs of a model around which others close to it cost less; None without any.
+
+        ``robot_values``: the simulator's own parameters, where they are not the model's.
+        """
+        held = [False] * len(model.free)
+        setup = self._setup(model.free, model, robot_values, held, lazy=False)
         return self.run(setup.effects, setup.parameters, self._options())
 
     def run(

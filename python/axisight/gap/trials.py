@@ -11,7 +11,9 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
+from axisight._core import Courses
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Standing, Trial, stand, trial
@@ -37,6 +39,8 @@ _LOOKED_AT = 3
 # Leaders of an axis that are refined, unless the first already explains nearly everything.
 _REFINED = 2
 _GOOD_ENOUGH = 0.95
+# Evaluations between two starts of an effect.
+_SCANS = 10
 # Share of a gain that another candidate may have on the same axis and not count as felt.
 _FELT = 0.2
 
@@ -95,10 +99,13 @@ class Trials:
         self.layout, self.settings, self.progress = layout, settings, progress
         self.current = held_out_loss(model)
         self.near = fitter.runs(model)
+        self.near_nominal: Courses | None = None
         self.skipped: dict[str, str] = {}
 
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
         """Screen all candidates by one linear step, fit the promising ones in full."""
+        if any(option.starts for option in options):
+            self.near_nominal = self.fitter.runs(self.model, {})
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
                 label = f"screening candidates, round {number}"
@@ -163,8 +170,10 @@ class Trials:
         self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None
     ) -> A | None:
         effects = [*kept_beside(self.model.free, option), option]
+        # Runs serve where the simulator's own parameters are those of the runs, or near them.
+        near = self.near if values is None or values == self.model.robot_values else self.near_nominal
         try:
-            return solve(effects, self.model, robot_values=values, near=self.near)
+            return solve(effects, self.model, robot_values=values, near=near)
         except InputError as error:
             # A candidate that cannot be simulated is out, and the result says so.
             self.skipped[option.effect.label] = str(error)
@@ -202,16 +211,40 @@ class Trials:
         best = _Start(option, self.model.robot_values, -np.inf)
         if evidence is not None:
             best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
-        for values in option.starts:
-            # A large effect bends the re-fitted simulator: its own starts begin without.
-            begin = option.at(values)
-            loss = self._attempt(self.fitter.loss, begin, {})
-            if loss is not None and self.model.total - loss > best.gain:
-                best = _Start(begin, {}, self.model.total - loss)
+        if option.starts:
+            begin, gain = self._best_of_starts(option)
+            if gain > best.gain:
+                best = _Start(begin, {}, gain)
         return best
 
+    def _best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
+        """Return the candidate at the best of its own starts, and what it gains there.
+
+        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted.
+        """
+        name = option.free[0]
+
+        def loss(value: float) -> float:
+            found = self._attempt(self.fitter.loss, option.at({name: value}), {})
+            return np.inf if found is None else found
+
+        values = sorted(s[name] for s in option.starts)
+        losses = [loss(v) for v in values]
+        at = int(np.argmin(losses))
+        least, value = losses[at], values[at]
+        if least < self.model.total:
+            # The valley is narrower than the steps between starts.
+            between = (values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)])
+            options = {"maxiter": _SCANS, "xatol": 0.003 * value}
+            finer = minimize_scalar(loss, bounds=between, method="bounded", options=options)
+            if finer.fun < least:
+                least, value = float(finer.fun), float(finer.x)
+        return option.at({name: value}), self.model.total - least
+
     def _fitted(self, start: _Start) -> Trial | None:
-        solve = partial(self.fitter.fit, lazy=True)
+        # One that bends the simulator has sensitivities of its own.
+        bends = start.robot_values is not self.model.robot_values
+        solve = partial(self.fitter.fit, lazy=not bends)
         evidence = self._attempt(solve, start.option, start.robot_values)
         return None if evidence is None else trial(start.option, evidence)
 
