@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.gap.model import Evidence, FreeEffect
-from axisight.gap.starts import MOST_ORDERS, STARTS, Situation, Trial
+from axisight.gap.orders import Turning, turning
+from axisight.gap.starts import STARTS, Response, Situation, Trial
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -18,31 +19,23 @@ Array = NDArray[np.float64]
 
 
 def situation(
-    robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, bandwidth_hz: float
+    robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, response: Response
 ) -> Situation:
-    """Return residual, angle and speed by log and axis at the decimated rate."""
-    residual: list[list[Array]] = []
-    angle: list[list[Array]] = []
-    speed: list[list[Array]] = []
-    for i, log in enumerate(logs):
-        rows: list[Array] = []
-        angles: list[Array] = []
-        speeds: list[Array] = []
-        for axis in range(robot.n_axes):
-            mine = (baseline.log == i) & (baseline.axis == axis)
-            first = int(baseline.start[mine].min())
-            count = int(baseline.size[mine].sum())
-            rows.append(baseline.residual[first : first + count])
-            position = log.position_rad[:, axis]
-            rate = np.gradient(position, log.sample_time_s)
-            # A short running mean takes the quantization and noise off the speed.
-            rate = np.convolve(rate, np.ones(9) / 9, mode="same")
-            angles.append(position[::decimation][:count])
-            speeds.append(rate[::decimation][:count])
-        residual.append(rows)
-        angle.append(angles)
-        speed.append(speeds)
-    return Situation(residual, angle, speed, bandwidth_hz)
+    """Return the residual of a model and how the motors turned, by log and axis."""
+
+    def one(i: int, log: Log, axis: int) -> Turning:
+        mine = (baseline.log == i) & (baseline.axis == axis)
+        first = int(baseline.start[mine].min())
+        count = int(baseline.size[mine].sum())
+        position = log.position_rad[:, axis]
+        speed = np.gradient(position, log.sample_time_s)
+        # A short running mean takes the quantization and noise off the speed.
+        speed = np.convolve(speed, np.ones(9) / 9, mode="same")
+        residual = baseline.residual[first : first + count]
+        return turning(residual, position, speed, log.sample_time_s, decimation)
+
+    axes = range(robot.n_axes)
+    return Situation([[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)], response)
 
 
 def all_candidates(
@@ -95,7 +88,7 @@ def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
     # Of numbered terms those that the search may use.
     terms = [t for t in info.terms().values() if t[0] in given and len(info.terms()) > 1]
     if terms:
-        free = _merged_terms(values, given, terms[:MOST_ORDERS])
+        free = _merged_terms(values, given, terms)
     return replace(candidate, effect=own.with_values(values), bounds=bounds, free=free)
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects
+from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import core_spec
+from axisight.frf.errors import reference_to_input
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.settings import Settings
@@ -22,6 +23,7 @@ from axisight.robot import Robot
 from axisight.simulation import simulate_batch, white_noise
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 class ClosedLoopView(View):
@@ -34,6 +36,25 @@ class ClosedLoopView(View):
             robot, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+
+    def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        """Return the response of the feedback that keeps the simulator on the log.
+
+        An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``; a torque
+        on the motor passes the machine before.
+        """
+        machine, controller = self._loop(frequency_hz)
+        out = reference_to_input(machine, controller)
+        if effect_info(effect).acts != "sensor":
+            out = out @ machine
+        return np.asarray(out[:, axis, axis])
+
+    def _loop(self, frequency_hz: Array) -> tuple[Complex, Complex]:
+        """Return machine and controller (n_freq, n_axes, n_axes), from the motor angle to its torque."""
+        # At rest and at zero frequency both are infinite.
+        f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
+        machine = self.robot.zoh_response(f).values
+        return machine, controller_response(self.robot, f)
 
     def measured(self, log: Log) -> Array:
         """Return the logged torque."""
@@ -53,6 +74,20 @@ class ClosedLoopView(View):
             first_run,
             threads=self.settings.threads,
         )
+
+
+def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
+    """Return the sampled controller from motor angle to torque (n_freq, n_axes, n_axes) [Nm/rad]."""
+    gains, time = robot.controller_gains, robot.sample_time_s
+    kp, ki = gains["kp"], gains.get("ki", 0.0)
+    back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
+    out = (1 - back) / time
+    if "kv" in gains:
+        # The error is summed up to the sample before.
+        out = (out + gains["kv"]) * (kp + ki * time * back / (1 - back))
+    else:
+        out = kp * out + ki
+    return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
 
 
 def _contiguous(x: Array) -> Array:

@@ -14,29 +14,26 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo
 from axisight.gap.model import FreeEffect
-from axisight.gap.orders import strongest_orders
+from axisight.gap.orders import Complex, Turning, strongest_orders
 from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-MOST_ORDERS = 3
-"""Orders of a ripple that one candidate takes up."""
+Response = Callable[[str, int, Array], Complex]
+"""Of the weighted residual on an axis (from 0) to an effect there, by its name, at frequencies [Hz]."""
 
 
 @dataclass(frozen=True)
 class Situation:
-    """What start values are taken from: logs and baseline residual torque on a common grid.
+    """What start values are taken from.
 
-    ``residual[log][axis]`` weighted residual torque, ``angle`` and ``speed``
-    motor side at the same samples, ``bandwidth_hz`` below which the residual
-    torque follows a torque on the motor.
+    ``turning[log][axis]``: weighted residual torque of the model, and how the motor turned;
+    ``response``: how effects that repeat with the motor angle show in it.
     """
 
-    residual: list[list[Array]]
-    angle: list[list[Array]]
-    speed: list[list[Array]]
-    bandwidth_hz: float
+    turning: Sequence[Sequence[Turning]]
+    response: Response
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
     """Begin at neutral values; speeds that shape a friction law are shares of the speeds seen."""
 
     def start(trial: Trial) -> FreeEffect:
-        top = max(float(np.abs(v[trial.index]).max()) for v in trial.at.speed) or 1.0
+        top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
         found = {name: share * top for name, share in shares.items()}
         values = {p.name: p.neutral for p in trial.info.parameters} | found
         bounds = {name: (0.1 * value, 10 * value) for name, value in found.items()}
@@ -87,33 +84,22 @@ _SMOOTHING = 0.003
 _STRIBECK = 0.1
 
 
-def _waves(*, speed_power: int) -> Callable[[Trial], FreeEffect | None]:
-    """Begin with the strongest orders of the residual over the motor angle.
-
-    ``speed_power``: power of the speed with which the residual torque of the effect grows.
-    """
-
-    def start(trial: Trial) -> FreeEffect | None:
-        i, at = trial.index, trial.at
-        orders = strongest_orders(
-            [r[i] for r in at.residual],
-            [a[i] for a in at.angle],
-            [v[i] for v in at.speed],
-            count=MOST_ORDERS,
-            bandwidth_hz=at.bandwidth_hz,
-            speed_power=speed_power,
-        )
-        if not orders:
-            return None
-        # Terms without an order are switched off.
-        values = {p.name: 0.0 for p in trial.info.parameters if p.name.startswith("order")}
-        free: list[str] = []
-        for found, (order, *waves) in zip(orders, trial.info.terms().values(), strict=False):
-            values[order] = float(found)
-            free += waves
-        return FreeEffect(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free))
-
-    return start
+def _waves(trial: Trial) -> FreeEffect | None:
+    """Begin with the strongest orders of the residual over the motor angle."""
+    logs = [axes[trial.index] for axes in trial.at.turning]
+    found = trial.at.response
+    responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
+    terms = trial.info.terms().values()
+    orders = strongest_orders(logs, responses, count=len(terms))
+    if not orders:
+        return None
+    # Terms without an order are switched off.
+    values = {p.name: 0.0 for p in trial.info.parameters if p.name.startswith("order")}
+    free: list[str] = []
+    for n, (order, *waves) in zip(orders, terms, strict=False):
+        values[order] = float(n)
+        free += waves
+    return FreeEffect(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free))
 
 
 def _gear_waves(trial: Trial) -> FreeEffect:
@@ -142,7 +128,8 @@ def _play(trial: Trial) -> FreeEffect:
 
 def _axis_share(at: Situation, index: int) -> float:
     """Return the share of the residual error on an axis [1]."""
-    squares = [sum(float(row @ row) for row in rows) for rows in zip(*at.residual, strict=True)]
+    logs = zip(*at.turning, strict=True)
+    squares = [sum(float(log.residual @ log.residual) for log in axis) for axis in logs]
     return squares[index] / max(sum(squares), 1e-300)
 
 
@@ -179,8 +166,8 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "backlash": _play,
     "nonlinear_stiffness": _neutral,
     "joint_stiffness": _neutral,
-    "torque_ripple": _waves(speed_power=0),
-    "resolver_ripple": _waves(speed_power=2),
+    "torque_ripple": _waves,
+    "resolver_ripple": _waves,
     "input_delay": _neutral,
     "actuator_bandwidth": _neutral,
     "torque_constant": _neutral,

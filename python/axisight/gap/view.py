@@ -19,9 +19,7 @@ from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
-
-# A torque ripple is followed by the controller one to one up to about here.
-_RIPPLE_BANDWIDTH_HZ = 20.0
+Complex = NDArray[np.complex128]
 
 
 @dataclass
@@ -40,10 +38,24 @@ class View(ABC):
     def candidates(self, model: Evidence) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model."""
         at = situation(
-            self.robot, self.logs, model, self.fitter.weighting.decimation, _RIPPLE_BANDWIDTH_HZ
+            self.robot, self.logs, model, self.fitter.weighting.decimation, self._weighted_response
         )
         inverse = self.mode == "inverse_dynamics"
         return all_candidates(self.robot, self.logs, at, inverse_dynamics=inverse)
+
+    def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        weighting = self.fitter.weighting
+        weight = np.interp(frequency_hz, weighting.frequency_hz, weighting.weight[axis])
+        return np.asarray(weight * self.response(effect, axis, frequency_hz))
+
+    def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        """Return how an effect that repeats with the motor angle shows in the error of its axis.
+
+        From its torque or angle to the torque error, (n_freq,); ``axis`` from 0. By default the effect
+        is a torque that is missing as it is.
+        """
+        del effect, axis
+        return np.ones(len(frequency_hz), dtype=np.complex128)
 
     @abstractmethod
     def measured(self, log: Log) -> Array:
