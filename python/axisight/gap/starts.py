@@ -104,8 +104,11 @@ def _waves(trial: Trial) -> FreeEffect | None:
 
 def _gear_waves(trial: Trial) -> FreeEffect:
     """Begin twice a motor turn, as harmonic drives have it."""
-    values = {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0}
-    return FreeEffect(trial.effect(values), ("cosine_rad", "sine_rad"))
+    values = {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0, "returned": 0.5}
+    # Gears conserve power or pass torque at the nominal ratio: either is as good a guess.
+    return FreeEffect(
+        trial.effect(values), ("cosine_rad", "sine_rad", "returned"), {"returned": (0.5, 0.5)}
+    )
 
 
 # An axis with less of the error than this is not worth many starts.

@@ -9,8 +9,8 @@ mod harmonics;
 
 pub use axisight_plant::effect::{
     Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, EffectError, EffectInfo,
-    Experiment, Family, Joint, Kernel, Linear, Motor, Pair, ParameterInfo, PlantParameters, Role,
-    Scope, Spring, StandsFor,
+    Experiment, Family, GearError, Joint, Kernel, Linear, Motor, Pair, ParameterInfo,
+    PlantParameters, Role, Scope, Spring, StandsFor,
 };
 pub use axisight_plant::formulas;
 

@@ -1,13 +1,13 @@
 //! Kinematic error of the gear over the motor angle.
 
 use super::formulas::harmonic_slope;
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "transmission_error",
     summary: "the gear runs ahead and behind periodically over the motor angle",
-    equation: "delta = r phi + a cos(n phi) + b sin(n phi) - q",
+    equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi); tau_motor = (r + c de/dphi) tau_gear",
     source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -48,6 +48,17 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 0.1,
             typical: 2e-4,
         },
+        // One where the gear conserves power; none where the torque passes at the nominal ratio, as
+        // many simulators have it and lossy gears may.
+        ParameterInfo {
+            name: "returned",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 1.0,
+            lower: -1.0,
+            upper: 2.0,
+            typical: 1.0,
+        },
     ],
 };
 
@@ -55,6 +66,7 @@ struct TransmissionError<S> {
     order: S,
     cosine: S,
     sine: S,
+    returned: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
@@ -62,12 +74,18 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
         order: p[0],
         cosine: p[1],
         sine: p[2],
+        returned: p[3],
     })
 }
 
 impl<S: Scalar> Kernel<S> for TransmissionError<S> {
-    fn transmission_error(&self, angle: S) -> Option<(S, S)> {
-        let (error, slope) = harmonic_slope(self.order * angle, self.cosine, self.sine);
-        Some((error, self.order * slope))
+    fn transmission_error(&self, angle: S) -> Option<GearError<S>> {
+        let (ahead, slope) = harmonic_slope(self.order * angle, self.cosine, self.sine);
+        let slope = self.order * slope;
+        Some(GearError {
+            ahead,
+            slope,
+            returned: self.returned * slope,
+        })
     }
 }

@@ -121,6 +121,18 @@ pub struct BaseJoint<S> {
     pub body: Option<Body<S>>,
 }
 
+/// Kinematic error of a gear over the motor angle.
+#[derive(Debug, Clone, Copy)]
+pub struct GearError<S> {
+    /// Joint angle by which the gear runs ahead [rad].
+    pub ahead: S,
+    /// Its derivative: what it adds to the gear ratio of rates.
+    pub slope: S,
+    /// What it adds to the ratio at which the gear's torque returns to the motor: the slope itself
+    /// where the gear conserves power.
+    pub returned: S,
+}
+
 /// The points where an effect may act; every default is "not here".
 ///
 /// States of its own start at zero; their rates are asked for where the effect acts
@@ -184,9 +196,8 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     }
     /// Rates of the effect's own states in a gear [1/s].
     fn gear_rates(&self, _spring: &Spring<'_, S>, _rates: &mut [S]) {}
-    /// Kinematic error of the gear over the motor angle: joint angle [rad] by which the
-    /// gear runs ahead, and its slope.
-    fn transmission_error(&self, _angle: S) -> Option<(S, S)> {
+    /// Kinematic error of the gear over the motor angle.
+    fn transmission_error(&self, _angle: S) -> Option<GearError<S>> {
         None
     }
 

@@ -10,5 +10,6 @@ pub use info::{
     StandsFor,
 };
 pub use kernel::{
-    Arm, AxisTorque, BaseJoint, CoupledAxis, Joint, Kernel, Motor, Pair, PlantParameters, Spring,
+    Arm, AxisTorque, BaseJoint, CoupledAxis, GearError, Joint, Kernel, Motor, Pair,
+    PlantParameters, Spring,
 };

@@ -114,7 +114,7 @@ impl<S: Scalar> Axis<S> {
                 .on_gear
                 .iter()
                 .filter_map(|on| on.kernel.transmission_error(angle));
-            let Some(error) = errors.map(|(e, _)| e).reduce(|a, b| a + b) else {
+            let Some(error) = errors.map(|e| e.ahead).reduce(|a, b| a + b) else {
                 break;
             };
             angle = (wanted - error) * (1.0 / self.ratio);
@@ -128,7 +128,7 @@ impl<S: Scalar> Axis<S> {
             .on_gear
             .iter()
             .filter_map(|on| on.kernel.transmission_error(angle));
-        load * slopes.fold(S::constant(self.ratio), |r, (_, slope)| r + slope)
+        load * slopes.fold(S::constant(self.ratio), |r, e| r + e.returned)
     }
 
     /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.

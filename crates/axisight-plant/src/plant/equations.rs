@@ -222,16 +222,18 @@ impl<S: Scalar> Plant<S> {
         let (angle, speed, gear, load) = if let Some(gear) = &axis.gear {
             let (angle, speed) = (x[gear.slot], x[m + n + gear.slot]);
             let (mut delta, mut slope) = (angle * axis.ratio, S::constant(axis.ratio));
+            let mut back = slope;
             for on_gear in &axis.on_gear {
-                if let Some((error, rate)) = on_gear.kernel.transmission_error(angle) {
-                    delta += error;
-                    slope += rate;
+                if let Some(error) = on_gear.kernel.transmission_error(angle) {
+                    delta += error.ahead;
+                    slope += error.slope;
+                    back += error.returned;
                 }
             }
             delta -= x[m + axis.joint];
             let rate = speed * slope - x[m + n + m + axis.joint];
             let torque = axis.gear_torque(gear, delta, rate, own, own_rates);
-            (angle, speed, torque, torque * slope)
+            (angle, speed, torque, torque * back)
         } else {
             let up = 1.0 / axis.ratio;
             let (q, v) = (x[m + axis.joint], x[m + n + m + axis.joint]);
