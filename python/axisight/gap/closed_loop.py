@@ -13,6 +13,7 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import core_spec
 from axisight.frf.errors import reference_to_input
+from axisight.gap.limits import reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.settings import Settings
@@ -36,6 +37,7 @@ class ClosedLoopView(View):
             robot, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+        self.limits = torque_limits(robot, logs)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the response of the feedback that keeps the simulator on the log.
@@ -62,7 +64,10 @@ class ClosedLoopView(View):
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the simulated torque of every log."""
-        return simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
+        out = simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
+        # An effect of a variant replaces the simulator's own.
+        effects = {e.label: e for e in (*self.robot.effects, *variant.effects)}.values()
+        return [reported(torque, self.limits, effects) for torque in out]
 
     def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
@@ -82,11 +87,10 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
     kp, ki = gains["kp"], gains.get("ki", 0.0)
     back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
     out = (1 - back) / time
-    if "kv" in gains:
-        # The error is summed up to the sample before.
-        out = (out + gains["kv"]) * (kp + ki * time * back / (1 - back))
-    else:
-        out = kp * out + ki
+    # The error of a cascade is summed up to the sample before.
+    cascade = "kv" in gains
+    summed = ki * time * back / (1 - back)
+    out = (out + gains["kv"]) * (kp + summed) if cascade else kp * out + ki
     return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
 
 

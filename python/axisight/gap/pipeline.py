@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.carried import carried_over
@@ -18,6 +19,7 @@ from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
+from axisight.gap.limits import missing
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
 from axisight.gap.remainder import parameters_at_edge, remainder_of
@@ -82,7 +84,8 @@ def diagnose(
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
-    conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs))
+    limits = missing(view.limits, machine)
+    conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs), limits=limits)
     out = _assemble(
         name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen, noted
     )
@@ -151,10 +154,16 @@ class Reach:
     left: tuple[ErrorLog, ...]
 
 
-def _reach(view: View, logs: Sequence[Log], found: Search, named: int, settings: Settings) -> Reach:
-    """Measure the gap on validation logs; the first ``named`` causes are in ``after``."""
-    model = found.model
-    variants = [Variant(model.robot_values, model.effects[: i + 1]) for i in range(named)]
+def _reach(
+    view: View,
+    logs: Sequence[Log],
+    found: Search,
+    causes: Sequence[Effect],
+    settings: Settings,
+) -> Reach:
+    """Measure the gap on validation logs; all ``causes`` are in ``after``."""
+    values = found.model.robot_values
+    variants = [Variant(values, tuple(causes[: i + 1])) for i in range(len(causes))]
     refit = Variant(found.baseline.robot_values)
     measured = [view.measured(log) for log in logs]
     noise = view.noises(logs, len(view.logs))
@@ -196,7 +205,7 @@ def _assemble(
 ) -> Diagnosis:
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
-    reach = _reach(view, held_logs, found, len(conclusion.causes), settings)
+    reach = _reach(view, held_logs, found, conclusion.effects, settings)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
     conclusion = carried_over(conclusion, reach.stages, gap, names, settings)

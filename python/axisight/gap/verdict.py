@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from axisight.effects import effect_info
+from axisight.effects import Effect, effect_info
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
+from axisight.gap.limits import TorqueLimit
 from axisight.gap.model import Evidence
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss
@@ -44,34 +45,47 @@ class Conclusion:
     p_unknown: float
     axes: tuple[AxisVerdict, ...]
     checks: tuple[str, ...]
+    effects: tuple[Effect, ...] = ()
+    """The causes as they are added to the simulator."""
     withdrawn: str | None = None
     """Why the validation logs contradict what the estimation logs say."""
 
 
-def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusion:
+# A limit that the controller's own law shows could still be one of the supply, not of the drive.
+_SHOWN = 0.99
+
+
+def conclude(
+    found: Search, settings: Settings, *, stands_out: bool, limits: Sequence[TorqueLimit] = ()
+) -> Conclusion:
     """Draw the verdict from a finished search.
 
     ``stands_out``: whether the plain torque error of the re-fitted simulator lies
-    above the noise; without, what no effect explains is taken for noise.
+    above the noise; without, what no effect explains is taken for noise. ``limits``: causes that
+    the logs show by themselves; they come first.
     """
     accepted = found.accepted
     explained = found.explained()
     labels = {r.trial.label for r, _ in accepted}
     strongest = _strongest(found)
     ranking = () if strongest is None else tuple(_candidate(r) for r in strongest.ranked)
+    p_none = 1.0 if strongest is None else strongest.p_none
+    p_unknown = 0.0 if strongest is None else strongest.p_unknown
+    if limits and not accepted:
+        ranking = (_candidate_shown(limits[0]),)
+        p_none, p_unknown = 0.0, 1.0 - _SHOWN
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
     gap = stands_out and _significant(found, settings)
-    if not accepted:
+    if not accepted and not limits:
         verdict: VerdictKind = "unknown" if gap else "none"
-    elif explained < settings.explained_share:
+    elif explained < settings.explained_share and (accepted or gap):
         verdict = "unknown"
     else:
         verdict = "undecidable" if open_groups else "explained"
     believed = verdict in ("explained", "undecidable")
-    causes = tuple(
-        _named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted) if believed
-    )
+    searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
+    causes = (*map(_shown, limits), *searched) if believed else ()
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
@@ -83,10 +97,26 @@ def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusi
         equivalent=open_groups if believed else (),
         next_experiment=advice,
         ranking=ranking,
-        p_none=1.0 if strongest is None else strongest.p_none,
-        p_unknown=0.0 if strongest is None else strongest.p_unknown,
+        p_none=p_none,
+        p_unknown=p_unknown,
         axes=_axes(found, settings, causes, gap=gap),
-        checks=_checks(found, settings, explained),
+        checks=(*map(_limit_check, limits), *_checks(found, settings, explained)),
+        effects=(*(x.effect for x in limits), *found.model.effects) if believed else (),
+    )
+
+
+def _shown(limit: TorqueLimit) -> NamedCause:
+    info = effect_info(limit.effect.name)
+    units = {p.name: p.unit for p in info.parameters}
+    value = {"limit_nm": limit.limit_nm}
+    return NamedCause(info.name, limit.axis, _SHOWN, value, units, info.family, _SHOWN)
+
+
+def _limit_check(limit: TorqueLimit) -> str:
+    return (
+        f"Axis {limit.axis}: {100 * limit.samples / limit.of:.3g} % of the logged torque stands at "
+        f"{limit.limit_nm.value:.4g} Nm where the controller's law asks for more; cut there, the law gives "
+        f"{100 * limit.explained:.4g} % of what it misses otherwise."
     )
 
 
@@ -126,6 +156,13 @@ def _significant(found: Search, settings: Settings) -> bool:
     """Whether the re-fitted simulator leaves more than floor and formula error."""
     excess = found.layout.by_axis(held_out_loss(found.baseline) - found.floor)
     return bool(np.any(excess / found.layout.samples() > settings.largest_scatter))
+
+
+def _candidate_shown(limit: TorqueLimit) -> Candidate:
+    name = limit.effect.name
+    # So many samples, each a trial of its own, stand where chance would put none.
+    sure = float(np.sqrt(limit.samples))
+    return Candidate(name, limit.axis, _SHOWN, limit.explained, sure, "shown_by_the_logs")
 
 
 def _candidate(ranked: Ranked) -> Candidate:

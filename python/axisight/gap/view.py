@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
+from axisight.gap.limits import TorqueLimit
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.result import Mode
@@ -34,6 +35,8 @@ class View(ABC):
     floor: Floor
     cutoff_hz: float | None = None
     """Of the low-pass on both sides; None where there is none."""
+    limits: tuple[TorqueLimit, ...] = ()
+    """Of the torque, as the logs show them by themselves."""
 
     def candidates(self, model: Evidence) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model."""

@@ -1,0 +1,141 @@
+"""Torque limits that a log shows by itself: flat tops where the controller asks for more.
+
+Many drives report the torque after their own limit. The machine got what the log says, so a
+simulator that is kept on the log has no error there; driven by the references, it has. But the
+command before the limit is algebra of references and measured positions, whatever the machine:
+where it lies beyond a flat top of the logged torque, and equals the torque elsewhere, the drive has
+cut it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.gap.result import Interval
+from axisight.logs import Log
+from axisight.logs.frozen import runs
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# A flat top has this many equal samples in a row, and all tops together this many.
+_IN_A_ROW = 3
+_IN_ALL = 20
+# One limit for all logs: levels agree so well.
+_SAME_LEVEL = 1e-3
+# Share of the samples at a top where the command must lie beyond it, and share of the torque's
+# variance elsewhere that the command must give; what is left beyond is another controller.
+_BEYOND = 0.95
+_LAW_HOLDS = 0.99
+
+
+@dataclass(frozen=True)
+class TorqueLimit:
+    """A limit of one axis (from 1) [Nm]; ``samples`` stood at it, of ``of`` in these logs.
+
+    ``explained``: share of what the torque is off the command that the limit takes away [1].
+    """
+
+    axis: int
+    limit_nm: Interval
+    samples: int
+    of: int
+    explained: float
+
+    @property
+    def effect(self) -> Effect:
+        """The limit as an effect."""
+        return Effect("torque_saturation", self.axis, {"limit_nm": self.limit_nm.value})
+
+
+def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[TorqueLimit, ...]:
+    """Return the limits that logs with velocity references show, axis by axis."""
+    commands = [_command(robot, log) for log in logs]
+    found = (_limit(i, logs, commands) for i in range(robot.n_axes))
+    return tuple(x for x in found if x is not None)
+
+
+def missing(limits: Sequence[TorqueLimit], robot: Robot) -> tuple[TorqueLimit, ...]:
+    """Return the limits that a simulator does not have."""
+    own = {e.axis: e.values()[0] for e in robot.effects if e.name == "torque_saturation"}
+    return tuple(
+        x for x in limits if abs(own.get(x.axis, np.inf) / x.limit_nm.value - 1) > _SAME_LEVEL
+    )
+
+
+def reported(torque: Array, limits: Sequence[TorqueLimit], effects: Iterable[Effect]) -> Array:
+    """Return commanded torques (n, n_axes) [Nm] as drives that show ``limits`` report them.
+
+    Cut at the limits among ``effects``, those of the simulator.
+    """
+    out = torque.copy()
+    after = {x.axis for x in limits}
+    for effect in effects:
+        if effect.name == "torque_saturation" and effect.axis in after:
+            limit, i = effect.values()[0], effect.axis - 1
+            out[:, i] = np.clip(out[:, i], -limit, limit)
+    return out
+
+
+def _command(robot: Robot, log: Log) -> Array:
+    """Return what the controller commands before any limit, but for a constant, (n, n_axes) [Nm]."""
+    reference, time = log.velocity_ref_rad_s, log.sample_time_s
+    assert reference is not None  # closed loop only
+    gains = robot.controller_gains
+    position = log.position_rad - log.position_rad[0]
+    speed = np.diff(position, axis=0, prepend=position[:1]) / time
+    behind = _before(reference) * time - position
+    slower = reference - speed
+    if "kv" in gains:
+        error = slower + gains["kv"] * behind
+        return np.asarray(gains["kp"] * error + gains["ki"] * _before(error) * time)
+    return np.asarray(gains["kp"] * slower + gains.get("ki", 0.0) * behind)
+
+
+def _before(x: Array) -> Array:
+    return np.asarray(np.cumsum(x, axis=0) - x)
+
+
+def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> TorqueLimit | None:
+    torques = [log.torque_nm[:, axis] for log in logs]
+    highest = max(float(np.abs(u).max()) for u in torques)
+    tops = [_flat(np.abs(u), highest) for u in torques]
+    at_top = np.concatenate(tops)
+    if at_top.sum() < _IN_ALL or at_top.all():
+        return None
+    measured = np.concatenate(torques)
+    # What the controller starts from is constant along a log.
+    asked = np.concatenate(
+        [
+            c[:, axis] + np.median((u - c[:, axis])[~top]) if not top.all() else u
+            for u, c, top in zip(torques, commands, tops, strict=True)
+        ]
+    )
+    off = measured - asked
+    power = float(np.var(measured[~at_top]))
+    if not power > 0 or float(np.mean(off[~at_top] ** 2)) > (1 - _LAW_HOLDS) * power:
+        return None
+    beyond = -np.sign(measured) * off
+    scatter = 3.0 * float(np.std(off[~at_top]))
+    if float(np.mean(beyond[at_top] > -scatter)) < _BEYOND or np.median(beyond[at_top]) < scatter:
+        return None
+    cut = np.clip(asked, -highest, highest)
+    explained = 1.0 - float(np.sum((measured - cut) ** 2) / np.sum(off**2))
+    levels = np.abs(measured[at_top])
+    low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975])
+    interval = Interval(float(middle), float(low), float(high))
+    return TorqueLimit(axis + 1, interval, int(at_top.sum()), len(at_top), explained)
+
+
+def _flat(size: Array, level: float) -> NDArray[np.bool_]:
+    """Mark the samples (n,) of runs at a level."""
+    flat = np.zeros(len(size), dtype=bool)
+    for a, b in runs(size >= (1 - _SAME_LEVEL) * level):
+        if b - a >= _IN_A_ROW:
+            flat[a:b] = True
+    return flat
