@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,12 @@ Array = NDArray[np.float64]
 
 
 def situation(
-    robot: Robot, logs: Sequence[Log], baseline: Evidence, decimation: int, response: Response
+    robot: Robot,
+    logs: Sequence[Log],
+    baseline: Evidence,
+    decimation: int,
+    response: Response,
+    noise: Array,
 ) -> Situation:
     """Return the residual of a model and how the motors turned, by log and axis."""
 
@@ -35,21 +41,28 @@ def situation(
         return turning(residual, position, speed, log.sample_time_s, decimation)
 
     axes = range(robot.n_axes)
-    return Situation([[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)], response)
+    turned = [[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)]
+    return Situation(turned, response, noise)
 
 
 def all_candidates(
-    robot: Robot, logs: Sequence[Log], at: Situation, *, inverse_dynamics: bool = False
+    robot: Robot,
+    logs: Sequence[Log],
+    at: Situation,
+    *,
+    inverse_dynamics: bool = False,
+    threads: int = 1,
 ) -> list[FreeEffect]:
     """Return one candidate per effect and place that can act on this robot."""
-    out = []
-    for info in effect_table().values():
-        if info.stiff or (inverse_dynamics and not info.inverse_dynamics):
-            continue
-        for axis in _axes(robot, info):
-            candidate = STARTS[info.name](Trial(info, axis, robot, logs, at))
-            if candidate is not None:
-                out.append(candidate)
+    trials = [
+        Trial(info, axis, robot, logs, at)
+        for info in effect_table().values()
+        if not info.stiff and (info.inverse_dynamics or not inverse_dynamics)
+        for axis in _axes(robot, info)
+    ]
+    with ThreadPoolExecutor(threads) as pool:
+        found = pool.map(lambda t: STARTS[t.info.name](t), trials)
+        out = [candidate for candidate in found if candidate is not None]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
 

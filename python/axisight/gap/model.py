@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 class FreeEffect:
     """An effect under trial: start values, the parameters to fit, priors and bounds of some.
 
-    ``starts`` are further values of the one free parameter worth trying, for effects whose fit
-    may end in the wrong valley.
+    ``starts`` are further start values worth trying, of one parameter, for effects whose fit may
+    end in the wrong valley.
     """
 
     effect: Effect

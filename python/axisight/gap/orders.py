@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,18 @@ class Turning:
     def frequency_hz(self) -> Array:
         """Frequencies (n // 2 + 1,) of the residual's spectrum [Hz]."""
         return np.asarray(np.fft.rfftfreq(len(self.residual), self.sample_time_s))
+
+    @cached_property
+    def spectra(self) -> Complex:
+        """Spectra of the cosines of every order, then of the sines (2 orders, n // 2 + 1)."""
+        order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
+        rate = self.oversampling / self.sample_time_s
+        used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST * rate
+        wave = np.cumprod(np.broadcast_to(np.exp(1j * self.angle_rad), used.shape), axis=0) * used
+        # Of the oversampled wave what lies below the Nyquist frequency of the residual.
+        f = self.frequency_hz
+        spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))[:, : len(f)]
+        return np.asarray(spectra * np.exp(2j * np.pi * f * self.later_s))
 
 
 def turning(
@@ -94,17 +107,10 @@ def strongest_orders(
 
 
 def _columns(log: Turning, response: Complex) -> Array:
-    """Return cosines of every order, then sines, through a response (2 orders, n)."""
-    order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
-    rate = log.oversampling / log.sample_time_s
-    used = np.abs(log.speed_rad_s) * order < np.pi * _OF_NYQUIST * rate
-    wave = np.cumprod(np.broadcast_to(np.exp(1j * log.angle_rad), used.shape), axis=0) * used
-    f, n = log.frequency_hz, len(log.residual)
-    passed = response * np.exp(2j * np.pi * f * log.later_s)
-    passed[0] = 0.0
-    # The spectrum of the oversampled wave up to the Nyquist frequency of the residual.
-    spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))[:, : len(f)] * passed
-    return np.asarray(np.fft.irfft(spectra, n))
+    """Return cosines of every order, then sines, through a response (2 orders, n), without means."""
+    passed = log.spectra * response
+    passed[:, 0] = 0.0
+    return np.asarray(np.fft.irfft(passed, len(log.residual)))
 
 
 def _gains(normal: Array, along: Array, found: Sequence[int]) -> Array:

@@ -7,7 +7,7 @@ data have nothing to start from.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,10 @@ Response = Callable[[str, int, Array], Complex]
 """Of the weighted residual on an axis (from 0) to an effect there, by its name, at frequencies [Hz]."""
 
 
+# Mean square of a weighted residual that no cause is worth naming for.
+_LEFT = 0.05
+
+
 @dataclass(frozen=True)
 class Situation:
     """What start values are taken from.
@@ -34,6 +38,14 @@ class Situation:
 
     turning: Sequence[Sequence[Turning]]
     response: Response
+    noise: Array
+    """Mean square of the residual of each axis that is noise only."""
+
+    def is_left(self, index: int) -> bool:
+        """Whether the residual of an axis holds more than noise."""
+        logs = [axes[index].residual for axes in self.turning]
+        square = sum(float(r @ r) for r in logs) / sum(len(r) for r in logs)
+        return bool(square > self.noise[index] + _LEFT)
 
 
 @dataclass(frozen=True)
@@ -82,10 +94,26 @@ def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
 
 _SMOOTHING = 0.003
 _STRIBECK = 0.1
+# Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load.
+_STRIBECK_STARTS = (0.003, 0.01, 0.03)
+
+
+def _stribeck(trial: Trial) -> FreeEffect:
+    """Begin as a law with several speeds over which friction falls: a fit does not cross decades."""
+    name = "stribeck_speed_rad_s"
+    begin = _law(smoothing_rad_s=_SMOOTHING, **{name: _STRIBECK})(trial)
+    if not trial.at.is_left(trial.index):
+        return begin
+    speed = float((begin.effect.parameters or {})[name])
+    starts = tuple({name: share / _STRIBECK * speed} for share in _STRIBECK_STARTS)
+    bounds = {**begin.bounds, name: (0.1 * starts[0][name], 10 * speed)}
+    return replace(begin, bounds=bounds, starts=starts)
 
 
 def _waves(trial: Trial) -> FreeEffect | None:
     """Begin with the strongest orders of the residual over the motor angle."""
+    if not trial.at.is_left(trial.index):
+        return None
     logs = [axes[trial.index] for axes in trial.at.turning]
     found = trial.at.response
     responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
@@ -164,7 +192,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "viscous_friction": _neutral,
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
     "asymmetric_friction": _law(smoothing_rad_s=_SMOOTHING),
-    "stribeck_friction": _law(smoothing_rad_s=_SMOOTHING, stribeck_speed_rad_s=_STRIBECK),
+    "stribeck_friction": _stribeck,
     "presliding_friction": _law(stribeck_speed_rad_s=_STRIBECK),
     "backlash": _play,
     "nonlinear_stiffness": _neutral,

@@ -104,7 +104,7 @@ class Trials:
 
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
         """Screen all candidates by one linear step, fit the promising ones in full."""
-        if any(option.starts for option in options):
+        if any(option.starts and len(option.free) == 1 for option in options):
             self.near_nominal = self.fitter.runs(self.model, {})
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
@@ -213,7 +213,14 @@ class Trials:
         best = _Start(option, self.model.robot_values, -np.inf)
         if evidence is not None:
             best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
-        if option.starts:
+        if len(option.free) > 1:
+            # Further starts of one that does nothing as it is: by what a step from there promises.
+            for begin in (option.at(values) for values in option.starts):
+                other = self._attempt(self.fitter.evaluate, begin, None)
+                gain = -np.inf if other is None else linear_gain(other)
+                if gain > best.gain:
+                    best = replace(best, option=begin, gain=gain)
+        elif option.starts:
             begin, gain = self._best_of_starts(option)
             if gain > best.gain:
                 best = _Start(begin, {}, gain)

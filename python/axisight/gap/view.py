@@ -41,10 +41,20 @@ class View(ABC):
     def candidates(self, model: Evidence) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model."""
         at = situation(
-            self.robot, self.logs, model, self.fitter.weighting.decimation, self._weighted_response
+            self.robot,
+            self.logs,
+            model,
+            self.fitter.weighting.decimation,
+            self._weighted_response,
+            self.floor.expected,
         )
-        inverse = self.mode == "inverse_dynamics"
-        return all_candidates(self.robot, self.logs, at, inverse_dynamics=inverse)
+        return all_candidates(
+            self.robot,
+            self.logs,
+            at,
+            inverse_dynamics=self.mode == "inverse_dynamics",
+            threads=self.settings.threads,
+        )
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         weighting = self.fitter.weighting
