@@ -89,14 +89,14 @@ def test_a_diagnosis_refuses_by_name(name):
     assert "expected" in str(error.value) and "got" in str(error.value)
 
 
-def test_a_flag_is_in_checks_and_verdict():
+def test_a_flag_is_in_diagnosis_and_verdict():
     mistake = next(m for m in GATE if m.spoil.__name__ == "zero_of_one_axis_off_arm")
     case = mistake.spoil(clean_arm())
     settings = Settings(bootstrap=20, max_causes=1)
     out = diagnose(
         robot=case.robot, estimation=case.estimation, validation=case.validation, settings=settings
     )
-    assert any(check.startswith("position_offset") for check in out.checks)
+    assert "position_offset" in {finding.name for finding in out.findings}
     (entry,) = [f for f in out.to_verdict()["findings"] if f["name"] == "position_offset"]
     assert entry["axis"] == 2 and entry["severity"] == "flag"
 
