@@ -1,7 +1,9 @@
 """Plausible mistakes are refused or flagged by their name before a diagnosis, and nothing else is."""
 
+import importlib.util
 import re
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +11,22 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from axisight import Effect, Robot, Settings, diagnose, read_case, simulate
+from axisight import (
+    Effect,
+    Log,
+    Robot,
+    Settings,
+    diagnose,
+    load_robot,
+    read_case,
+    read_log,
+    simulate,
+)
 from axisight.cli import app
 from axisight.errors import CaseError, InputError, LogError
 from axisight.gap import RefusedInputError, check_inputs
 from axisight.gap.faults import MEANINGS
+from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.inputs import read_inputs
 from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
 from wrong_inputs import TABLE, Case, clean_arm, clean_loop, each, late, loop_case, write_case
@@ -224,7 +237,7 @@ def test_a_drive_that_filters_its_torque_passes():
     assert found(each(clean_loop(), filtered)) == ()
 
 
-@pytest.mark.parametrize("bits", [14, 16, 20])
+@pytest.mark.parametrize("bits", [9, 10, 12, 14, 16, 20])
 def test_an_encoder_of_few_bits_is_no_frozen_channel(bits):
     step = 2 * np.pi / 2**bits
 
@@ -232,6 +245,19 @@ def test_an_encoder_of_few_bits_is_no_frozen_channel(bits):
         return replace(log, position_rad=np.round(log.position_rad / step) * step)
 
     assert not refusals(each(clean_loop(), coarse))
+
+
+def test_numbers_of_few_digits_are_no_jumps():
+    """Five digits, as text files have them: steps grow tenfold where a position passes 100 rad."""
+
+    def written(log):
+        turned = log.position_rad + np.array([98.0, -101.0, 99.5])
+        digits = 4 - np.floor(np.log10(np.abs(turned)))
+        return replace(log, position_rad=np.round(turned * 10**digits) / 10**digits)
+
+    named = {f.name for f in found(each(without_references(clean_loop()), written))}
+    assert not named & {"rows_missing", "rows_shuffled", "rows_repeated", "position_jumps"}
+    assert not named & {"samples_frozen", "position_spike"}
 
 
 ARMS = {
@@ -266,6 +292,55 @@ def test_practice_cases_pass(shared, number):
     assert {f.name for f in found(case)} <= {"torque_saturated"}
     assert not refusals(case)
     assert {f.name for f in found(without_references(case))} <= {"torque_saturated"}
+
+
+def test_irregular_stamps_that_were_interpolated_are_no_fault_of_rows():
+    def interpolated(log):
+        # An axis that creeps over a coarse encoder, between two stamps by straight lines.
+        counts = 7e-4 * np.round(0.02 * log.time_s[:, None] * np.ones(3) / 7e-4)
+        own = np.arange(0.0, log.duration_s, 3.1 * log.sample_time_s)
+        held = np.column_stack(
+            [np.interp(log.time_s, own, np.interp(own, log.time_s, c)) for c in counts.T]
+        )
+        return replace(log, position_rad=held, notes=("resampled linearly from 9 stamps",))
+
+    logs = each(without_references(clean_loop()), interpolated).logs
+    assert not [f for log in logs for f in check_log_alone(log) if f.severity == "refuse"]
+
+
+# Real machines.
+
+
+def test_real_machines_are_not_refused(shared_data, repository):
+    examples = repository / "examples"
+    robot = load_robot(examples / "emps/robot.toml")
+    names = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
+    columns = examples / "emps/columns.toml"
+    first, second = (read_log(shared_data / "emps" / name, columns) for name in names)
+    assert check_inputs(robot, [first], [second]) == ()
+    spec = importlib.util.spec_from_file_location("rigid_run", examples / "rigid_body/run.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclass looks its module up
+    spec.loader.exec_module(module)
+
+    def log_of_record(record):
+        n, step = len(record.torque_nm), record.sample_time_s
+        # Motor angles of the gears alone: a coupling of axes has no place in a robot file.
+        motor = record.position_rad / record.robot.gear_ratio
+        name = record.name
+        return Log(
+            name=name, source=Path(name), sample_time_s=step, time_s=step * np.arange(n),
+            torque_nm=record.torque_nm, position_rad=motor,
+        )  # fmt: skip
+
+    tx40 = module.read_tx40(shared_data / "staubli_tx40")
+    whole = log_of_record(tx40)
+    assert check_inputs(tx40.robot, [whole.part(0.0, 5.0)], [whole.part(5.0)]) == ()
+    runs = [module.read_kr300(shared_data / "kuka_kr300", run) for run in "ABC"]
+    logs = [log_of_record(run) for run in runs]
+    # A counterbalance carries two thirds of the load of axis 2; the robot file has none.
+    noted = check_inputs(runs[0].robot, logs[:2], logs[2:])
+    assert {(f.name, f.severity, f.axis) for f in noted} == {("torque_scaled", "flag", 2)}
 
 
 # The page.

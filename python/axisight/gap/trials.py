@@ -171,7 +171,9 @@ class Trials:
     ) -> A | None:
         effects = [*kept_beside(self.model.free, option), option]
         # Runs serve where the simulator's own parameters are those of the runs, or near them.
-        near = self.near if values is None or values == self.model.robot_values else self.near_nominal
+        near = (
+            self.near if values is None or values == self.model.robot_values else self.near_nominal
+        )
         try:
             return solve(effects, self.model, robot_values=values, near=near)
         except InputError as error:

@@ -54,10 +54,9 @@ def check_log_alone(log: Log) -> list[Finding]:
     if any(finding.severity == "error" for finding in wrong):
         return [named(finding, log) for finding in wrong]
     slides = [kind == "prismatic" for kind in log.axis_kinds]
-    looked = [
-        *look_at_signals(signals, labels, slides),
-        *check_rows(signals, labels, log.sample_time_s),
-    ]
+    looked = look_at_signals(signals, labels, slides)
+    if not log.is_resampled:  # steps and rests between interpolated stamps are those of the grid
+        looked += check_rows(signals, labels, log.sample_time_s)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
     out = [_dead(finding, log) for finding in out if not _idle_reference(finding)]
     return [*out, *_clipped(log, labels), *_velocity(log, slides)]
