@@ -59,6 +59,8 @@ def test_a_mistake_is_named(mistake):
     seen = [(f.name, f.severity, f.axis) for f in findings]
     of_the_name = [f for f in findings if (f.name, f.severity) == (mistake.name, mistake.severity)]
     assert of_the_name, seen
+    if mistake.severity == "flag":
+        assert not [f for f in findings if f.severity == "refuse"], seen
     if mistake.axis is not None:
         assert mistake.axis in {f.axis for f in of_the_name}, seen
     for finding in findings:

@@ -31,7 +31,7 @@ def steps_around(values: Floats, places: Ints) -> Floats:
     rounding = _ROUNDING * float(np.abs(values).max())
     usual = _smallest(change, rounding)
     grid = np.array([_grid_step(change, int(k), rounding, usual) for k in places])
-    return np.maximum(grid, _last_digit(values, places))
+    return np.asarray(np.maximum(grid, _last_digit(values, places)))
 
 
 def _grid_step(change: Floats, k: int, rounding: float, usual: float) -> float:
