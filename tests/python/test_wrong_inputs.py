@@ -23,8 +23,9 @@ from axisight import (
     simulate,
 )
 from axisight.cli import app
+from axisight.cli.identify_common import read_logs
 from axisight.errors import CaseError, InputError, LogError
-from axisight.gap import RefusedInputError, check_inputs
+from axisight.gap import RefusedInputError, check_fit_inputs, check_inputs
 from axisight.gap.faults import MEANINGS
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.inputs import read_inputs
@@ -60,7 +61,9 @@ def test_a_mistake_is_named(mistake):
     of_the_name = [f for f in findings if (f.name, f.severity) == (mistake.name, mistake.severity)]
     assert of_the_name, seen
     if mistake.severity == "flag":
-        assert not [f for f in findings if f.severity == "refuse"], seen
+        # A position that rests at its limit and comes back with a jump stood still, too.
+        also = {"samples_frozen"} if mistake.name == "position_clipped" else set()
+        assert {f.name for f in findings if f.severity == "refuse"} <= also, seen
     if mistake.axis is not None:
         assert mistake.axis in {f.axis for f in of_the_name}, seen
     for finding in findings:
@@ -138,7 +141,45 @@ def test_check_and_identify_know_rows(tmp_path):
     robot = str(folder / "robot.toml")
     identified = CliRunner().invoke(app, ["identify", "rigid-body", robot, log])
     assert identified.exit_code == 2
-    assert "stood still" in " ".join(identified.output.split())
+    text = " ".join(identified.output.split())
+    assert "samples_frozen: multisine_0: position_2: " in text and "stood still" in text
+    axis = ["identify", "axis", log, log, "--robot", robot, "--axis", "2"]
+    identified = CliRunner().invoke(app, axis)
+    assert identified.exit_code == 2
+    assert "samples_frozen" in identified.output
+
+
+@pytest.mark.parametrize("mistake", GATE, ids=lambda m: m.id)
+def test_a_log_to_fit_to_is_looked_at_for_itself(mistake):
+    """What shows without a simulator has the same name as in a diagnosis."""
+    case = mistake.spoil(CLEAN[mistake.kind]())
+    alone = {(f.name, f.severity) for f in check_fit_inputs(case.robot, case.logs)}
+    by_rows = "rows_ samples_ not_ channel_ torque_sat position_spike position_wr position_cl gear"
+    if mistake.name.startswith(tuple(by_rows.split())):
+        assert (mistake.name, mistake.severity) in alone, alone
+    names = {name for name, severity in alone if severity == "refuse"}
+    assert names <= {f.name for f in found(case)} | {"log_repeated"}
+
+
+def test_part_of_a_log_is_judged_by_itself(tmp_path):
+    """The advice to cut the log where a channel stood still can be followed."""
+    spoil = next(m for m in GATE if m.spoil.__name__ == "position_frozen_for_200_ms").spoil
+    folder = write_case(spoil(clean_loop()), tmp_path / "case")
+    log = folder / "logs" / "multisine_0.parquet"
+    columns, robot = None, load_robot(folder / "robot.toml")
+    (whole,) = read_logs([log], columns, robot, unchecked=True)
+    assert {f.name for f in check_fit_inputs(robot, [whole])} == {"samples_frozen"}
+    until = next(f for f in check_fit_inputs(robot, [whole])).message
+    begin = float(re.search(r"from (\S+) s on", until)[1])
+    (part,) = read_logs([log], columns, robot, unchecked=False, part=(0.0, begin - 0.1))
+    assert check_fit_inputs(robot, [part]) == ()
+
+
+@pytest.mark.parametrize("kind", CLEAN)
+def test_clean_logs_to_fit_to_pass_without_a_word(kind):
+    case = CLEAN[kind]()
+    assert check_fit_inputs(case.robot, case.logs) == ()
+    assert check_fit_inputs(None, case.logs) == ()
 
 
 # No false alarms.
