@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import wrong_inputs  # noqa: F401 (enters its mistakes into the table)
 from axisight import (
     Effect,
     Log,
@@ -30,7 +31,8 @@ from axisight.gap.faults import MEANINGS
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.inputs import read_inputs
 from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
-from wrong_inputs import TABLE, Case, clean_arm, clean_loop, each, late, loop_case, write_case
+from spoiled_cases import TABLE, Case, clean_arm, clean_loop, each, late, loop_case
+from wrong_files import write_case
 
 CLEAN = {"loop": clean_loop, "arm": clean_arm}
 GATE = [m for m in TABLE if m.kind != "file"]
