@@ -33,7 +33,7 @@ def test_a_diagnosis_says_it_all(shown):
         "where: axis 2, residual steps with velocity sign",
         "remains above noise: 3.7 % of the torque; it varies with speed",
         "remains: axis 1, 70 % of the squared gap above the floor",
-        "finding: axis2.damping ended +32 % off, at the bound",
+        "finding: parameter_at_edge: axis2.damping: ended +32 % off, at the bound",
         "next experiment: Move slowly.",
         "stiffness_2 │ -2.1 % │ -3.5 to -0.7 %",
     ):

@@ -92,7 +92,7 @@ def test_pooled_remainder_and_findings_are_on_the_page():
     assert "√(Σ e² / Σ u²)" in page
     assert "3.7 % of the torque on the held-out logs remain above the floor" in page
     assert "that varies with speed" in page
-    assert "axis2.damping ended +32 % off, at the bound" in page
+    assert "parameter_at_edge: axis2.damping: ended +32 % off, at the bound" in page
     clean = " ".join(render_report(of("none")).split())
     assert "Nothing stands out of the floor" in clean
     assert "To know before believing" not in clean

@@ -1,7 +1,9 @@
 """Plausible mistakes are refused or flagged by their name before a diagnosis, and nothing else is."""
 
+import importlib.util
 import re
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,14 +11,28 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from axisight import Effect, Robot, Settings, diagnose, read_case, simulate
+import wrong_inputs  # noqa: F401 (enters its mistakes into the table)
+from axisight import (
+    Effect,
+    Log,
+    Robot,
+    Settings,
+    diagnose,
+    load_robot,
+    read_case,
+    read_log,
+    simulate,
+)
 from axisight.cli import app
+from axisight.cli.identify_common import read_logs
 from axisight.errors import CaseError, InputError, LogError
-from axisight.gap import RefusedInputError, check_inputs
+from axisight.gap import RefusedInputError, check_fit_inputs, check_inputs
 from axisight.gap.faults import MEANINGS
+from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.inputs import read_inputs
 from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
-from wrong_inputs import TABLE, Case, clean_arm, clean_loop, each, late, loop_case, write_case
+from spoiled_cases import TABLE, Case, clean_arm, clean_loop, each, late, loop_case
+from wrong_files import write_case
 
 CLEAN = {"loop": clean_loop, "arm": clean_arm}
 GATE = [m for m in TABLE if m.kind != "file"]
@@ -46,6 +62,10 @@ def test_a_mistake_is_named(mistake):
     seen = [(f.name, f.severity, f.axis) for f in findings]
     of_the_name = [f for f in findings if (f.name, f.severity) == (mistake.name, mistake.severity)]
     assert of_the_name, seen
+    if mistake.severity == "flag":
+        # A position that rests at its limit and comes back with a jump stood still, too.
+        also = {"samples_frozen"} if mistake.name == "position_clipped" else set()
+        assert {f.name for f in findings if f.severity == "refuse"} <= also, seen
     if mistake.axis is not None:
         assert mistake.axis in {f.axis for f in of_the_name}, seen
     for finding in findings:
@@ -89,14 +109,14 @@ def test_a_diagnosis_refuses_by_name(name):
     assert "expected" in str(error.value) and "got" in str(error.value)
 
 
-def test_a_flag_is_in_checks_and_verdict():
+def test_a_flag_is_in_diagnosis_and_verdict():
     mistake = next(m for m in GATE if m.spoil.__name__ == "zero_of_one_axis_off_arm")
     case = mistake.spoil(clean_arm())
     settings = Settings(bootstrap=20, max_causes=1)
     out = diagnose(
         robot=case.robot, estimation=case.estimation, validation=case.validation, settings=settings
     )
-    assert any(check.startswith("position_offset") for check in out.checks)
+    assert "position_offset" in {finding.name for finding in out.findings}
     (entry,) = [f for f in out.to_verdict()["findings"] if f["name"] == "position_offset"]
     assert entry["axis"] == 2 and entry["severity"] == "flag"
 
@@ -123,7 +143,45 @@ def test_check_and_identify_know_rows(tmp_path):
     robot = str(folder / "robot.toml")
     identified = CliRunner().invoke(app, ["identify", "rigid-body", robot, log])
     assert identified.exit_code == 2
-    assert "stood still" in " ".join(identified.output.split())
+    text = " ".join(identified.output.split())
+    assert "samples_frozen: multisine_0: position_2: " in text and "stood still" in text
+    axis = ["identify", "axis", log, log, "--robot", robot, "--axis", "2"]
+    identified = CliRunner().invoke(app, axis)
+    assert identified.exit_code == 2
+    assert "samples_frozen" in identified.output
+
+
+@pytest.mark.parametrize("mistake", GATE, ids=lambda m: m.id)
+def test_a_log_to_fit_to_is_looked_at_for_itself(mistake):
+    """What shows without a simulator has the same name as in a diagnosis."""
+    case = mistake.spoil(CLEAN[mistake.kind]())
+    alone = {(f.name, f.severity) for f in check_fit_inputs(case.robot, case.logs)}
+    by_rows = "rows_ samples_ not_ channel_ torque_sat position_spike position_wr position_cl gear"
+    if mistake.name.startswith(tuple(by_rows.split())):
+        assert (mistake.name, mistake.severity) in alone, alone
+    names = {name for name, severity in alone if severity == "refuse"}
+    assert names <= {f.name for f in found(case)} | {"log_repeated"}
+
+
+def test_part_of_a_log_is_judged_by_itself(tmp_path):
+    """The advice to cut the log where a channel stood still can be followed."""
+    spoil = next(m for m in GATE if m.spoil.__name__ == "position_frozen_for_200_ms").spoil
+    folder = write_case(spoil(clean_loop()), tmp_path / "case")
+    log = folder / "logs" / "multisine_0.parquet"
+    columns, robot = None, load_robot(folder / "robot.toml")
+    (whole,) = read_logs([log], columns, robot, unchecked=True)
+    assert {f.name for f in check_fit_inputs(robot, [whole])} == {"samples_frozen"}
+    until = next(f for f in check_fit_inputs(robot, [whole])).message
+    begin = float(re.search(r"from (\S+) s on", until)[1])
+    (part,) = read_logs([log], columns, robot, unchecked=False, part=(0.0, begin - 0.1))
+    assert check_fit_inputs(robot, [part]) == ()
+
+
+@pytest.mark.parametrize("kind", CLEAN)
+def test_clean_logs_to_fit_to_pass_without_a_word(kind):
+    case = CLEAN[kind]()
+    assert check_fit_inputs(case.robot, case.logs) == ()
+    assert check_fit_inputs(None, case.logs) == ()
 
 
 # No false alarms.
@@ -224,7 +282,7 @@ def test_a_drive_that_filters_its_torque_passes():
     assert found(each(clean_loop(), filtered)) == ()
 
 
-@pytest.mark.parametrize("bits", [14, 16, 20])
+@pytest.mark.parametrize("bits", [9, 10, 12, 14, 16, 20])
 def test_an_encoder_of_few_bits_is_no_frozen_channel(bits):
     step = 2 * np.pi / 2**bits
 
@@ -232,6 +290,19 @@ def test_an_encoder_of_few_bits_is_no_frozen_channel(bits):
         return replace(log, position_rad=np.round(log.position_rad / step) * step)
 
     assert not refusals(each(clean_loop(), coarse))
+
+
+def test_numbers_of_few_digits_are_no_jumps():
+    """Five digits, as text files have them: steps grow tenfold where a position passes 100 rad."""
+
+    def written(log):
+        turned = log.position_rad + np.array([98.0, -101.0, 99.5])
+        digits = 4 - np.floor(np.log10(np.abs(turned)))
+        return replace(log, position_rad=np.round(turned * 10**digits) / 10**digits)
+
+    named = {f.name for f in found(each(without_references(clean_loop()), written))}
+    assert not named & {"rows_missing", "rows_shuffled", "rows_repeated", "position_jumps"}
+    assert not named & {"samples_frozen", "position_spike"}
 
 
 ARMS = {
@@ -266,6 +337,55 @@ def test_practice_cases_pass(shared, number):
     assert {f.name for f in found(case)} <= {"torque_saturated"}
     assert not refusals(case)
     assert {f.name for f in found(without_references(case))} <= {"torque_saturated"}
+
+
+def test_irregular_stamps_that_were_interpolated_are_no_fault_of_rows():
+    def interpolated(log):
+        # An axis that creeps over a coarse encoder, between two stamps by straight lines.
+        counts = 7e-4 * np.round(0.02 * log.time_s[:, None] * np.ones(3) / 7e-4)
+        own = np.arange(0.0, log.duration_s, 3.1 * log.sample_time_s)
+        held = np.column_stack(
+            [np.interp(log.time_s, own, np.interp(own, log.time_s, c)) for c in counts.T]
+        )
+        return replace(log, position_rad=held, notes=("resampled linearly from 9 stamps",))
+
+    logs = each(without_references(clean_loop()), interpolated).logs
+    assert not [f for log in logs for f in check_log_alone(log) if f.severity == "refuse"]
+
+
+# Real machines.
+
+
+def test_real_machines_are_not_refused(shared_data, repository):
+    examples = repository / "examples"
+    robot = load_robot(examples / "emps/robot.toml")
+    names = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
+    columns = examples / "emps/columns.toml"
+    first, second = (read_log(shared_data / "emps" / name, columns) for name in names)
+    assert check_inputs(robot, [first], [second]) == ()
+    spec = importlib.util.spec_from_file_location("rigid_run", examples / "rigid_body/run.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclass looks its module up
+    spec.loader.exec_module(module)
+
+    def log_of_record(record):
+        n, step = len(record.torque_nm), record.sample_time_s
+        # Motor angles of the gears alone: a coupling of axes has no place in a robot file.
+        motor = record.position_rad / record.robot.gear_ratio
+        name = record.name
+        return Log(
+            name=name, source=Path(name), sample_time_s=step, time_s=step * np.arange(n),
+            torque_nm=record.torque_nm, position_rad=motor,
+        )  # fmt: skip
+
+    tx40 = module.read_tx40(shared_data / "staubli_tx40")
+    whole = log_of_record(tx40)
+    assert check_inputs(tx40.robot, [whole.part(0.0, 5.0)], [whole.part(5.0)]) == ()
+    runs = [module.read_kr300(shared_data / "kuka_kr300", run) for run in "ABC"]
+    logs = [log_of_record(run) for run in runs]
+    # A counterbalance carries two thirds of the load of axis 2; the robot file has none.
+    noted = check_inputs(runs[0].robot, logs[:2], logs[2:])
+    assert {(f.name, f.severity, f.axis) for f in noted} == {("torque_scaled", "flag", 2)}
 
 
 # The page.

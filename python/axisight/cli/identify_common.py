@@ -11,6 +11,8 @@ import typer
 
 from axisight.cli.common import OUT, numbers
 from axisight.errors import InputError
+from axisight.gap import RefusedInputError, check_fit_inputs
+from axisight.gap.faults import refused
 from axisight.gap.inputs import part_of
 from axisight.logs import Log, check_log, read_log
 from axisight.robot import Robot, load_robot
@@ -60,19 +62,14 @@ def read_logs(
 ) -> list[Log]:
     """Return the ``part`` [s] of logs that pass what ``axisight check`` looks at; warnings are printed.
 
-    Identification fits data in wrong units as well as any. Raises InputError for an error that the
-    check finds, unless ``unchecked``, and for an axis that turns where that of the robot slides.
+    Identification fits data in wrong units, or with rows missing, as well as any. Raises InputError
+    for an error that the check finds, and for what :func:`check_fit_inputs` refuses by name, unless
+    ``unchecked``, and for an axis that turns where that of the robot slides.
     """
     logs = []
+    said: set[tuple[str, str]] = set()
     for path in paths:
-        for finding in check_log(path, columns).findings:
-            text = f"{path.name}: {finding.column}: {finding.message}"
-            if finding.severity == "error" and not unchecked:
-                raise InputError(
-                    f"{text} (put it right in a column map, or go on with --unchecked)"
-                )
-            if finding.severity != "ok":
-                say(f"{finding.severity}: {text}")
+        said |= _checked(path, columns, unchecked=unchecked)
         log = read_log(path, columns, n_axes=None if robot is None else robot.n_axes)
         slides = [kind == "prismatic" for kind in log.axis_kinds]
         if robot is not None and slides != list(robot.axis_is_prismatic):
@@ -81,7 +78,30 @@ def read_logs(
                 f"robot's, got axes that {_kinds(slides)} by their units"
             )
         logs.append(log if part == (0.0, None) else part_of(log, *part))
+    found = check_fit_inputs(robot, logs)
+    if refused(found) and not unchecked:
+        raise InputError(f"{RefusedInputError(found)} (put it right, or go on with --unchecked)")
+    for finding in found:
+        if (finding.log, finding.message) not in said and finding.name != "velocity_inconsistent":
+            say(f"warning: {finding}")
     return logs
+
+
+def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[str, str]]:
+    """Print what ``axisight check`` warns of, and return it as (name of the log, message).
+
+    Raises InputError for its errors, unless ``unchecked``, but for those that have a name: these are
+    refused by reading, or where they lie in the part that is used.
+    """
+    said = set()
+    for finding in check_log(path, columns).findings:
+        text = f"{path.name}: {finding.column}: {finding.message}"
+        if finding.severity == "error" and not finding.name and not unchecked:
+            raise InputError(f"{text} (put it right in a column map, or go on with --unchecked)")
+        if finding.severity == "warning" or (finding.severity == "error" and not finding.name):
+            say(f"{finding.severity}: {f'{finding.name}: ' if finding.name else ''}{text}")
+            said.add((path.stem, finding.message))
+    return said
 
 
 def _kinds(slides: Sequence[bool]) -> str:

@@ -1,7 +1,7 @@
 """Diagnosis of the gap between a simulator and measured logs: where, which, how far."""
 
 from axisight.gap.faults import Finding, RefusedInputError
-from axisight.gap.gate import check_inputs
+from axisight.gap.gate import check_fit_inputs, check_inputs
 from axisight.gap.pipeline import diagnose
 from axisight.gap.result import (
     AxisVerdict,
@@ -32,6 +32,7 @@ __all__ = [
     "Remainder",
     "Settings",
     "Where",
+    "check_fit_inputs",
     "check_inputs",
     "diagnose",
     "verdict_schema",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -39,8 +40,16 @@ def lowpass(x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4) -
             f"x: expected more than {least} samples for order {order}, got {x.shape[0]}"
         )
     pad = min(x.shape[0] - 1, max(least, math.ceil(_PADDING_PERIODS / (cutoff_hz * sample_time_s))))
-    sections = scipy.signal.butter(order, cutoff_hz * sample_time_s * 2.0, output="sos")
+    sections = _butterworth(order, cutoff_hz * sample_time_s * 2.0).copy()  # scipy wants to write
     return np.asarray(scipy.signal.sosfiltfilt(sections, x, axis=0, padlen=pad), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _butterworth(order: int, cutoff: float) -> Floats:
+    """Return second-order sections; `cutoff` relative to Nyquist. Designing takes as long as filtering."""
+    sections = np.asarray(scipy.signal.butter(order, cutoff, output="sos"), dtype=np.float64)
+    sections.setflags(write=False)
+    return sections
 
 
 def differentiate(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from axisight.logs.findings import Finding
-from axisight.logs.log import Floats
+from axisight.logs.log import RESAMPLED, Floats
 
 JITTER_SAMPLES = 0.01
 """Largest tolerated error of a time stamp, in samples."""
@@ -145,9 +145,7 @@ def _resample(grid: Grid, time_s: Floats, resample_hz: float, label: str) -> Non
         )
         grid.findings.append(Finding("warning", label, message))
         grid.notes.append(message)
-    grid.notes.append(
-        f"resampled linearly from {time_s.size} irregular stamps to {resample_hz:g} Hz"
-    )
+    grid.notes.append(f"{RESAMPLED} from {time_s.size} irregular stamps to {resample_hz:g} Hz")
 
 
 def _agree(grid: Grid, rate_hz: float, label: str) -> None:

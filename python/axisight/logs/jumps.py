@@ -13,6 +13,7 @@ from axisight.logs.findings import Finding
 from axisight.logs.frozen import frozen_stretches
 from axisight.logs.gather import Channel
 from axisight.logs.log import Floats
+from axisight.logs.resolution import steps_around
 from axisight.logs.spikes import isolated_spikes
 
 Ints = NDArray[np.int64]
@@ -24,6 +25,9 @@ Ints = NDArray[np.int64]
 _NEIGHBOURS = 7
 _SHARE_OF_TOP = 0.3
 _USUAL = 20.0
+# Steps of a coarse encoder, or of numbers written with few digits, make the speed of a slow axis jump
+# by one or two of themselves.
+_RESOLUTIONS = 3.0
 # Jumps this near to one another are one event; this many in it are rows out of order.
 _EVENT_SAMPLES = 15
 _OUT_OF_ORDER = 4
@@ -92,6 +96,7 @@ def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Ju
     if known:
         near = np.abs(found[:, None] - np.array(known)[None]).min(axis=1) <= 2
         found = found[~near]
+    found = found[np.abs(off[found]) > _RESOLUTIONS * steps_around(values, found)]
     return [Jump(axis, int(k), float(off[k]), float(usual[k])) for k in found], top
 
 

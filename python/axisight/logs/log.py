@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 AxisKind = Literal["revolute", "prismatic"]
 
+RESAMPLED = "resampled linearly"
+"""How the note of a log starts whose irregular time stamps were interpolated."""
+
 # Log field -> (name in the Dataset, unit of a revolute axis, unit of a prismatic axis)
 _VARIABLES = {
     "position_rad": ("position", "rad", "m"),
@@ -93,6 +96,11 @@ class Log:
     def sample_rate_hz(self) -> float:
         """Samples per second."""
         return 1.0 / self.sample_time_s
+
+    @property
+    def is_resampled(self) -> bool:
+        """Whether reading interpolated irregular stamps: rows are not those that were recorded."""
+        return any(note.startswith(RESAMPLED) for note in self.notes)
 
     @property
     def duration_s(self) -> float:

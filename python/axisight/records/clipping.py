@@ -29,24 +29,34 @@ def clipped_samples(signal: Real, meant: Real | None = None) -> int:
         meant = reals("meant", meant, "numbers of shape (n,)", 1)
         if meant.shape != signal.shape:
             raise InputError(f"meant: expected shape {signal.shape} as signal, got {meant.shape}")
-    found = quantization(signal)
-    threshold = _STEPS * found.step if found is not None else 1e-6 * float(np.ptp(signal))
+    threshold: float | None = None
     flat = None if meant is None else np.diff(meant, append=meant[-1]) == 0.0
     count = 0
     for side in (signal, -signal):
         top = float(side.max())
         starts, stops = _runs(side == top)
+        flats = [
+            (a, b) for a, b in zip(starts, stops, strict=True) if b - a >= _LEAST_RUN and a >= 2
+        ]
+        if len(flats) < _LEAST_TIMES:
+            continue
+        if threshold is None:  # it takes longer than all the rest, and few signals have flats
+            threshold = _threshold(signal)
         hit = [
             (a, b)
-            for a, b in zip(starts, stops, strict=True)
-            if b - a >= _LEAST_RUN
-            and a >= 2
-            and 2 * side[a - 1] - side[a - 2] - top > threshold
+            for a, b in flats
+            if 2 * side[a - 1] - side[a - 2] - top > threshold
             and not (flat is not None and flat[a : b - 1].all())
         ]
         if len(hit) >= _LEAST_TIMES:
             count += sum(b - a for a, b in hit)
     return count
+
+
+def _threshold(signal: Real) -> float:
+    """Return by how much a slope has to point beyond an extreme."""
+    found = quantization(np.asarray(signal))
+    return _STEPS * found.step if found is not None else 1e-6 * float(np.ptp(signal))
 
 
 def _runs(mask: NDArray[np.bool_]) -> tuple[list[int], list[int]]:

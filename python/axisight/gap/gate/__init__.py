@@ -1,6 +1,13 @@
 """The gate before a diagnosis: simulator and logs are looked at before anything is fitted to them."""
 
 from axisight.gap.faults import MEANINGS, Finding, RefusedInputError
-from axisight.gap.gate.inspect import check_inputs, pass_gate
+from axisight.gap.gate.inspect import check_fit_inputs, check_inputs, pass_gate
 
-__all__ = ["MEANINGS", "Finding", "RefusedInputError", "check_inputs", "pass_gate"]
+__all__ = [
+    "MEANINGS",
+    "Finding",
+    "RefusedInputError",
+    "check_fit_inputs",
+    "check_inputs",
+    "pass_gate",
+]

@@ -63,6 +63,19 @@ def check_inputs(
     return (*found, *check_noise(robot, logs))
 
 
+def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding, ...]:
+    """Return the faults of logs that are to be fitted to, without a simulator of the machine.
+
+    What `check_inputs` finds in each log for itself, in copies among them, and in the gears of the
+    robot file, if there is one; logs may have another sample time than the robot, but not in ms or us.
+    """
+    found = [] if robot is None else check_machine(robot, logs)
+    out = [f for f in found if f.name != "sample_time_differs"]
+    for log in logs:
+        out += check_log_alone(log)
+    return (*out, *check_copies(logs, ()))
+
+
 def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     """Flag references missing in some logs: the comparison falls back to inverse dynamics."""
     missing = [log for log in logs if log.velocity_ref_rad_s is None]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from axisight.gap.cutoff import Motion, highest_cutoff_hz
 from axisight.gap.faults import Finding, GateSeverity, refused
-from axisight.gap.gate.mistakes import Mistake, predict, undone
+from axisight.gap.gate.mistakes import Mistake, gravity_turned, predict, undone
 from axisight.gap.gate.passive import check_passive
 from axisight.gap.gate.scales import scale_name
 from axisight.gap.gate.small_errors import check_small_errors
@@ -48,6 +48,8 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     out = []
     for log, (_, at) in zip(logs, motions, strict=True):
         out += _one_log(robot, log, at)
+    if any(f.name == "gravity_flipped" for f in out) and not _gravity_off(robot, motions):
+        out = [f for f in out if f.name != "gravity_flipped"]
     return out if refused(out) else [*out, *check_small_errors(robot, motions)]
 
 
@@ -86,12 +88,32 @@ def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
 
 
 def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
-    best = min(undone(robot, at), key=lambda mistake: mistake.fit.total)
+    # Positions scaled to next to nothing would leave nothing but a prediction times a thousand.
+    sound = (mistake for mistake in undone(robot, at) if _in_scale(mistake.fit))
+    best = min(sound, key=lambda mistake: mistake.fit.total, default=None)
+    if best is None:
+        return None
     removed = given.total - best.fit.total
     axes = list(best.axes)
     explains = float(best.fit.left[axes].max()) < _EXPLAINED
     enough = removed > max(_REMOVED * given.total, _LEAST_REMOVED)
     return best if enough and explains else None
+
+
+def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
+    """Whether gravity turned round explains every log that feels it: the logs have it in common."""
+    for _, at in motions:
+        given = torque_fit(at[3], predict(robot, at), at).total
+        removed = given - gravity_turned(robot, at).total
+        if abs(removed) > _LEAST_REMOVED and removed < _REMOVED * given:
+            return False
+    return True
+
+
+def _in_scale(fit: TorqueFit) -> bool:
+    """Whether the torques that a prediction carries are of its size, loads that it lacks granted."""
+    slope = np.abs(fit.slope[fit.gain > _CARRIES])
+    return bool(np.all((slope > _ONE_AXIS[0]) & (slope < _ONE_AXIS[1])))
 
 
 def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
@@ -122,7 +144,7 @@ def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
         severity: GateSeverity = "refuse" if everywhere or a_unit else "flag"
         message = (
             f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque: state "
-            "unit, scale and side of the gear in a column map, or masses in the robot file"
+            "unit, scale and side of the gear in a column map, or masses and counterbalance in the robot file"
         )
         column = f"torque_cmd_{axis + 1}"
         out.append(Finding(name, severity, message, log.name, axis + 1, column))

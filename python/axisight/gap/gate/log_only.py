@@ -54,13 +54,17 @@ def check_log_alone(log: Log) -> list[Finding]:
     if any(finding.severity == "error" for finding in wrong):
         return [named(finding, log) for finding in wrong]
     slides = [kind == "prismatic" for kind in log.axis_kinds]
-    looked = [
-        *look_at_signals(signals, labels, slides),
-        *check_rows(signals, labels, log.sample_time_s),
-    ]
+    # A reference may be constant, or of few levels: it is a choice, not a measurement.
+    measured = {c: x for c, x in signals.items() if c[0] not in _REFERENCE}
+    looked = look_at_signals(measured, labels, slides)
+    if not log.is_resampled:  # steps and rests between interpolated stamps are those of the grid
+        looked += check_rows(measured, labels, log.sample_time_s)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
-    out = [_dead(finding, log) for finding in out if not _idle_reference(finding)]
-    return [*out, *_clipped(log, labels), *_velocity(log, slides)]
+    return [
+        *(_dead(finding, log) for finding in out),
+        *_clipped(log, labels),
+        *_velocity(log, slides),
+    ]
 
 
 def named(finding: LogFinding, log: Log) -> Finding:
@@ -79,11 +83,6 @@ def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
         "of the axis, zero if it rests"
     )
     return LogFinding("error", finding.column, message, "reference_missing", finding.axis)
-
-
-def _idle_reference(finding: Finding) -> bool:
-    """A reference may be constant, or of few levels: it is a choice, not a measurement."""
-    return finding.field.startswith("velocity_ref") and finding.severity == "flag"
 
 
 def _dead(finding: Finding, log: Log) -> Finding:

@@ -72,7 +72,7 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
     if np.any(np.abs(np.log(np.abs(robot.gear_ratio))) > _GEARED):
         words = "divide by the gear ratios"
         yield Mistake("position_joint_side", "position", every, words, moved(1 / robot.gear_ratio))
-    yield Mistake("gravity_flipped", "gravity", every, "turn it round", _gravity_turned(robot, at))
+    yield Mistake("gravity_flipped", "gravity", every, "turn it round", gravity_turned(robot, at))
 
 
 def predict(robot: Robot, at: Motion) -> Array:
@@ -81,7 +81,7 @@ def predict(robot: Robot, at: Motion) -> Array:
     return predicted_torque(robot, AS_GIVEN, (position, speed, acceleration, torque))
 
 
-def _gravity_turned(robot: Robot, at: Motion) -> TorqueFit:
+def gravity_turned(robot: Robot, at: Motion) -> TorqueFit:
     """Fit with gravity of the other sign: what the same motion without speed takes, off twice."""
     still = np.zeros_like(at[1])
     weight = predict(robot, (at[0], still, still, at[3]))

@@ -1,0 +1,61 @@
+"""The steps that the numbers of a channel are made of where they jump: an encoder's, or of few digits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.logs.log import Floats
+
+Ints = NDArray[np.int64]
+
+# A jump is compared with the smallest changes of speed so many samples around it.
+_AROUND = 50
+_SMALLEST = 0.1
+# Differences this small against the values are rounding.
+_ROUNDING = 1e-12
+# Significant digits that files have when they were written with few; more resolve any motion.
+_DIGITS = range(3, 9)
+
+
+def steps_around(values: Floats, places: Ints) -> Floats:
+    """Return the resolution of a position (n,) between samples `k` and `k + 1`, for `k` in `places`.
+
+    A position on a grid, of an encoder say, changes its speed by no less than a step of it. Numbers
+    written with few digits have steps that grow tenfold at every power of ten. Zero where neither
+    shows.
+    """
+    if not places.size:
+        return np.zeros(0)
+    change = np.abs(np.diff(values, n=2))
+    rounding = _ROUNDING * float(np.abs(values).max())
+    usual = _smallest(change, rounding)
+    grid = np.array([_grid_step(change, int(k), rounding, usual) for k in places])
+    return np.asarray(np.maximum(grid, _last_digit(values, places)))
+
+
+def _grid_step(change: Floats, k: int, rounding: float, usual: float) -> float:
+    """Return the smallest changes of speed beside a jump, those of the side where they are larger.
+
+    `usual`: those of the whole channel, where the axis rests on both sides.
+    """
+    before, after = change[max(0, k - 1 - _AROUND) : max(0, k - 1)], change[k + 1 : k + 1 + _AROUND]
+    return max(_smallest(before, rounding), _smallest(after, rounding)) or usual
+
+
+def _smallest(change: Floats, rounding: float) -> float:
+    moving = change[change > rounding]
+    return float(np.quantile(moving, _SMALLEST)) if moving.size else 0.0
+
+
+def _last_digit(values: Floats, places: Ints) -> Floats:
+    """Return what one in the last digit is at `places`, zero for numbers of many digits."""
+    size = np.abs(values[values != 0.0])
+    exponent = np.floor(np.log10(size))
+    for digits in _DIGITS:
+        scaled = size * 10.0 ** (digits - 1 - exponent)
+        if np.abs(scaled - np.rint(scaled)).max() < 1e-5:
+            largest = np.maximum(np.abs(values[places]), np.abs(values[places + 1]))
+            largest = np.maximum(largest, size.min())
+            return np.asarray(10.0 ** (np.floor(np.log10(largest)) + 1 - digits))
+    return np.zeros(len(places))
