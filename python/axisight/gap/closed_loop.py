@@ -38,6 +38,7 @@ class ClosedLoopView(View):
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
         self.limits = torque_limits(robot, logs)
+        self._loops: dict[tuple[int, float], tuple[Complex, Complex]] = {}
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the response of the feedback that keeps the simulator on the log.
@@ -45,18 +46,20 @@ class ClosedLoopView(View):
         An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``; a torque
         on the motor passes the machine before.
         """
-        machine, controller = self._loop(frequency_hz)
-        out = reference_to_input(machine, controller)
-        if effect_info(effect).acts != "sensor":
-            out = out @ machine
-        return np.asarray(out[:, axis, axis])
+        from_angle, from_torque = self._loop(frequency_hz)
+        on_sensor = effect_info(effect).acts == "sensor"
+        return (from_angle if on_sensor else from_torque)[:, axis, axis]
 
     def _loop(self, frequency_hz: Array) -> tuple[Complex, Complex]:
-        """Return machine and controller (n_freq, n_axes, n_axes), from the motor angle to its torque."""
-        # At rest and at zero frequency both are infinite.
-        f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
-        machine = self.robot.zoh_response(f).values
-        return machine, controller_response(self.robot, f)
+        """Return the responses to errors of sensors and to torques (n_freq, n_axes, n_axes)."""
+        key = (len(frequency_hz), float(frequency_hz[-1]))
+        if key not in self._loops:
+            # At zero frequency machine and controller are infinite.
+            f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
+            machine = self.robot.zoh_response(f).values
+            out = reference_to_input(machine, controller_response(self.robot, f))
+            self._loops[key] = out, out @ machine
+        return self._loops[key]
 
     def measured(self, log: Log) -> Array:
         """Return the logged torque."""

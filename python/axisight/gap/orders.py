@@ -13,9 +13,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HIGHEST_ORDER = 80
-# Waves are made at this many times the rate of the residual, and left out where they come near
-# the Nyquist frequency of that: what passes lies above the band of the residual.
-_OVERSAMPLING = 2
+# Waves are left out where they come near the Nyquist frequency of the residual.
 _OF_NYQUIST = 0.8
 # An order is worth a term when it takes so much of what the others leave.
 _WORTH = 0.05
@@ -27,8 +25,8 @@ _LEAST_APART = 1e-8
 class Turning:
     """One axis in one log: residual (n,) and how its motor turned.
 
-    ``sample_time_s`` of the residual; its first sample lies ``later_s`` after the first of ``angle_rad``
-    [rad] and ``speed_rad_s`` [rad/s], which have ``1 / oversampling`` of its sample time.
+    ``angle_rad`` and ``speed_rad_s`` (n,) every ``sample_time_s``, like the residual, whose first sample
+    lies ``later_s`` after theirs.
     """
 
     residual: Array
@@ -36,7 +34,6 @@ class Turning:
     speed_rad_s: Array
     sample_time_s: float
     later_s: float = 0.0
-    oversampling: int = 1
 
     @property
     def frequency_hz(self) -> Array:
@@ -47,30 +44,24 @@ class Turning:
     def spectra(self) -> Complex:
         """Spectra of the cosines of every order, then of the sines (2 orders, n // 2 + 1)."""
         order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
-        rate = self.oversampling / self.sample_time_s
-        used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST * rate
+        used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST / self.sample_time_s
         wave = np.cumprod(np.broadcast_to(np.exp(1j * self.angle_rad), used.shape), axis=0) * used
-        # Of the oversampled wave what lies below the Nyquist frequency of the residual.
-        f = self.frequency_hz
-        spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))[:, : len(f)]
-        return np.asarray(spectra * np.exp(2j * np.pi * f * self.later_s))
+        spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))
+        return np.asarray(spectra * np.exp(2j * np.pi * self.frequency_hz * self.later_s))
 
 
 def turning(
     residual: Array, position_rad: Array, speed_rad_s: Array, sample_time_s: float, decimation: int
 ) -> Turning:
     """Return a residual decimated as `Weighting` does, with position and speed of the full log."""
-    many = _OVERSAMPLING if decimation % _OVERSAMPLING == 0 else 1
-    every = decimation // many
-    count = len(residual) * many
+    count = len(residual)
     return Turning(
         residual,
-        position_rad[::every][:count],
-        speed_rad_s[::every][:count],
+        position_rad[::decimation][:count],
+        speed_rad_s[::decimation][:count],
         sample_time_s * decimation,
         # Mirrored at its ends, a decimated sample stands in the middle of those it replaces.
         0.5 * (decimation - 1) * sample_time_s,
-        many,
     )
 
 

@@ -215,8 +215,11 @@ class Trials:
             best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
         if len(option.free) > 1:
             # Further starts of one that does nothing as it is: by what a step from there promises.
+            # Only sizes: where it has none, its shape shows nothing.
+            sizes = replace(option, free=tuple(n for n in option.free if n in _sizes(option)))
             for begin in (option.at(values) for values in option.starts):
-                other = self._attempt(self.fitter.evaluate, begin, None)
+                at = sizes.at(begin.effect.parameters or {})
+                other = self._attempt(self.fitter.evaluate, at, None)
                 gain = -np.inf if other is None else linear_gain(other)
                 if gain > best.gain:
                     best = replace(best, option=begin, gain=gain)
@@ -289,6 +292,11 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
+
+
+def _sizes(option: FreeEffect) -> set[str]:
+    info = effect_info(option.effect.name)
+    return {p.name for p in info.parameters if p.role == "amplitude"}
 
 
 def _size(group: Sequence[FreeEffect]) -> int:
