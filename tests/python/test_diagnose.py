@@ -1,5 +1,6 @@
 """The whole diagnosis on a small machine: one elastic axis, effects withheld from its simulator."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -8,6 +9,7 @@ import pytest
 
 import axisight
 from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, simulate
+from axisight.effects import effect_info
 from axisight.errors import CaseError, InputError
 from axisight.gap import verdict_schema
 
@@ -99,6 +101,13 @@ def test_scatter_alone_is_none():
         Effect("torque_offset", 1, {"offset_nm": 0.4}),
         Effect("torque_ripple", 1, {"order_1": 6.0, "cosine_1_nm": 0.3, "sine_1_nm": 0.2}),
         Effect("resolver_ripple", 1, {"order_1": 2.0, "cosine_1_rad": 2e-3, "sine_1_rad": 1e-3}),
+        Effect(
+            "stribeck_friction",
+            1,
+            {"coulomb_nm": 0.5, "excess_nm": 0.6, "stribeck_speed_rad_s": 1.0},
+        ),
+        # As many simulators have it: torque passes the gear at the nominal ratio.
+        Effect("transmission_error", 1, {"cosine_rad": 3e-4, "sine_rad": 1e-4, "returned": 0.0}),
     ],
     ids=lambda e: e.name,
 )
@@ -114,11 +123,47 @@ def test_a_withheld_effect_is_named(effect):
     assert found.remainder.where == ()
     assert found.gap.pooled.after < 1.2 * found.gap.pooled.floor
     amplitude = next(iter(effect.parameters))
+    assert set(cause.parameters) <= {p.name for p in effect_info(effect.name).parameters}
     if not amplitude.startswith("order"):
         # The simulator's own parameters are free within one per cent or so, and trade with it.
         assert cause.parameters[amplitude].value == pytest.approx(
             effect.parameters[amplitude], rel=0.1
         )
+
+
+def test_several_orders_of_a_ripple_are_one_cause():
+    waves = {"order_1": 48.0, "cosine_1_rad": 2e-4, "order_2": 12.0, "sine_2_rad": 3e-4}
+    found = run([Effect("resolver_ripple", 1, waves)])
+    assert found.verdict == "explained", found.headline
+    (cause,) = found.causes
+    assert cause.effect == "resolver_ripple"
+    orders = {p.value for name, p in cause.parameters.items() if name.startswith("order")}
+    assert orders == {12.0, 48.0}
+    assert found.gap.after < 1.1 * found.gap.floor
+
+
+def test_a_limit_of_the_drive_is_named_though_it_reports_the_torque_after_it():
+    robot, limit = bare_axis(), 4.0
+    machine = scattered(robot, 4)
+    effect = Effect("torque_saturation", 1, {"limit_nm": limit})
+
+    def reported(plan):
+        logs = logs_of(machine, [effect], plan)
+        return [replace(x, torque_nm=np.clip(x.torque_nm, -limit, limit)) for x in logs]
+
+    settings = Settings(bootstrap=200)
+    cases = {"estimation": reported(PLAN), "validation": reported(HELD)}
+    found = diagnose(robot=robot, settings=settings, **cases)
+    assert found.verdict == "explained", found.headline
+    (cause,) = found.causes
+    assert (cause.effect, cause.axis) == ("torque_saturation", 1)
+    assert cause.parameters["limit_nm"].value == pytest.approx(limit, rel=1e-6)
+    assert found.gap.refitted > 1.5 * found.gap.floor
+    assert found.gap.after < 1.2 * found.gap.floor
+    jsonschema.validate(found.to_verdict(), verdict_schema())
+    # A simulator that has the limit lacks nothing.
+    complete = diagnose(robot=robot.with_effects([effect]), settings=settings, **cases)
+    assert complete.verdict == "none", complete.headline
 
 
 def test_two_effects_are_both_named():

@@ -8,7 +8,6 @@ import pytest
 
 from axisight import Settings
 from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
-from axisight.gap.orders import strongest_orders
 from axisight.gap.remainder import parameters_at_edge, remainder_of
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Log
@@ -209,15 +208,3 @@ def test_gap_reduction_is_the_share_of_the_explainable_gap(base):
     assert found.high - found.low < 0.01
     again = gap_reduction(given, half, given, floor, draws=300, seed=1)
     assert again == found
-
-
-def test_orders_are_found_in_a_noisy_ripple():
-    rng = np.random.default_rng(7)
-    time = np.arange(N) * T
-    angle = 3 * time + 0.5 * np.sin(time)
-    speed = np.gradient(angle, T)
-    ripple = 0.2 * np.cos(7 * angle + 1) + 0.1 * np.sin(18 * angle)
-    found = strongest_orders(
-        [ripple + 0.2 * rng.normal(size=N)], [angle], [speed], count=2, bandwidth_hz=20.0
-    )
-    assert found == [7, 18]

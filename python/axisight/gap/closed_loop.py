@@ -32,12 +32,16 @@ class ClosedLoopView(View):
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         floor = closed_loop_floor(robot, logs, settings)
+        limits = torque_limits(robot, logs)
+        # A torque reported after the limit is what the motor got: it needs no limit once more.
+        after = {limit.effect.label for limit in limits}
+        kept_on_log = robot.with_effects([e for e in robot.effects if e.label not in after])
         data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
         fitter = ClosedLoopFitter(
-            robot, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
+            kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
-        self.limits = torque_limits(robot, logs)
+        self.limits = limits
         self._loops: dict[tuple[int, float], tuple[Complex, Complex]] = {}
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -15,6 +16,8 @@ Complex = NDArray[np.complex128]
 HIGHEST_ORDER = 80
 # Waves are left out where they come near the Nyquist frequency of the residual.
 _OF_NYQUIST = 0.8
+# Share of a log that fades in and out.
+_TAPERED = 0.05
 # An order is worth a term when it takes so much of what the others leave.
 _WORTH = 0.05
 # Cosine and sine of an order that hardly turns look alike.
@@ -46,6 +49,8 @@ class Turning:
         order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
         used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST / self.sample_time_s
         wave = np.cumprod(np.broadcast_to(np.exp(1j * self.angle_rad), used.shape), axis=0) * used
+        # From nothing to nothing: the jump from the end of a log to its start is no wave.
+        wave *= scipy.signal.windows.tukey(len(self.angle_rad), _TAPERED)
         spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))
         return np.asarray(spectra * np.exp(2j * np.pi * self.frequency_hz * self.later_s))
 

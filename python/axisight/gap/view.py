@@ -48,13 +48,15 @@ class View(ABC):
             self._weighted_response,
             self.floor.expected,
         )
-        return all_candidates(
+        found = all_candidates(
             self.robot,
             self.logs,
             at,
             inverse_dynamics=self.mode == "inverse_dynamics",
             threads=self.settings.threads,
         )
+        shown = {limit.effect.label for limit in self.limits}
+        return [f for f in found if f.effect.label not in shown]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         weighting = self.fitter.weighting

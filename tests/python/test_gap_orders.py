@@ -1,0 +1,85 @@
+"""Orders of the motor angle in residuals."""
+
+import numpy as np
+import pytest
+
+from axisight import load_robot, simulate
+from axisight.gap.closed_loop import controller_response
+from axisight.gap.orders import Turning, strongest_orders, turning
+
+T = 4e-3
+N = 2500
+
+
+def turned(residual, scale: float = 3.0) -> Turning:
+    time = np.arange(N) * T
+    angle = scale * time + 0.5 * np.sin(time)
+    return Turning(residual, angle, np.gradient(angle, T), T)
+
+
+def flat(log: Turning):
+    return np.ones(len(log.frequency_hz), dtype=complex)
+
+
+def test_orders_are_found_in_a_noisy_ripple_strongest_first():
+    rng = np.random.default_rng(7)
+    angle = turned(np.zeros(N)).angle_rad
+    ripple = 0.2 * np.cos(7 * angle + 1) + 0.1 * np.sin(18 * angle)
+    log = turned(ripple + 0.2 * rng.normal(size=N))
+    assert strongest_orders([log], [flat(log)], count=4) == [7, 18]
+    assert strongest_orders([log], [flat(log)], count=1) == [7]
+
+
+def test_noise_alone_has_no_order():
+    rng = np.random.default_rng(8)
+    log = turned(rng.normal(size=N))
+    assert strongest_orders([log], [flat(log)], count=3) == []
+
+
+def test_logs_share_amplitude_and_phase():
+    """What cancels over the logs is no ripple of the machine, however strong in each."""
+    angle = turned(np.zeros(N)).angle_rad
+    here, there = turned(np.cos(5 * angle)), turned(-np.cos(5 * angle))
+    assert strongest_orders([here, there], [flat(here)] * 2, count=1) == []
+    assert strongest_orders([here, here], [flat(here)] * 2, count=1) == [5]
+
+
+def test_orders_are_seen_through_the_response():
+    """A quarter of a second late, at changing speed, a wave of the angle is none of the residual."""
+    empty = turned(np.zeros(N))
+    late = np.exp(-2j * np.pi * empty.frequency_hz * 0.25)
+    log = turned(np.fft.irfft(late * (empty.spectra[23] + 0.5 * empty.spectra[4]), N))
+    assert strongest_orders([log], [late], count=3) == [24, 5]
+    assert strongest_orders([log], [flat(log)], count=3) != [24, 5]
+
+
+def test_a_decimated_residual_stands_in_the_middle_of_its_samples():
+    """Against the full log mirrored at its ends, order 30 keeps its phase only so."""
+    full, factor = 5e-4, 8
+    time = np.arange(N * factor) * full
+    angle = 4 * time
+    speed = np.full_like(angle, 4.0)
+    centre = angle.reshape(-1, factor).mean(axis=1)
+    log = turning(np.cos(30 * centre), angle, speed, full, factor)
+    assert log.later_s == pytest.approx(3.5 * full)
+    wave = np.fft.irfft(log.spectra[29], N)
+    inside = slice(200, -200)  # where it does not fade
+    np.testing.assert_allclose(wave[inside], log.residual[inside], atol=0.02)
+
+
+@pytest.mark.parametrize("name", ["two_mass_axis", "irb6600_like"])
+def test_the_controller_is_that_of_the_simulation(name):
+    """A sine of the sensor on a motor at rest: what the controller answers is its response."""
+    robot = load_robot(name).with_effects([])
+    n, size = 8192, 1e-7
+    line = 64
+    f = line / (n * robot.sample_time_s)
+    wave = np.zeros((n, robot.n_axes))
+    wave[:, 0] = size * np.sin(2 * np.pi * line * np.arange(n) / n)
+    out = simulate(robot, np.zeros((n, robot.n_axes)), noise=wave, method="rk4")
+    command = out.torque_cmd_nm.values[:, 0]
+    seen = out.position_rad.values[:, 0]
+    half = slice(n // 2, n)
+    u, y = (np.fft.fft(x[half])[line // 2] for x in (command, seen))
+    (response,) = controller_response(robot, np.array([f]))[:, 0, 0]
+    assert -u / y == pytest.approx(response, rel=2e-3)
