@@ -8,8 +8,9 @@ use axisight_identification::logs::{
     Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput, SimulationOutput,
     Target, fit,
 };
-use axisight_numerics::Weighting;
-use axisight_tests::{ARM, PRESET, effect, largest, plant, relative, robot, sines, trace};
+use axisight_tests::{
+    ARM, PRESET, effect, flat, free, largest, plant, relative, robot, sines, trace,
+};
 use nalgebra::{DMatrix, DVector};
 
 const SIGMA: f64 = 1e-3;
@@ -18,26 +19,6 @@ const METHOD: Method = Method::RungeKutta4 { substeps: 1 };
 /// True values of the fitted parameters of the arm: stiffness, motor inertia, mass, Coulomb.
 const TRUTH: [f64; 4] = [4e5, 0.004, 60.0, 0.4];
 const SCALE: [f64; 4] = [1e4, 1e-4, 1.0, 0.1];
-
-fn free(target: Target, initial: f64, scale: f64) -> FitParameter {
-    FitParameter {
-        target,
-        initial,
-        lower: f64::NEG_INFINITY,
-        upper: f64::INFINITY,
-        scale,
-        prior: None,
-        frozen: false,
-        nuisance: false,
-    }
-}
-
-fn flat(weight: f64) -> Weighting {
-    Weighting {
-        weight: vec![weight],
-        ..Weighting::flat()
-    }
-}
 
 fn friction(level: f64) -> Vec<EffectSetting<f64>> {
     vec![effect("coulomb_friction", Some(0), &[level, 0.5])]
