@@ -4,6 +4,7 @@
 //! linearisation leaves out; the first is what drawing its matrices as straight lines over 8 ms,
 //! the forces of other masses over 2 samples and the arm's own spring back over one leaves out.
 
+use axisight_core::plant::Plant;
 use axisight_core::robot::{Course, Parameter, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
 use axisight_identification::logs::{
@@ -369,7 +370,7 @@ fn a_course_that_does_not_fit_a_run_is_refused() {
             method,
             cancel: None,
         };
-        let mut stepper = Stepper::along(&plant, &Arc::new(course));
+        let mut stepper = Stepper::along(&plant, &Arc::new(course)).expect("of this arm");
         simulate(&plant, &run, &mut stepper, &mut |_| {})
     };
     assert_eq!(along(100, METHOD), Ok(Status::Completed));
@@ -383,5 +384,22 @@ fn a_course_that_does_not_fit_a_run_is_refused() {
     };
     refused(99, METHOD);
     refused(1, METHOD);
+    refused(0, METHOD);
     refused(100, Method::DormandPrince { tolerance: 1e-7 });
+}
+
+/// Of more joints and of fewer.
+#[test]
+fn a_course_of_another_arm_is_refused() {
+    let [arm, preset] = [ARM, PRESET].map(|text| plant::<f64>(&robot(text), &[]));
+    let course = |plant: &Plant<f64>| {
+        let rest = vec![0.0; 2 * plant.chain.len() * 10];
+        Arc::new(Course::new(&plant.chain, 1e-3, &rest))
+    };
+    for (of, on) in [(&arm, &preset), (&preset, &arm)] {
+        let (got, expected) = (of.chain.len(), on.chain.len());
+        let outcome = Stepper::along(on, &course(of)).err();
+        let error = SimulationError::CourseOfAnother { expected, got };
+        assert_eq!(outcome, Some(error));
+    }
 }
