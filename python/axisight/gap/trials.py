@@ -171,7 +171,9 @@ class Trials:
     ) -> A | None:
         effects = [*kept_beside(self.model.free, option), option]
         # Runs serve where the simulator's own parameters are those of the runs, or near them.
-        near = self.near if values is None or values == self.model.robot_values else self.near_nominal
+        near = (
+            self.near if values is None or values == self.model.robot_values else self.near_nominal
+        )
         try:
             return solve(effects, self.model, robot_values=values, near=near)
         except InputError as error:
@@ -235,8 +237,12 @@ class Trials:
         if least < self.model.total:
             # The valley is narrower than the steps between starts.
             between = (values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)])
-            options = {"maxiter": _SCANS, "xatol": 0.003 * value}
-            finer = minimize_scalar(loss, bounds=between, method="bounded", options=options)
+            finer = minimize_scalar(
+                loss,
+                bounds=between,
+                method="bounded",
+                options={"maxiter": _SCANS, "xatol": 0.003 * value},
+            )
             if finer.fun < least:
                 least, value = float(finer.fun), float(finer.x)
         return option.at({name: value}), self.model.total - least
