@@ -1,70 +1,17 @@
 """The whole diagnosis on a small machine: one elastic axis, effects withheld from its simulator."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 
 import axisight
-from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, simulate
+from axisight import Effect, Log, Settings, diagnose, load_robot
 from axisight.effects import effect_info
 from axisight.errors import CaseError, InputError
 from axisight.gap import verdict_schema
-
-SECONDS = 6.0
-
-
-def bare_axis() -> Robot:
-    """The two-mass axis as a simulator that models no effect."""
-    return load_robot("two_mass_axis").with_effects([])
-
-
-def reference(kind: str, seed: int, n: int, sample_time_s: float) -> np.ndarray:
-    time = np.arange(n) * sample_time_s
-    if kind == "moves":
-        return (30.0 * np.sin(2 * np.pi * 0.35 * time) * np.minimum(time, 1.0))[:, None]
-    rng = np.random.default_rng(seed)
-    lines = np.arange(1.0, 40.0, 0.5)
-    phases = rng.uniform(0, 2 * np.pi, len(lines))
-    wave = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
-    square = np.tanh(20 * np.sin(2 * np.pi * time / 3.0))
-    return (np.minimum(time / 0.1, 1.0) * 6.0 * (0.7 * wave / np.abs(wave).max() + square))[:, None]
-
-
-def logs_of(machine: Robot, effects: list[Effect], plan: dict[str, tuple[str, int]]) -> list[Log]:
-    out = []
-    n = int(SECONDS / machine.sample_time_s)
-    for run, (name, (kind, seed)) in enumerate(plan.items()):
-        ref = reference(kind, seed, n, machine.sample_time_s)
-        data = simulate(machine, ref, effects=effects, noise_seed=5, run=run)
-        assert data.attrs["status"] == "completed"
-        out.append(
-            Log(
-                name=name,
-                source=Path(f"{name}.parquet"),
-                sample_time_s=machine.sample_time_s,
-                time_s=data.time.values,
-                velocity_ref_rad_s=ref,
-                torque_nm=data.torque_cmd_nm.values,
-                position_rad=data.position_rad.values,
-            )
-        )
-    return out
-
-
-def scattered(robot: Robot, seed: int) -> Robot:
-    """About one per cent off in everything, as any other machine of the type."""
-    rng = np.random.default_rng(seed)
-    spread = {"stiffness": 0.01, "damping": 0.05, "motor_inertia": 0.01, "viscous_friction": 0.02}
-    values = {
-        name: value * (1 + spread[q] * rng.uniform(-1, 1))
-        for name, value in robot.parameters().items()
-        if (q := name.rsplit(".", 1)[1]) in spread
-    }
-    return robot.with_parameters(values)
-
+from gap_data import bare_axis, logs_of, scattered
 
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
 HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import fields
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,9 @@ def test_the_core_says_all_that_the_class_holds() -> None:
 
 
 def test_every_effect_has_start_values_and_no_entry_is_stray() -> None:
-    assert list(STARTS) == list(TABLE)
+    pairs = enumerate(zip_longest(STARTS, TABLE, fillvalue="nothing"), start=1)
+    wrong = [f"entry {i}: STARTS has {a}, mod.rs has {b}" for i, (a, b) in pairs if a != b]
+    assert not wrong, wrong[0]
 
 
 @pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)

@@ -8,39 +8,7 @@ from axisight.gap.decide import Standing, Trial, clearly_worse, stand
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss, linear_gain
-
-
-def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 20) -> Evidence:
-    """Evidence of an ordinary least-squares fit of y on x, cut into blocks."""
-    theta = np.linalg.lstsq(x, y, rcond=None)[0]
-    residual = x @ theta - y
-    starts = np.arange(0, len(y), block)
-    matrix = np.array([x[s : s + block].T @ x[s : s + block] for s in starts])
-    gradient = np.array([x[s : s + block].T @ residual[s : s + block] for s in starts])
-    loss = np.array([(residual[s : s + block] ** 2).sum() for s in starts])
-    p = x.shape[1]
-    names = tuple((None, f"p{i}") for i in range(p))
-    return Evidence(
-        effects=(),
-        free=(),
-        robot_values={},
-        std={},
-        parameters=names,
-        status="loss_converged",
-        condition=1.0,
-        at_bound=(),
-        matrix=matrix,
-        gradient=gradient,
-        loss=loss,
-        log=log[starts],
-        axis=np.zeros(len(starts), dtype=np.int64),
-        start=starts,
-        size=np.full(len(starts), block),
-        prior_matrix=np.zeros((p, p)),
-        prior_gradient=np.zeros(p),
-        residual=residual,
-        columns={},
-    )
+from gap_data import linear_evidence
 
 
 @pytest.fixture

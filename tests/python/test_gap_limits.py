@@ -7,7 +7,7 @@ import pytest
 
 from axisight import Effect
 from axisight.gap.limits import missing, reported, torque_limits
-from test_diagnose import HELD, PLAN, bare_axis, logs_of, scattered
+from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 
 LIMIT = 4.0
 

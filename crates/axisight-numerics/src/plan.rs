@@ -48,3 +48,63 @@ fn make<T: FftNum>(n: usize, direction: FftDirection) -> Arc<dyn Fft<T>> {
 fn make<T: FftNum>(n: usize, direction: FftDirection) -> Arc<dyn Fft<T>> {
     rustfft::FftPlanner::new().plan_fft(n, direction)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustfft::num_complex::Complex;
+
+    /// Lengths that no other test of this crate asks for.
+    const LENGTHS: [usize; 3] = [691, 720, 1033];
+    const DIRECTIONS: [FftDirection; 2] = [FftDirection::Forward, FftDirection::Inverse];
+
+    fn transformed<T: FftNum>(plan: &dyn Fft<T>, scale: f64) -> Vec<Complex<T>> {
+        let part = |x: f64| T::from_f64(scale * x.sin()).unwrap_or_else(T::zero);
+        let number = |k: usize| Complex::new(part(k as f64), part(1.0 + 2.0 * k as f64));
+        let mut series: Vec<Complex<T>> = (0..plan.len()).map(number).collect();
+        plan.process(&mut series);
+        series
+    }
+
+    /// Bit for bit, also where plans of the other direction, number type and length are known.
+    #[test]
+    fn a_kept_plan_does_what_a_new_one_does() {
+        for _ in 0..2 {
+            for (n, direction) in LENGTHS.iter().flat_map(|n| DIRECTIONS.map(|d| (*n, d))) {
+                let kept = plan::<f64>(n, direction);
+                let new = make::<f64>(n, direction);
+                assert_eq!((kept.len(), kept.fft_direction()), (n, direction));
+                assert_eq!(transformed(&*kept, 1.0), transformed(&*new, 1.0));
+                let kept = plan::<f32>(n, direction);
+                let new = make::<f32>(n, direction);
+                assert_eq!(transformed(&*kept, 1.0), transformed(&*new, 1.0));
+            }
+        }
+    }
+
+    /// Threads that use one plan at once do not disturb each other; no thread makes it anew.
+    #[test]
+    fn threads_share_a_plan_and_few_are_kept() {
+        let (n, direction) = (947, FftDirection::Forward);
+        let first = plan::<f64>(n, direction);
+        let work = |thread: usize| {
+            let mine = plan::<f64>(n, direction);
+            let scale = 1.0 + thread as f64;
+            let want = transformed(&*make::<f64>(n, direction), scale);
+            let right = (0..50).all(|_| transformed(&*mine, scale) == want);
+            (right, Arc::ptr_eq(&mine, &first))
+        };
+        let work = &work;
+        let done: Vec<(bool, bool)> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4).map(|t| scope.spawn(move || work(t))).collect();
+            threads.into_iter().filter_map(|t| t.join().ok()).collect()
+        });
+        assert_eq!(done, [(true, true); 4]);
+        // A job that goes through many lengths does not keep them all; here, as it forgets `first`.
+        for n in 2..2 * MOST_PLANS {
+            plan::<f64>(n, direction);
+            let kept = PLANS.lock().expect("no thread has panicked").len();
+            assert!(kept <= MOST_PLANS, "{kept} plans");
+        }
+    }
+}

@@ -142,10 +142,15 @@ impl Weighting {
 impl Weighter {
     /// Weight two series at once (as real and imaginary part; a real even weight
     /// keeps them apart).
+    ///
+    /// Each is brought to the same size by a power of two: they may have different units, and
+    /// the rounding of the larger would drown the smaller. A series of zeros stays one.
     pub fn apply_pair(&self, a: &[f64], b: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let half = self.kept * self.decimation;
-        let mut long: Vec<Complex<f64>> = (0..half).map(|i| Complex::new(a[i], b[i])).collect();
-        long.extend((0..half).rev().map(|i| Complex::new(a[i], b[i])));
+        let ((down_a, up_a), (down_b, up_b)) = (to_one(&a[..half]), to_one(&b[..half]));
+        let number = |i: usize| Complex::new(a[i] * down_a, b[i] * down_b);
+        let mut long: Vec<Complex<f64>> = (0..half).map(number).collect();
+        long.extend((0..half).rev().map(number));
         self.forward.process(&mut long);
         let (n_long, n_short) = (long.len(), 2 * self.kept);
         let mut short = vec![Complex::new(0.0, 0.0); n_short];
@@ -158,8 +163,25 @@ impl Weighter {
             }
         }
         self.backward.process(&mut short);
-        short.iter().take(self.kept).map(|c| (c.re, c.im)).unzip()
+        let kept = short.iter().take(self.kept);
+        kept.map(|c| (c.re * up_a, c.im * up_b)).unzip()
     }
+}
+
+/// Powers of two that bring the largest magnitude of a series near one, and back; zeros for a
+/// series of zeros.
+fn to_one(x: &[f64]) -> (f64, f64) {
+    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest == 0.0 && !x.iter().any(|x| x.is_nan()) {
+        return (0.0, 0.0);
+    }
+    if !largest.is_normal() {
+        return (1.0, 1.0);
+    }
+    // Of a finite number: between -1022 and 1023, and less so that both powers are normal.
+    #[allow(clippy::cast_possible_truncation)]
+    let exponent = largest.log2().clamp(-1000.0, 1000.0) as i32;
+    (2f64.powi(-exponent), 2f64.powi(exponent))
 }
 
 #[cfg(test)]
@@ -177,6 +199,27 @@ mod tests {
         for i in 0..50 {
             assert!((a[i] - x[i]).abs() < 1e-13 && (b[i] - y[i]).abs() < 1e-13);
         }
+    }
+
+    /// Series of units as far apart as Nm a radian of play and Nm a Nm/rad^3 of a cubic spring.
+    #[test]
+    fn a_series_does_not_drown_in_a_larger_one() {
+        let x: Vec<f64> = (0..60)
+            .map(|i| 1e-14 * (f64::from(i) * 0.37).sin())
+            .collect();
+        let y: Vec<f64> = (0..60).map(|i| 1e6 * (f64::from(i) * 0.11).cos()).collect();
+        let plan = Weighting::flat().plan(60, 0.01);
+        let ((a, _), (_, b)) = (plan.apply_pair(&x, &y), plan.apply_pair(&y, &x));
+        for i in 0..60 {
+            // A few roundings of the largest entry.
+            assert!((a[i] - x[i]).abs() < 1e-28 && (b[i] - x[i]).abs() < 1e-28);
+        }
+        assert!(plan.apply_pair(&y, &[0.0; 60]).1.iter().all(|v| *v == 0.0));
+        assert!(plan.apply_pair(&[0.0; 60], &y).0.iter().all(|v| *v == 0.0));
+        // What is not finite is not hidden.
+        let (a, _) = plan.apply_pair(&[f64::NAN; 60], &y);
+        let (b, _) = plan.apply_pair(&[f64::INFINITY; 60], &y);
+        assert!(a.iter().chain(&b).all(|v| !v.is_finite()));
     }
 
     #[test]

@@ -269,7 +269,8 @@ class ModelFitter(ABC):
     ) -> list[Linearized]:
         """Return what `evaluate` would for each of several effects that do nothing as they are.
 
-        They do not disturb one another: one evaluation serves all.
+        They do not disturb one another: one evaluation serves all. One that stands in for a
+        parameter of the simulator finds it where ``start`` has it, not at its nominal value.
         """
         free, n = [*start.free, *options], len(start.free)
         setup = self._setup(free, start, None, [True] * len(free), lazy=True, fixed_by=start.free)

@@ -6,6 +6,8 @@ use axisight_core::plant::{Plant, assemble};
 use axisight_core::robot::{EffectSetting, Place, RobotDescription};
 use axisight_core::robot_file::read_robot;
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
+use axisight_identification::logs::{FitParameter, Target};
+use axisight_numerics::Weighting;
 use axisight_scalar::Scalar;
 
 /// The preset robot: three driven axes, four elastic joints, 20 states.
@@ -94,6 +96,28 @@ pub fn effect<S: Scalar>(name: &str, axis: Option<usize>, parameters: &[f64]) ->
         name: name.to_owned(),
         place: axis.map_or(Place::Arm, Place::Axis),
         parameters: parameters.iter().map(|p| S::constant(*p)).collect(),
+    }
+}
+
+/// A parameter to fit, without bounds.
+pub fn free(target: Target, initial: f64, scale: f64) -> FitParameter {
+    FitParameter {
+        target,
+        initial,
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        scale,
+        prior: None,
+        frozen: false,
+        nuisance: false,
+    }
+}
+
+/// The same weight at all frequencies.
+pub fn flat(weight: f64) -> Weighting {
+    Weighting {
+        weight: vec![weight],
+        ..Weighting::flat()
     }
 }
 

@@ -44,6 +44,16 @@ fn slopes_are_derivatives() {
     }
 }
 
+/// A gear without play that carries nothing: derivatives pass, as they do under any load.
+#[test]
+fn a_gap_of_no_width_has_the_slope_of_none() {
+    for x in [-0.2, 0.0, 0.2] {
+        let (x, b) = (D::constant(x).seeded(0), D::zero());
+        assert_eq!(dead_zone_inverse(x, b).partials, [1.0]);
+        assert_eq!(dead_zone(x, b).0.partials, [1.0]);
+    }
+}
+
 #[test]
 fn the_dead_zone_is_inverted() {
     let mut random = Random(2);

@@ -276,7 +276,7 @@ impl SimulationErrorProblem {
         let plant = self.plant::<S>(theta, seeds)?;
         let mut stepper = match arm {
             Arm::Exact => Stepper::new(&plant),
-            Arm::Along(course) => Stepper::along(&plant, course),
+            Arm::Along(course) => Stepper::along(&plant, course).map_err(|e| failed(&e))?,
         };
         self.traces(records, &plant, &mut stepper, seeds.len(), None)
     }

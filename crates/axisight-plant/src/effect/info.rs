@@ -78,7 +78,9 @@ pub struct StandsFor {
 pub enum Linear {
     /// Changed parameters of the robot: wherever the robot goes, linear or not.
     Parameters,
-    /// Its slope at rest describes it in motion too.
+    /// Its slope at rest describes it in motion too. A slope of zero qualifies where small motion
+    /// about the rest stays in it (a cubic spring without load); not where speed leaves it behind
+    /// (drag).
     Slope,
     /// It comes before the plant: gain, delay, lag.
     Path,
@@ -159,7 +161,8 @@ pub struct ParameterInfo {
     pub lower: f64,
     /// Largest admissible value.
     pub upper: f64,
-    /// Typical magnitude: natural scale of a search and width of a plausible range.
+    /// Typical magnitude: natural scale of a search and width of a plausible range. It must visibly
+    /// change the closed loop of the preset robot.
     pub typical: f64,
 }
 
@@ -188,9 +191,11 @@ pub struct EffectInfo {
     pub stands_for: Option<StandsFor>,
     /// How a linear model holds it.
     pub linear: Linear,
-    /// Whether torque predicted from measured motion can hold it.
+    /// Whether torque predicted from measured motion can hold it; false for effects in the
+    /// transmission and of the sensor, whose place a rigid gear takes there.
     pub inverse_dynamics: bool,
-    /// Whether it is stiff at usual sizes: explicit integration, as in fits, is no use.
+    /// Whether it is stiff at usual sizes: explicit integration, as in fits, is no use. True
+    /// excludes it from the candidates of a diagnosis.
     pub stiff: bool,
     /// What it is part of once identified.
     pub absorbed_by: &'static [Absorber],

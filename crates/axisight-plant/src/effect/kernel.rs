@@ -190,7 +190,8 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn deflection_inverse(&self, loaded: S) -> S {
         loaded
     }
-    /// Gear torque added to the linear spring and damper [Nm, joint side].
+    /// Gear torque added to the linear spring and damper [Nm, joint side]; positive for a positive
+    /// deflection or rate where it restores or damps.
     fn gear_torque(&self, _spring: &Spring<'_, S>) -> S {
         S::zero()
     }

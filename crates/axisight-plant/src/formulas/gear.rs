@@ -25,13 +25,12 @@ pub fn dead_zone<S: Scalar>(delta: S, b: S) -> (S, S) {
 /// The deflection whose [`dead_zone`] is `loaded`; zero, the middle of the gap, for none.
 #[inline(always)]
 pub fn dead_zone_inverse<S: Scalar>(loaded: S, b: S) -> S {
-    let zero = S::zero();
     let edge = b * EDGE;
     let size = loaded.abs();
     let on_edge = (size * edge).sqrt() * 2.0 - edge;
     let over = (edge - size).if_positive(on_edge, size) + b;
-    // An unloaded gear rests in the middle of its gap.
-    loaded.if_positive(over, (-loaded).if_positive(-over, zero))
+    // An unloaded gear rests in the middle of its gap; without a gap it follows the load.
+    loaded.if_positive(over, (-loaded).if_positive(-over, loaded))
 }
 
 /// `k_1 delta + k_3 delta^3`, the torque of a spring.

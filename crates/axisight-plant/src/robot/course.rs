@@ -91,6 +91,9 @@ impl<R: Scalar> Course<R> {
     }
 
     fn linearize(&mut self, dynamics: &Dynamics<R>) {
+        if self.samples == 0 {
+            return;
+        }
         let n = self.joints();
         let lifted = Dynamics::new(&self.chain.lifted::<Dual<R, SEEDS>>());
         let (mut plain, mut dual) = (dynamics.scratch(), lifted.scratch());
@@ -138,9 +141,10 @@ impl<R: Scalar> Course<R> {
     }
 
     /// Forces that `chain` needs on the run beyond those of the run's own arm, node by node;
-    /// `None` for the same arm.
+    /// `None` for the same arm, or without a run.
     fn forcing<S: Scalar<Real = R>>(&self, chain: &Chain<S>) -> Option<Vec<S>> {
-        if !chain.carries_derivatives() && chain.same_masses(&self.chain) {
+        let same = !chain.carries_derivatives() && chain.same_masses(&self.chain);
+        if same || self.samples == 0 {
             return None;
         }
         let n = self.joints();
@@ -215,7 +219,10 @@ impl<S: Scalar> Along<S> {
         let node = sample / course.stride;
         let share = ((sample % course.stride) as f64 + 0.5) / course.stride as f64;
         let share = S::Real::constant(share);
-        let pair = &course.nodes[node * size..(node + 2) * size];
+        // A run without samples has none; it is refused before the first step.
+        let Some(pair) = course.nodes.get(node * size..(node + 2) * size) else {
+            return;
+        };
         let (from, to) = pair.split_at(size);
         for ((out, from), to) in self.matrices.iter_mut().zip(from).zip(to) {
             *out = (*to - *from).fma(share, *from);

@@ -1,5 +1,6 @@
 //! Choice of integrator, and what all of them share.
 
+use super::closed_loop::SimulationError;
 use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
 use super::{dormand_prince, nystrom4, runge_kutta4};
@@ -133,10 +134,17 @@ impl<S: Scalar> Stepper<S> {
 
     /// Scratch for `plant` with its arm linearised along `course`, see
     /// [`Plant::follows_courses`]; methods of fixed steps only.
-    pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Self {
+    ///
+    /// # Errors
+    /// [`SimulationError::CourseOfAnother`] where `course` is of an arm of other joints.
+    pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Result<Self, SimulationError> {
+        let (expected, got) = (plant.chain.len(), course.joints());
+        if got != expected {
+            return Err(SimulationError::CourseOfAnother { expected, got });
+        }
         let mut stepper = Self::new(plant);
         stepper.plant_scratch.along = Some(Along::new(course, &plant.chain));
-        stepper
+        Ok(stepper)
     }
 
     /// Number of samples of the course, where there is one.

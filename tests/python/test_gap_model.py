@@ -1,0 +1,295 @@
+"""Models under trial: many candidates in one evaluation, models near runs, groups, best starts."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.effects import effect_info
+from axisight.errors import InputError
+from axisight.gap.candidates import all_candidates, situation
+from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
+from axisight.gap.layout import layout_of
+from axisight.gap.model import Evidence, FreeEffect, Linearized
+from axisight.gap.trials import Trials
+from gap_data import bare_axis, linear_evidence, logs_of, scattered
+
+PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
+FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.4, "smoothing_rad_s": 0.3})
+SPRING = Effect("joint_stiffness", 1, {"relative_change": 0.03})
+
+
+@pytest.fixture(scope="module")
+def view() -> ClosedLoopView:
+    machine = scattered(bare_axis(), 4)
+    logs = logs_of(machine, [Effect("torque_offset", 1, {"offset_nm": 0.4})], PLAN, seconds=1.5)
+    return ClosedLoopView(bare_axis(), logs, Settings(block_s=0.25))
+
+
+@pytest.fixture(scope="module")
+def fitter(view: ClosedLoopView) -> ClosedLoopFitter:
+    return view.fitter
+
+
+def model(fitter: ClosedLoopFitter, *effects: Effect, steps: int = 2) -> Evidence:
+    """A fit of the simulator with effects, some steps from its nominal values."""
+    free = [FreeEffect(e, (next(iter(e.parameters or {})),)) for e in effects]
+    return fitter.fit(free, max_iterations=steps)
+
+
+def idle(view: ClosedLoopView, at: Evidence) -> list[FreeEffect]:
+    """All candidates that do nothing as they are."""
+    seen = situation(view.robot, view.logs, at, view.floor.weighting.decimation, 125.0)
+    present = {e.label for e in at.effects}
+    options = all_candidates(view.robot, view.logs, seen)
+    return [o for o in options if not o.effect.acts and o.effect.label not in present]
+
+
+def differ(a: Linearized, b: Linearized) -> float:
+    """Largest difference of two evaluations, by the sizes of columns and residual."""
+    assert (a.parameters, a.at_bound) == (b.parameters, b.at_bound)
+    np.testing.assert_array_equal(a.prior_matrix, b.prior_matrix)
+    np.testing.assert_allclose(a.prior_gradient, b.prior_gradient, rtol=1e-12)
+    size = np.sqrt(np.diag(b.matrix.sum(axis=0)))
+    # Smoothing of a friction that is not there does nothing.
+    nothing = size == 0
+    assert not a.matrix[:, nothing].any()
+    size[nothing] = 1.0
+    root = np.sqrt(b.total)
+    return max(
+        float(np.abs((a.matrix - b.matrix) / np.outer(size, size)).max()),
+        float(np.abs((a.gradient - b.gradient) / size).max() / root),
+        float(np.abs(a.loss - b.loss).max() / root**2),
+    )
+
+
+# Columns are weighted in pairs, each at the size of the other: a column whose partner is another
+# differs by roundings of its largest entry, 1e-15, of which no more than a thousandth may be a
+# typical one.
+ROUNDING = 1e-12
+
+
+@pytest.mark.parametrize("near", [False, True], ids=["exact", "near"])
+@pytest.mark.parametrize("effects", [(), (FRICTION,), (SPRING, FRICTION)], ids=len)
+def test_candidates_evaluated_together_are_as_alone(view, fitter, effects, near: bool):
+    # Where the simulator is as given: it is so for candidates that stand in for parameters of it.
+    start = model(fitter, *effects, steps=0)
+    runs = fitter.runs(start) if near else None
+    options = idle(view, start)
+    assert len(options) > 15
+    together = fitter.evaluate_each(options, start, runs)
+    for option, found in zip(options, together, strict=True):
+        alone = fitter.evaluate([*start.free, option], start, near=runs)
+        assert differ(found, alone) < ROUNDING, option.effect.label
+
+
+def test_what_stands_in_for_a_fitted_parameter_leaves_it_where_it_is(view, fitter):
+    start = model(fitter)
+    assert abs(start.robot_values["axis1.stiffness"] / 1.5e6 - 1) > 1e-4
+    options = idle(view, start)
+    for option, found in zip(options, fitter.evaluate_each(options, start), strict=True):
+        # In tandem with a column, and its rounding; nothing has moved.
+        assert found.total == pytest.approx(start.total, rel=1e-9)
+        stands_for = effect_info(option.effect.name).stands_for
+        own = {name for place, name in found.parameters if place is None}
+        assert (f"axis1.{stands_for[0]}" if stands_for else "") not in own
+        if stands_for is None:
+            alone = fitter.evaluate([option], start)
+            assert differ(found, alone) < ROUNDING, option.effect.label
+
+
+def numbered() -> Linearized:
+    """Entries that say where they come from: two effects of a model, three candidates."""
+    names = ["mass", "stiffness", "damping"]
+    places: list[tuple[int | None, str]] = [(None, n) for n in names]
+    places += [(0, "a"), (1, "b"), (2, "c"), (3, "d"), (3, "e"), (4, "f")]
+    row = np.arange(9.0)
+    entries = 10 * row[:, None] + row
+    return Linearized(
+        parameters=tuple(places),
+        at_bound=((None, "stiffness"), (1, "b"), (3, "e"), (4, "f")),
+        matrix=np.stack([entries, 100 + entries]),
+        gradient=np.stack([row, 100 + row]),
+        loss=np.array([3.0, 4.0]),
+        prior_matrix=-entries,
+        prior_gradient=-row,
+    )
+
+
+@pytest.mark.parametrize(
+    ("kept", "fixed", "columns", "bound"),
+    [
+        (2, set(), [0, 1, 2, 3, 4, 5], [(None, "stiffness"), (1, "b")]),
+        (3, set(), [0, 1, 2, 3, 4, 6, 7], [(None, "stiffness"), (1, "b"), (2, "e")]),
+        # One that stands in for the stiffness.
+        (4, {"stiffness"}, [0, 2, 3, 4, 8], [(1, "b"), (2, "f")]),
+    ],
+)
+def test_one_candidate_of_several_keeps_its_own_columns(kept, fixed, columns, bound):
+    every = numbered()
+    one = every.without(kept, among=range(2, 5), fixed=fixed)
+    wanted = [every.parameters[i] for i in columns]
+    # It comes first among the candidates, after the effects of the model.
+    assert one.parameters == tuple((2 if p == kept else p, name) for p, name in wanted)
+    assert one.at_bound == tuple(bound)
+    entries = 10.0 * np.array(columns)[:, None] + columns
+    np.testing.assert_array_equal(one.matrix, np.stack([entries, 100 + entries]))
+    np.testing.assert_array_equal(one.gradient, [columns, 100.0 + np.array(columns)])
+    np.testing.assert_array_equal(one.prior_matrix, -entries)
+    np.testing.assert_array_equal(one.prior_gradient, -np.array(columns, float))
+    assert one.total == every.total
+
+
+@pytest.mark.parametrize("near", [False, True], ids=["exact", "near"])
+def test_a_loss_is_that_of_the_evaluation(fitter, near: bool):
+    start = model(fitter, FRICTION)
+    runs = fitter.runs(start) if near else None
+    offset = FreeEffect(Effect("torque_offset", 1, {"offset_nm": 0.3}), ("offset_nm",))
+    for values in (None, {}):
+        free = [*start.free, offset]
+        loss = fitter.loss(free, start, robot_values=values, near=runs)
+        found = fitter.evaluate(free, start, robot_values=values, near=runs)
+        # Weighted with a column or without.
+        assert loss == pytest.approx(found.total, rel=1e-9)
+        assert loss < 0.9 * start.total or values == {}
+
+
+def test_around_its_own_runs_a_model_is_as_exact(fitter):
+    start = model(fitter, FRICTION)
+    runs = fitter.runs(start)
+    exact = fitter.loss(start.free, start)
+    assert exact == pytest.approx(start.total, rel=1e-9)
+    # What the linearised arm leaves out is put back: rounding alone.
+    assert fitter.loss(start.free, start, near=runs) == pytest.approx(exact, rel=1e-9)
+    # And is not there by itself: another model's runs are another thing.
+    nominal = fitter.runs(start, {})
+    assert fitter.loss(start.free, start, near=nominal) != pytest.approx(exact, rel=1e-9)
+    assert fitter.loss(start.free, start, near=nominal) == pytest.approx(exact, rel=1e-3)
+
+
+def evidence(*effects: Effect) -> Evidence:
+    """A fit of nothing, with effects in the model."""
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(200, 2)), rng.normal(size=200)
+    fitted = linear_evidence(x, y, np.repeat([0, 1], 100))
+    return replace(fitted, effects=effects, free=tuple(FreeEffect(e, ()) for e in effects))
+
+
+class Valley:
+    """A fitter whose loss depends on one number; the simulation fails where ``fails`` says so."""
+
+    def __init__(self, loss: Callable[[float], float], fails: float = np.inf) -> None:
+        self.curve, self.fails = loss, fails
+        self.asked: list[float] = []
+
+    def runs(self, *_: object) -> None:
+        return None
+
+    def loss(self, free: Sequence[FreeEffect], *_: object, **__: object) -> float:
+        value = (free[-1].effect.parameters or {})["half_width_rad"]
+        self.asked.append(value)
+        if value > self.fails:
+            raise InputError("the simulation failed")
+        return self.curve(value)
+
+
+def trials(model: Evidence, fitter: object = None) -> Trials:
+    fitter = fitter or Valley(float)
+    none = np.zeros(len(model.loss))
+    return Trials(fitter, model, none, layout_of(model), Settings(), lambda *_: None)  # type: ignore[arg-type]
+
+
+def candidate(name: str, n_free: int, *, acts: bool = False, axis: int = 1) -> FreeEffect:
+    parameters = effect_info(name).parameters
+    values = {p.name: p.neutral for p in parameters}
+    if acts:
+        values[parameters[0].name] = parameters[0].typical
+    return FreeEffect(Effect(name, axis, values), tuple(values)[:n_free])
+
+
+def test_candidates_share_evaluations_of_no_more_parameters_than_the_core_takes():
+    options = [
+        candidate("viscous_friction", 1),
+        candidate("asymmetric_friction", 3),
+        candidate("torque_offset", 1),
+        candidate("torque_ripple", 6),
+        candidate("torque_saturation", 1, acts=True),
+        candidate("gravity_compensation", 2),
+        candidate("torque_constant", 1, acts=True),
+        candidate("stribeck_friction", 4),
+        candidate("input_delay", 1),
+        candidate("load_dependent_friction", 2, axis=2),
+    ]
+    groups = trials(evidence())._groups(options)
+    assert sorted(o.effect.label for g in groups for o in g) == sorted(
+        o.effect.label for o in options
+    )
+    by_name = {o.effect.name: [p.effect.name for p in g] for g in groups for o in g}
+    for name in ("torque_saturation", "torque_constant", "torque_ripple"):
+        assert by_name[name] == [name]
+    shared = [g for g in groups if len(g) > 1]
+    assert all(sum(len(o.free) for o in g) <= 4 for g in shared)
+    # 4 + (3 + 1) + (2 + 2) + (1 + 1): none could be saved.
+    assert len(groups) == 3 + 4
+
+
+def test_what_takes_the_place_of_an_effect_is_evaluated_alone():
+    # Stribeck friction contains the Coulomb friction of the model; on another axis it does not.
+    here, there = candidate("stribeck_friction", 2), candidate("stribeck_friction", 2, axis=2)
+    others = [candidate("torque_offset", 1), candidate("input_delay", 1)]
+    groups = trials(evidence(FRICTION))._groups([here, there, *others])
+    assert [[o.effect.label for o in g] for g in groups] == [
+        ["stribeck_friction@1"],
+        ["stribeck_friction@2", "torque_offset@1", "input_delay@1"],
+    ]
+
+
+STARTS = np.geomspace(1e-5, 1e-3, 12)
+
+
+def play(starts: Sequence[float] = tuple(STARTS)) -> FreeEffect:
+    effect = Effect("backlash", 1, {"half_width_rad": 0.0})
+    values = tuple({"half_width_rad": float(s)} for s in starts)
+    return FreeEffect(effect, ("half_width_rad",), starts=values)
+
+
+@pytest.mark.parametrize("true", [1.1e-5, 7e-5, 1.7e-4, 9.3e-4])
+def test_the_bottom_of_a_valley_narrower_than_the_steps_between_starts_is_found(true: float):
+    model = evidence()
+    # Starts lie a factor of 1.5 apart; the valley falls to half its depth within a fifth.
+    fitter = Valley(lambda v: 2 * model.total * (1 - np.exp(-((v / true - 1) ** 2) / 0.06)))
+    option, gain = trials(model, fitter)._best_of_starts(play(STARTS[::-1]))
+    found = (option.effect.parameters or {})["half_width_rad"]
+    # The scan stops within 0.003 of the value; the loss there is 2e-4 of the depth.
+    assert found == pytest.approx(true, rel=0.01)
+    assert gain == pytest.approx(model.total, rel=1e-2)
+    assert gain == pytest.approx(model.total - fitter.curve(found))
+
+
+def test_where_no_start_is_better_none_is_looked_at_closer():
+    model = evidence()
+    fitter = Valley(lambda v: model.total * (1 + v))
+    option, gain = trials(model, fitter)._best_of_starts(play())
+    assert (option.effect.parameters or {})["half_width_rad"] == STARTS[0]
+    assert gain == pytest.approx(-model.total * STARTS[0])
+    assert fitter.asked == list(STARTS)
+
+
+def test_starts_that_cannot_be_simulated_are_passed_over():
+    model, true = evidence(), 5e-5
+    fitter = Valley(lambda v: model.total * (v / true - 1) ** 2, fails=3e-4)
+    round_ = trials(model, fitter)
+    option, gain = round_._best_of_starts(play())
+    assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
+    assert gain == pytest.approx(model.total, rel=1e-3)
+    assert round_.skipped == {"backlash@1": "the simulation failed"}
+
+
+def test_a_single_start_is_a_start():
+    model = evidence()
+    fitter = Valley(lambda v: model.total * (v / 1e-4 - 1) ** 2)
+    option, gain = trials(model, fitter)._best_of_starts(play([1.2e-4]))
+    assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(1.2e-4)
+    assert gain == pytest.approx(0.96 * model.total)
