@@ -50,10 +50,15 @@ def of_axis_fit(
 
 
 RIGID_BODY_TERMS = {
-    "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
-    "torque_offset": ("torque_offset", "offset_nm"),
+    "coulomb_friction": ("coulomb_friction", "coulomb_nm", 1.0),
+    # A torque model needs the term from its motor, the effect gives it to the motor.
+    "torque_offset": ("torque_offset", "offset_nm", -1.0),
 }
-"""Terms of a torque model that the robot has no parameter for: effect and its parameter."""
+"""Terms of a torque model that the robot has no parameter for: effect, its parameter and sign."""
+
+CORNER_SHARE = 0.003
+"""Corner of the sign of the speed in dry friction, as a share of the largest speed seen: narrow
+enough for hardly a sample to lie in it, wide enough to be integrated."""
 
 RIGID_BODY_QUANTITIES = {
     "motor_inertia": "motor_inertia",
