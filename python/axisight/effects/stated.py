@@ -8,7 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from axisight.effects.effect import Effect
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,18 @@ RIGID_BODY_TERMS = {
 }
 """Terms of a torque model that the robot has no parameter for: effect, its parameter and sign."""
 
-CORNER_SHARE = 0.003
-"""Corner of the sign of the speed in dry friction, as a share of the largest speed seen: narrow
-enough for hardly a sample to lie in it, wide enough to be integrated."""
+_CORNER_SHARE = 0.003
+_MOTOR_CORNER_RAD_S = 0.1
+
+
+def friction_corner(top_speed: Array) -> Array:
+    """Return over which speeds (n_axes,) the sign in dry friction is smoothed, from the largest seen.
+
+    Narrow enough for hardly a sample to lie in it, wide enough to be integrated; at most the usual
+    corner of motors, which is too wide for a slide or for speeds on the side of the joints.
+    """
+    return np.asarray(np.minimum(_CORNER_SHARE * np.asarray(top_speed), _MOTOR_CORNER_RAD_S))
+
 
 RIGID_BODY_QUANTITIES = {
     "motor_inertia": "motor_inertia",

@@ -78,6 +78,8 @@ def motion(log: Log, cutoff_hz: float) -> Motion:
 class InverseDynamicsFitter(ModelFitter):
     """Error of the torque predicted from the measured motion."""
 
+    adds_up = True
+
     def __init__(
         self,
         robot: Robot,

@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
-from axisight.effects.stated import CORNER_SHARE
+from axisight.effects.stated import friction_corner
 from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
 from axisight.rigid_body.base import base_parameters
@@ -297,10 +296,7 @@ def _corners(model: TorqueModel, motions: Sequence[MotionEstimate]) -> Array:
     """Return over which motor speeds (n_axes,) dry friction turns over, as the motions have it."""
     chosen = float(model.terms.smoothing_rad_s)
     top = np.max([np.abs(m.velocity_rad_s).max(axis=0) for m in motions], axis=0)
-    usual = {p.name: p.neutral for p in effect_info("coulomb_friction").parameters}
-    # The regression has the sign sharp: what is not seen of it at motor speeds is wide for a slide.
-    sharp = np.minimum(CORNER_SHARE * top, usual["smoothing_rad_s"])
-    return np.full(len(top), chosen) if chosen > 0 else np.asarray(sharp)
+    return np.full(len(top), chosen) if chosen > 0 else friction_corner(top)
 
 
 def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> MotionEstimate:
