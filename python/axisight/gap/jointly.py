@@ -168,22 +168,21 @@ def in_parts(
     if not parts:
         return ()
     bounds = winner.trial.candidate.bounds
-    free = [_part(name, effect, bounds) for name in parts]
+    present = {e.label for e in model.effects}
+    free = [f for f in (_part(name, effect, bounds) for name in parts) if _new(f, present)]
     try:
         alone = [trial(f, fitter.fit([*model.free, f], model)) for f in free]
-        both = [
-            trial(f, fitter.fit([*model.free, g, f], beside.evidence, lazy=True))
-            for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
-        ]
+        both = alone
+        if len(free) == 2:
+            both = [
+                trial(f, fitter.fit([*model.free, g, f], beside.evidence, lazy=True))
+                for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
+            ]
     except InputError:
         return ()
-    if clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
+    if not both or clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
         return ()
-    sure = [
-        layout.significance(beside.held_out, t.held_out, standing.axis) > _OF_TWO
-        for beside, t in zip(alone[::-1], both, strict=True)
-    ]
-    chosen = both if all(sure) else [alone[0 if sure[0] else 1]] if any(sure) else [alone[0]]
+    chosen = _needed(alone, both, layout, standing.axis)
     labels = {t.label for t in both} | {winner.trial.label}
     rest = tuple(r for r in standing.ranked if r.trial.label not in labels)
     mass = sum(r.probability for r in standing.ranked if r.trial.label in labels)
@@ -191,9 +190,26 @@ def in_parts(
     return tuple((r, replace(standing, ranked=(r, *rest))) for r in found)
 
 
-def _part(
-    name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]
-) -> FreeEffect:
+def _new(part: FreeEffect, present: set[str]) -> bool:
+    return part.effect.label not in present
+
+
+def _needed(
+    alone: Sequence[Trial], both: Sequence[Trial], layout: Layout, axis: int
+) -> Sequence[Trial]:
+    """Return the trials of those parts that show beside the other; the first if none does."""
+    if len(both) < 2:
+        return both
+    sure = [
+        layout.significance(beside.held_out, t.held_out, axis) > _OF_TWO
+        for beside, t in zip(alone[::-1], both, strict=True)
+    ]
+    if all(sure):
+        return both
+    return [alone[1]] if sure[1] else [alone[0]]
+
+
+def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> FreeEffect:
     """Return a part of a composite, with the shape that the composite has."""
     given = composite.parameters or {}
     info = effect_info(name).parameters

@@ -169,9 +169,7 @@ def _pairs(
     fall = falls([p.both for p in seen], round_.current, state.layout)
     kept: list[int] = []
     for k, pair in enumerate(seen):
-        felt = (
-            interact(i, k, pair.axis, fall) or interact(k, i, seen[i].axis, fall) for i in kept
-        )
+        felt = (interact(i, k, pair.axis, fall) or interact(k, i, seen[i].axis, fall) for i in kept)
         if not any(felt):
             kept.append(k)
     return [member for i in kept for member in seen[i].members]

@@ -163,10 +163,14 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
     centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
     # Tools reach about as far as the last links do.
     spread = 0.3 * reach
+    # What is taken off a link leaves some of it, re-fitted or not.
+    last = next(j.link.mass_kg for j in reversed(joints) if j.link is not None)
+    top = next(p.upper for p in trial.info.parameters if p.name == "mass_kg")
     return FreeEffect(
         trial.effect({"mass_kg": 0.0, **centre}),
         ("mass_kg", "x_m", "y_m", "z_m"),
         {name: (value, spread) for name, value in centre.items()},
+        {"mass_kg": (-0.8 * float(last), top)},
     )
 
 
