@@ -44,7 +44,7 @@ class InverseView(View):
             [motion(log, cutoff) for log in logs],
             floor.weighting,
             settings.tolerances_of(robot),
-            settings.block_s,
+            block_s(logs, cutoff, settings),
         )
         self.cutoff = cutoff
         super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor, cutoff)
@@ -64,6 +64,18 @@ class InverseView(View):
             inverse_noise(self.robot, log, std, self.cutoff, seed, 2 * run)
             for run, log in enumerate(logs, start=first_run)
         ]
+
+
+# Stretches of time that a gain is compared over need that many blocks, all logs together.
+_BLOCKS = 20.0
+# A block is longer than what the low-pass and the friction around a reversal smear.
+_PERIODS = 10.0
+
+
+def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
+    """Return how long blocks of data are [s]: those of the settings, shorter in short logs."""
+    total = sum(log.duration_s for log in logs)
+    return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
 
 
 def motion(log: Log, cutoff_hz: float) -> Motion:
