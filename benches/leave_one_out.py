@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from real_arms import MACHINES, Machine
 
-from axisight import Diagnosis, Effect, Robot, Settings, diagnose
+from axisight import Diagnosis, Robot, Settings, diagnose
 from axisight.gap.inverse import motion, predicted_torque
 from axisight.gap.torques import AS_GIVEN
 
@@ -73,18 +73,9 @@ def cases(machine: Machine) -> Iterator[Case]:
     if full.n_axes > 1:
         key = f"{full.joint_names[-1]}.mass"
         mass = full.parameters()[key]
-        light = full.with_effects(
-            [*full.effects, Effect("payload", None, _taken_off(full, PAYLOAD_SHARE * mass))]
-        )
-        yield _case(machine, "payload", light, "mass_kg", 0.0)
-
-
-def _taken_off(robot: Robot, mass_kg: float) -> dict[str, float]:
-    """Return the payload that takes this much off the last link, at its centre of mass."""
-    link = robot.joints[-1].link
-    assert link is not None
-    x, y, z = (float(c) for c in link.com_m)
-    return {"mass_kg": -mass_kg, "x_m": x, "y_m": y, "z_m": z}
+        # What the tool weighs beyond a fifth of the last link, at its centre of mass.
+        light = full.with_parameters({key: (1 - PAYLOAD_SHARE) * mass})
+        yield _case(machine, "payload", light, "mass_kg", PAYLOAD_SHARE * mass)
 
 
 def _case(machine: Machine, label: str, robot: Robot, parameter: str, value: float) -> Case:

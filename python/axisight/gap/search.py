@@ -40,7 +40,8 @@ class Search:
 
     ``baseline``: the simulator re-fitted without effects; ``model``: with the
     accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
-    blocks lie; ``skipped``: candidates that failed, with the reason.
+    blocks lie; ``skipped``: candidates that failed, with the reason;
+    ``by_axis``: the effects explain their axes, not the arm.
     """
 
     baseline: Evidence
@@ -49,6 +50,7 @@ class Search:
     layout: Layout
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    by_axis: bool = False
 
     @property
     def accepted(self) -> list[tuple[Ranked, Standing]]:

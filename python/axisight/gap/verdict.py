@@ -68,7 +68,7 @@ def conclude(found: Search, settings: Settings, *, stands_out: bool) -> Conclusi
         verdict = "unknown"
     else:
         verdict = "undecidable" if open_groups else "explained"
-    believed = verdict in ("explained", "undecidable")
+    believed = verdict in ("explained", "undecidable") or found.by_axis
     causes = tuple(
         _named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted) if believed
     )
