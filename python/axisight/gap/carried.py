@@ -37,8 +37,7 @@ def carried_over(
 
     A cause whose addition does not shrink the validation gap is withdrawn; so is *none* where a
     log stands above the floor; and nothing is said where the noise estimated from the logs is
-    larger than the gap. ``own``: of causes that explain some axes, not the arm; they have to shrink
-    the gap there.
+    larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     """
     withdrawn = None
     if gap.floor > _ABSURD * gap.refitted:
@@ -48,6 +47,7 @@ def carried_over(
             f"glitches, frozen or missing samples, with `axisight check`."
         )
     elif own is not None:
+        # Another motion may leave more of what nothing explains, and ask as much of the causes.
         withdrawn = _no_fall_there(own, stages)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings)

@@ -261,8 +261,9 @@ def _assemble(
 def _axes_alone(
     view: View, found: Search, conclusion: Conclusion, reach: Reach, settings: Settings
 ) -> OwnAxes | None:
-    """Return how causes that explain their axes only fare there, on both kinds of logs."""
-    if not found.by_axis or not conclusion.causes:
+    """Return how causes fare on their axes on both kinds of logs, where errors of axes add up."""
+    arm = any(c.axis is None for c in conclusion.causes)
+    if not view.fitter.adds_up or not conclusion.causes or arm:
         return None
     measured = [view.measured(log) for log in view.logs]
     after = Variant(found.model.robot_values, found.model.effects)
