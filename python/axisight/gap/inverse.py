@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -12,7 +13,7 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
-from axisight.fitting.simulation_error import core_spec
+from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import Motion, chosen_cutoff_hz
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
@@ -24,6 +25,10 @@ from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
+
+
+# Natural step of effects, as a share of their typical size.
+_STEP = 1e-3
 
 
 class InverseView(View):
@@ -108,6 +113,15 @@ class InverseDynamicsFitter(ModelFitter):
         quantity = name.rsplit(".", 1)[1]
         return quantity not in ("stiffness", "damping")
 
+    def _specs(self, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> list[Spec]:
+        """Return the parameters for the core, effects in small steps.
+
+        What moves a block beyond all reason within its natural step has no derivative in the core: a
+        simulation is chaotic there. A predicted torque never is, and motors may be small.
+        """
+        steps = (p if p.effect is None else replace(p, scale=_STEP * p.scale) for p in parameters)
+        return [core_spec(p, effects) for p in steps]
+
     def solve(
         self,
         effects: Sequence[Effect],
@@ -120,7 +134,7 @@ class InverseDynamicsFitter(ModelFitter):
         return _core.fit_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
+            self._specs(parameters, effects),
             self.motions,
             self.weighting.core(),
             options,
@@ -140,7 +154,7 @@ class InverseDynamicsFitter(ModelFitter):
         return _core.evaluate_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
+            self._specs(parameters, effects),
             self.motions,
             self.weighting.core(),
             options,

@@ -174,6 +174,11 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
     )
 
 
+def _balancer(trial: Trial) -> FreeEffect | None:
+    """Begin at the neutral values; what slides has no angle that gravity turns with."""
+    return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
+
+
 STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "viscous_friction": _neutral,
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
@@ -194,7 +199,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "joint_damping": _neutral,
     "quadratic_drag": _neutral,
     "load_dependent_friction": _law(smoothing_rad_s=_SMOOTHING),
-    "gravity_compensation": _neutral,
+    "gravity_compensation": _balancer,
     "cable_stiffness": _neutral,
     "transmission_error": _gear_waves,
     "torque_saturation": _limit,
