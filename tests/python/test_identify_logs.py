@@ -315,7 +315,9 @@ def test_values_written_give_the_torques_of_the_fit(robot, logs, tmp_path: Path)
         for effect in back.effects:
             label = model.names[i].rpartition(".")[0]
             if effect.axis == robot.joint_names.index(label) + 1 and effect.name in name:
-                again[i] = effect.values()[0]
+                # The term asks of the motor what the effect gives it.
+                sign = -1.0 if effect.name == "torque_offset" else 1.0
+                again[i] = sign * effect.values()[0]
     q, v, a = smooth_motion(robot, 50, 0.1, 9)
     matrix = model.matrix(q, v, a)
     want = matrix @ found.consistent.theta

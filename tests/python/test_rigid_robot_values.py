@@ -5,6 +5,8 @@ import pytest
 
 from axisight import load_robot
 from axisight.errors import InputError, RobotError
+from axisight.gap.inverse import predicted_torque
+from axisight.gap.torques import AS_GIVEN
 from axisight.rigid_body import USUAL_TERMS, TorqueModel, identified_bodies
 from axisight.robot_file import Provenance, load_identified, write_identified
 
@@ -44,7 +46,26 @@ def test_written_robot_has_the_dynamics_of_the_parameters(tmp_path):
     assert new.matrix(q, v, a) @ new.nominal == pytest.approx(expected, rel=1e-9)
     effects = {e.label: e.parameters for e in load_identified(tmp_path / "new.toml").effects}
     assert effects["coulomb_friction@2"]["coulomb_nm"] == pytest.approx(0.7)
-    assert effects["torque_offset@3"]["offset_nm"] == pytest.approx(-0.2)
+    assert effects["torque_offset@3"]["offset_nm"] == pytest.approx(0.2)
+
+
+def test_written_simulator_needs_the_torque_of_the_parameters(tmp_path):
+    """Inverse dynamics of the simulator with its effects, against the regression: signs agree."""
+    robot = load_robot("two_mass_axis")
+    model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
+    theta = model.nominal.copy()
+    for name, value in (("coulomb_friction", 0.7), ("torque_offset", -0.2)):
+        theta[model.names.index(f"axis1.{name}")] = value
+    found = identified_bodies(model, theta, FROM, corner_rad_s=[0.001])
+    write_identified(robot, tmp_path / "new.toml", found)
+    back = load_robot(tmp_path / "new.toml")
+    q, v, a = np.random.default_rng(0).uniform(-1, 1, (3, 20, 1))
+    motor = tuple(np.ascontiguousarray(x / robot.gear_ratio) for x in (q, v, a))
+    at = (*motor, np.zeros((20, 1)))
+    needed = predicted_torque(back, AS_GIVEN, at)
+    np.testing.assert_allclose(needed, model.matrix(q, v, a) @ theta, rtol=1e-6, atol=1e-9)
+    dry = next(e for e in back.effects if e.name == "coulomb_friction")
+    assert dry.parameters["smoothing_rad_s"] == pytest.approx(0.001)
 
 
 def test_covariance_is_carried_to_first_order():

@@ -8,7 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from axisight.effects.effect import Effect
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,10 +55,24 @@ def of_axis_fit(
 
 
 RIGID_BODY_TERMS = {
-    "coulomb_friction": ("coulomb_friction", "coulomb_nm"),
-    "torque_offset": ("torque_offset", "offset_nm"),
+    "coulomb_friction": ("coulomb_friction", "coulomb_nm", 1.0),
+    # A torque model needs the term from its motor, the effect gives it to the motor.
+    "torque_offset": ("torque_offset", "offset_nm", -1.0),
 }
-"""Terms of a torque model that the robot has no parameter for: effect and its parameter."""
+"""Terms of a torque model that the robot has no parameter for: effect, its parameter and sign."""
+
+_CORNER_SHARE = 0.003
+_MOTOR_CORNER_RAD_S = 0.1
+
+
+def friction_corner(top_speed: Array) -> Array:
+    """Return over which speeds (n_axes,) the sign in dry friction is smoothed, from the largest seen.
+
+    Narrow enough for hardly a sample to lie in it, wide enough to be integrated; at most the usual
+    corner of motors, which is too wide for a slide or for speeds on the side of the joints.
+    """
+    return np.asarray(np.minimum(_CORNER_SHARE * np.asarray(top_speed), _MOTOR_CORNER_RAD_S))
+
 
 RIGID_BODY_QUANTITIES = {
     "motor_inertia": "motor_inertia",

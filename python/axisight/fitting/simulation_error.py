@@ -133,7 +133,7 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class _Spec:
+class Spec:
     """A parameter as the compiled core reads it."""
 
     robot: str | None
@@ -194,13 +194,13 @@ def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parame
     return Parameter(name, initial, p.lower, p.upper, p.typical, effect=index)
 
 
-def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> _Spec:
+def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> Spec:
     """Return a parameter as the compiled core reads it."""
     place = None
     if parameter.effect is not None:
         names = [p.name for p in effect_info(effects[parameter.effect].name).parameters]
         place = (parameter.effect, names.index(parameter.name))
-    return _Spec(
+    return Spec(
         robot=parameter.name if parameter.effect is None else None,
         effect=place,
         initial=parameter.initial,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.by_axis import OwnAxes
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.result import Gap
@@ -25,13 +26,18 @@ _ABSURD = 1.25
 
 
 def carried_over(
-    conclusion: Conclusion, stages: Stages, gap: Gap, names: Sequence[str], settings: Settings
+    conclusion: Conclusion,
+    stages: Stages,
+    gap: Gap,
+    names: Sequence[str],
+    settings: Settings,
+    own: OwnAxes | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
     A cause whose addition does not shrink the validation gap is withdrawn; so is *none* where a
     log stands above the floor; and nothing is said where the noise estimated from the logs is
-    larger than the gap.
+    larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     """
     withdrawn = None
     if gap.floor > _ABSURD * gap.refitted:
@@ -40,6 +46,9 @@ def carried_over(
             f"larger than the gap ({percent(gap.refitted)}): look for faults in the data, such as "
             f"glitches, frozen or missing samples, with `axisight check`."
         )
+    elif own is not None:
+        # Another motion may leave more of what nothing explains, and ask as much of the causes.
+        withdrawn = _no_fall_there(own, stages)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings)
     elif conclusion.verdict == "none":
@@ -85,6 +94,20 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
         f"gap goes from {percent(gap.before)} to {percent(gap.after)} of the torque; on axis {axis + 1} of "
         f"{names[log]} from {percent(float(np.sqrt(before[log, axis])))} to "
         f"{percent(float(np.sqrt(after[log, axis])))}."
+    )
+
+
+def _no_fall_there(own: OwnAxes, stages: Stages) -> str | None:
+    """Say so where the causes of an axis do not shrink its gap."""
+    axis = own.not_carried()
+    if axis is None:
+        return None
+    before, after = (
+        percent(float(np.sqrt(_squares(s)[:, axis].mean()))) for s in (stages.given, stages.after)
+    )
+    return (
+        f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
+        f"logs: with it the gap of the axis goes from {before} to {after} of the torque."
     )
 
 

@@ -25,6 +25,13 @@ def headline(
             f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
             f"{percent(gap.refitted)} of the torque unexplained; sensor noise alone leaves {percent(gap.floor)}."
         )
+    if conclusion.verdict == "unknown" and causes:
+        missing = named(causes, own, len(gap.before_per_axis))
+        return (
+            f"The simulator lacks {missing}, and something else that no known effect explains well: "
+            f"the gap on held-out data goes from {percent(gap.before)} to {percent(gap.after)} of the "
+            f"torque, {percent(gap.floor)} would be noise.{place}"
+        )
     if conclusion.verdict == "unknown":
         return (
             f"The simulator misses something that no known effect explains well: "

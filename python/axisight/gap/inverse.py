@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -12,7 +13,7 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
-from axisight.fitting.simulation_error import core_spec
+from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import Motion, chosen_cutoff_hz
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std
@@ -24,6 +25,10 @@ from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
+
+
+# Natural step of effects, as a share of their typical size.
+_STEP = 1e-3
 
 
 class InverseView(View):
@@ -44,7 +49,7 @@ class InverseView(View):
             [motion(log, cutoff) for log in logs],
             floor.weighting,
             settings.tolerances_of(robot),
-            settings.block_s,
+            block_s(logs, cutoff, settings),
         )
         self.cutoff = cutoff
         super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor, cutoff)
@@ -66,6 +71,18 @@ class InverseView(View):
         ]
 
 
+# Stretches of time that a gain is compared over need that many blocks, all logs together.
+_BLOCKS = 20.0
+# A block is longer than what the low-pass and the friction around a reversal smear.
+_PERIODS = 10.0
+
+
+def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
+    """Return how long blocks of data are [s]: those of the settings, shorter in short logs."""
+    total = sum(log.duration_s for log in logs)
+    return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
+
+
 def motion(log: Log, cutoff_hz: float) -> Motion:
     """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike."""
     velocity, acceleration = differentiate(log.position_rad, log.sample_time_s, cutoff_hz)
@@ -77,6 +94,8 @@ def motion(log: Log, cutoff_hz: float) -> Motion:
 
 class InverseDynamicsFitter(ModelFitter):
     """Error of the torque predicted from the measured motion."""
+
+    adds_up = True
 
     def __init__(
         self,
@@ -94,6 +113,15 @@ class InverseDynamicsFitter(ModelFitter):
         quantity = name.rsplit(".", 1)[1]
         return quantity not in ("stiffness", "damping")
 
+    def _specs(self, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> list[Spec]:
+        """Return the parameters for the core, effects in small steps.
+
+        What moves a block beyond all reason within its natural step has no derivative in the core: a
+        simulation is chaotic there. A predicted torque never is, and motors may be small.
+        """
+        steps = (p if p.effect is None else replace(p, scale=_STEP * p.scale) for p in parameters)
+        return [core_spec(p, effects) for p in steps]
+
     def solve(
         self,
         effects: Sequence[Effect],
@@ -106,7 +134,7 @@ class InverseDynamicsFitter(ModelFitter):
         return _core.fit_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
+            self._specs(parameters, effects),
             self.motions,
             self.weighting.core(),
             options,
@@ -126,7 +154,7 @@ class InverseDynamicsFitter(ModelFitter):
         return _core.evaluate_inverse_dynamics(
             self.robot.core,
             core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
+            self._specs(parameters, effects),
             self.motions,
             self.weighting.core(),
             options,

@@ -133,7 +133,13 @@ class _Setup:
 
 
 class ModelFitter(ABC):
-    """Fits models to one set of logs; subclasses say by which error."""
+    """Fits models to one set of logs; subclasses say by which error.
+
+    ``adds_up``: effects of an axis add up in the error, and hide one another where several are
+    missing: they are tried in pairs too.
+    """
+
+    adds_up = False
 
     def __init__(
         self, robot: Robot, weighting: Weighting, tolerances: Mapping[str, float], block_s: float

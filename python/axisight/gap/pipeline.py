@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
+from axisight.gap.by_axis import OwnAxes, believed_by_axis
 from axisight.gap.carried import carried_over
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
@@ -82,6 +83,7 @@ def diagnose(
     progress("looking at the logs", 1, 1)
     view = view_of(machine, fit_logs, held_logs, chosen)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    found = believed_by_axis(found, view.fitter, chosen)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     limits = missing(view.limits, machine)
@@ -208,7 +210,8 @@ def _assemble(
     reach = _reach(view, held_logs, found, conclusion.effects, settings)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
-    conclusion = carried_over(conclusion, reach.stages, gap, names, settings)
+    own = _axes_alone(view, found, conclusion, reach, settings)
+    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own)
     causes = tuple(
         Cause(
             c.effect,
@@ -262,6 +265,23 @@ def _assemble(
             "cutoff_hz": view.cutoff_hz,
         },
     )
+
+
+def _axes_alone(
+    view: View, found: Search, conclusion: Conclusion, reach: Reach, settings: Settings
+) -> OwnAxes | None:
+    """Return how causes fare on their axes on both kinds of logs, where errors of axes add up."""
+    arm = any(c.axis is None for c in conclusion.causes)
+    if not view.fitter.adds_up or not conclusion.causes or arm:
+        return None
+    measured = [view.measured(log) for log in view.logs]
+    after = Variant(found.model.robot_values, found.model.effects)
+    given, left = (
+        stage(view.logs, _errors(view.torques(v, view.logs), measured), settings.block_s, measured)
+        for v in (AS_GIVEN, after)
+    )
+    axes = sorted({c.axis - 1 for c in conclusion.causes if c.axis is not None})
+    return OwnAxes(axes, (given, left), (reach.stages.given, reach.stages.after))
 
 
 def _filtered(view: View) -> tuple[str, ...]:

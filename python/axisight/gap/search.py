@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
+from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
@@ -39,7 +40,8 @@ class Search:
 
     ``baseline``: the simulator re-fitted without effects; ``model``: with the
     accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
-    blocks lie; ``skipped``: candidates that failed, with the reason.
+    blocks lie; ``skipped``: candidates that failed, with the reason;
+    ``by_axis``: the effects explain their axes, not the arm.
     """
 
     baseline: Evidence
@@ -48,6 +50,7 @@ class Search:
     layout: Layout
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    by_axis: bool = False
 
     @property
     def accepted(self) -> list[tuple[Ranked, Standing]]:
@@ -122,6 +125,7 @@ def _taken(
     fall = falls(trials, round_.current, state.layout)
     place = {t.label: i for i, t in enumerate(trials)}
     found: list[tuple[Ranked, Standing]] = []
+    leaders: list[tuple[int, int]] = []
 
     def felt_most(s: Standing) -> tuple[float, float]:
         # One that leads on several axes is judged where it gains most.
@@ -134,14 +138,43 @@ def _taken(
             continue
         mine = place[led.best.trial.label]
         felt = any(
-            interact(place[r.trial.label], mine, led.axis, fall)
-            or interact(mine, place[r.trial.label], s.axis, fall)
-            for r, s in found
+            interact(one, mine, led.axis, fall) or interact(mine, one, axis, fall)
+            for one, axis in leaders
         )
         if not felt and _earns_its_gain(round_.fitter, led.best, state.model):
-            simpler = _simpler(led, round_.fitter)
-            found.append((simpler.best, simpler))
+            leaders.append((mine, led.axis))
+            found += _named_simply(led, round_.fitter, state)
+    if not found and round_.fitter.adds_up:
+        found = _pairs(round_, trials, state, settings, tried)
     return tuple(found[: max(room, 0)])
+
+
+def _named_simply(
+    led: Standing, fitter: ModelFitter, state: Search
+) -> Sequence[tuple[Ranked, Standing]]:
+    """Return the cause that leads a standing, or what it is made of where that does as well."""
+    if fitter.adds_up:
+        whole = without_rival_composites(led)
+        return in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
+    simpler = _simpler(led, fitter)
+    return ((simpler.best, simpler),)
+
+
+def _pairs(
+    round_: Trials, trials: Sequence[Trial], state: Search, settings: Settings, tried: int
+) -> list[tuple[Ranked, Standing]]:
+    """Return the pairs of causes, on axes that do not feel one another, where none shows alone."""
+    first = state.layout.by_axis(held_out_loss(state.baseline) - state.floor)
+    pairs = Pairs(round_.fitter, trials, round_.current, state.floor, state.layout, settings)
+    found = [pairs.found(axis, float(first[axis]), tried) for axis in range(state.layout.n_axes)]
+    seen = sorted((p for p in found if p is not None), key=lambda p: -p.gain)
+    fall = falls([p.both for p in seen], round_.current, state.layout)
+    kept: list[int] = []
+    for k, pair in enumerate(seen):
+        felt = (interact(i, k, pair.axis, fall) or interact(k, i, seen[i].axis, fall) for i in kept)
+        if not any(felt):
+            kept.append(k)
+    return [member for i in kept for member in seen[i].members]
 
 
 # Of candidates that explain nearly as much as the first, one may show more evenly over time.

@@ -181,11 +181,20 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
     centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
     # Tools reach about as far as the last links do.
     spread = 0.3 * reach
+    # What is taken off a link leaves some of it, re-fitted or not.
+    last = next(j.link.mass_kg for j in reversed(joints) if j.link is not None)
+    top = next(p.upper for p in trial.info.parameters if p.name == "mass_kg")
     return FreeEffect(
         trial.effect({"mass_kg": 0.0, **centre}),
         ("mass_kg", "x_m", "y_m", "z_m"),
         {name: (value, spread) for name, value in centre.items()},
+        {"mass_kg": (-0.8 * float(last), top)},
     )
+
+
+def _balancer(trial: Trial) -> FreeEffect | None:
+    """Begin at the neutral values; what slides has no angle that gravity turns with."""
+    return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
 
 
 STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
@@ -208,7 +217,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "joint_damping": _neutral,
     "quadratic_drag": _neutral,
     "load_dependent_friction": _law(smoothing_rad_s=_SMOOTHING),
-    "gravity_compensation": _neutral,
+    "gravity_compensation": _balancer,
     "cable_stiffness": _neutral,
     "transmission_error": _gear_waves,
     "torque_saturation": _limit,

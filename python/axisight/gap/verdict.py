@@ -83,7 +83,7 @@ def conclude(
         verdict = "unknown"
     else:
         verdict = "undecidable" if open_groups else "explained"
-    believed = verdict in ("explained", "undecidable")
+    believed = verdict in ("explained", "undecidable") or found.by_axis
     searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
     causes = (*map(_shown, limits), *searched) if believed else ()
     advice = _advice_unknown() if verdict == "unknown" else None

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.effects.stated import friction_corner
 from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
 from axisight.rigid_body.base import base_parameters
@@ -98,7 +99,8 @@ class LogIdentification:
         held = self.estimate.known
         # What is made of given values alone has no variance.
         free = np.diag([float(name not in held) for name in model.names])
-        found = identified_bodies(model, theta, source, covariance=free)
+        corner = _corners(model, self.motions)
+        found = identified_bodies(model, theta, source, covariance=free, corner_rad_s=corner)
         before = identified_bodies(model, model.nominal, source).values
         size = np.abs(before).max(initial=1e-300)
         same = np.isclose(found.values, before, rtol=1e-9, atol=1e-12 * size)
@@ -288,6 +290,13 @@ def identify_logs(
         errors,
         np.count_nonzero(weight, axis=0),
     )
+
+
+def _corners(model: TorqueModel, motions: Sequence[MotionEstimate]) -> Array:
+    """Return over which motor speeds (n_axes,) dry friction turns over, as the motions have it."""
+    chosen = float(model.terms.smoothing_rad_s)
+    top = np.max([np.abs(m.velocity_rad_s).max(axis=0) for m in motions], axis=0)
+    return np.full(len(top), chosen) if chosen > 0 else friction_corner(top)
 
 
 def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> MotionEstimate:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
 from axisight.effects.stated import RIGID_BODY_QUANTITIES, RIGID_BODY_TERMS
 from axisight.errors import InputError, RobotError
 from axisight.rigid_body.regressor import TorqueModel
@@ -26,6 +26,7 @@ def identified_bodies(
     provenance: Provenance,
     *,
     covariance: ArrayLike | None = None,
+    corner_rad_s: ArrayLike | None = None,
 ) -> Identified:
     """Return standard parameters in the terms of a robot file, for `write_identified`.
 
@@ -46,6 +47,9 @@ def identified_bodies(
         Where they come from.
     covariance
         (p, p) of theta, carried through to first order; without it standard errors are unknown.
+    corner_rad_s
+        (n_axes,) motor speeds over which the sign in Coulomb friction is smoothed [rad/s]; without
+        them the usual one of the effect, which suits motors and is wide for slides and joints.
 
     Raises InputError for a model on the joint side and numbers that do not fit the model or are
     not finite, RobotError for masses that are not positive.
@@ -73,6 +77,19 @@ def identified_bodies(
         out[link], jacobian[link, link] = _about_centre(values[link])
         quantities = ("mass", "com_x", "com_y", "com_z", *INERTIA)
         names[link] = [f"{joint}.{quantity}" for quantity in quantities]
+    corners = None if corner_rad_s is None else np.asarray(corner_rad_s, dtype=np.float64)
+    effects: list[Effect] = []
+    for i, name in enumerate(names):
+        joint, _, quantity = name.rpartition(".")
+        if quantity in RIGID_BODY_TERMS:
+            effect, parameter, sign = RIGID_BODY_TERMS[quantity]
+            out[i] *= sign
+            jacobian[i] *= sign
+            axis = _axis(model, joint)
+            shape = {} if corners is None else _corner(effect, corners[axis - 1])
+            found = Effect(effect, axis, {parameter: float(out[i]), **shape})
+            names[i] = f"{found.label}.{parameter}"
+            effects.append(found)
     spread = None
     if covariance is not None:
         given = np.asarray(covariance, dtype=np.float64)
@@ -80,14 +97,6 @@ def identified_bodies(
             raise InputError(f"covariance: expected shape {jacobian.shape}, got {given.shape}")
         spread = jacobian @ given @ jacobian.T
         spread = (spread + spread.T) / 2
-    effects: list[Effect] = []
-    for i, name in enumerate(names):
-        joint, _, quantity = name.rpartition(".")
-        if quantity in RIGID_BODY_TERMS:
-            effect, parameter = RIGID_BODY_TERMS[quantity]
-            found = Effect(effect, _axis(model, joint), {parameter: float(out[i])})
-            names[i] = f"{found.label}.{parameter}"
-            effects.append(found)
     replaced = _taken_up(model, effects)
     return identified(
         dict(zip(names, out.tolist(), strict=True)),
@@ -108,6 +117,14 @@ def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
             axis = _axis(model, joint)
             out += absorbed_effects(own, [RIGID_BODY_QUANTITIES[quantity]], axis=axis, found=found)
     return out
+
+
+def _corner(effect: str, corner_rad_s: float) -> dict[str, float]:
+    """Return the smoothing of an effect that has one, within its bounds."""
+    for p in effect_info(effect).parameters:
+        if p.name == "smoothing_rad_s":
+            return {p.name: float(np.clip(corner_rad_s, p.lower, p.upper))}
+    return {}
 
 
 def _axis(model: TorqueModel, joint: str) -> int:

@@ -1,0 +1,208 @@
+"""One effect at a time withheld from the complete simulator of a real machine: is it named?
+
+Run: python benches/leave_one_out.py DATA [--machine emps kr300 tx40] [--json out.json]
+
+DATA holds emps/, kuka_kr300/ and staubli_tx40/ (see real_arms.py). Each machine is identified from
+its estimation logs; then it is diagnosed without friction, complete, and without one effect of
+one axis, each in turn. Prints a table in Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from real_arms import MACHINES, Machine
+
+from axisight import Diagnosis, Robot, Settings, diagnose
+from axisight.gap.inverse import motion, predicted_torque
+from axisight.gap.torques import AS_GIVEN
+
+# Below this share of the torque's standard deviation on its axis an effect is not worth finding.
+SMALLEST_SHARE = 0.05
+PAYLOAD_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class Case:
+    """A simulator that lacks one thing: its label, parameter and true value."""
+
+    label: str
+    robot: Robot
+    parameter: str
+    value: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came out of one diagnosis. ``rank``: of the withheld effect, from 1; 0 if not among any."""
+
+    machine: str
+    withheld: str
+    share: float
+    verdict: str
+    named: str
+    first: bool
+    value: str
+    value_holds: bool | None
+    before: float
+    after: float
+    floor: float
+    seconds: float
+
+
+def cases(machine: Machine) -> Iterator[Case]:
+    """Yield the simulator without each of its effects, where the effect is worth finding."""
+    full = machine.complete
+    for effect in full.effects:
+        rest = [e for e in full.effects if e.label != effect.label]
+        name = {"coulomb_friction": "coulomb_nm", "torque_offset": "offset_nm"}[effect.name]
+        value = (effect.parameters or {})[name]
+        yield _case(machine, effect.label, full.with_effects(rest), name, value)
+    for axis, joint in enumerate(full.axis_names, 1):
+        key = f"{joint}.viscous_friction"
+        bare = full.with_parameters({key: 0.0})
+        value = full.parameters()[key]
+        yield _case(machine, f"viscous_friction@{axis}", bare, "viscous_nm_s_rad", value)
+    if full.n_axes > 1:
+        key = f"{full.joint_names[-1]}.mass"
+        mass = full.parameters()[key]
+        # What the tool weighs beyond a fifth of the last link, at its centre of mass.
+        light = full.with_parameters({key: (1 - PAYLOAD_SHARE) * mass})
+        yield _case(machine, "payload", light, "mass_kg", PAYLOAD_SHARE * mass)
+
+
+def _case(machine: Machine, label: str, robot: Robot, parameter: str, value: float) -> Case:
+    axis = int(label.partition("@")[2] or 0) - 1
+    missing, size = [], []
+    for log in machine.estimation:
+        at = motion(log, 20.0)
+        with_it, without = (predicted_torque(r, AS_GIVEN, at) for r in (machine.complete, robot))
+        missing.append(np.mean((with_it - without) ** 2, axis=0))
+        size.append(np.var(log.torque_nm, axis=0))
+    share = np.sqrt(np.mean(missing, axis=0) / np.mean(size, axis=0))
+    return Case(label, robot, parameter, value, float(share[axis] if axis >= 0 else share.max()))
+
+
+def row(machine: Machine, case: Case, found: Diagnosis, seconds: float) -> Row:
+    """Return what the diagnosis of a case says."""
+    labels = [c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in found.causes]
+    mine = [c for c, label in zip(found.causes, labels, strict=True) if label == case.label]
+    value, holds = "", None
+    if mine:
+        v = mine[0].parameters[case.parameter]
+        value = f"{v.value:.4g} [{v.low:.3g}, {v.high:.3g}] for {case.value:.4g}"
+        near = abs(v.value - case.value) <= 0.1 * abs(case.value)
+        holds = near or v.low <= case.value <= v.high
+    return Row(
+        machine.name,
+        case.label,
+        case.share,
+        found.verdict,
+        ", ".join(labels),
+        bool(labels) and labels[0] == case.label,
+        value,
+        holds,
+        found.gap.before,
+        found.gap.after,
+        found.gap.floor,
+        seconds,
+    )
+
+
+def least_squares_gap(machine: Machine, robot: Robot, cutoff_hz: float) -> float:
+    """Return the held-out gap of viscous and Coulomb friction and an offset fitted to the residual."""
+
+    def parts(log):
+        at = motion(log, cutoff_hz)
+        return at, at[3] - predicted_torque(robot, AS_GIVEN, at)
+
+    def columns(velocity):
+        return np.stack([velocity, np.sign(velocity), np.ones(len(velocity))], axis=1)
+
+    fitted = [parts(log) for log in machine.estimation]
+    held = [parts(log) for log in machine.validation]
+    squares = []
+    for axis in range(robot.n_axes):
+        x = np.concatenate([columns(at[1][:, axis]) for at, _ in fitted])
+        y = np.concatenate([left[:, axis] for _, left in fitted])
+        theta = np.linalg.lstsq(x, y, rcond=None)[0]
+        for log, (at, left) in zip(machine.validation, held, strict=True):
+            error = left[:, axis] - columns(at[1][:, axis]) @ theta
+            squares.append(float(np.mean(error**2) / np.var(log.torque_nm[:, axis])))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def diagnosed(machine: Machine, case: Case) -> tuple[Row, Diagnosis]:
+    """Diagnose a case."""
+    began = time.monotonic()
+    settings = Settings(bootstrap=100)
+    found = diagnose(
+        robot=case.robot,
+        estimation=machine.estimation,
+        validation=machine.validation,
+        settings=settings,
+    )
+    return row(machine, case, found, time.monotonic() - began), found
+
+
+def report(rows: list[Row]) -> str:
+    """Return the table."""
+    lines = [
+        "| machine | withheld | share of torque | verdict | first | named | value | gap | seconds |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for r in rows:
+        gap = f"{100 * r.before:.3g} to {100 * r.after:.3g} %"
+        first = "yes" if r.first else "no"
+        lines.append(
+            f"| {r.machine} | {r.withheld} | {100 * r.share:.0f} % | {r.verdict} | {first} "
+            f"| {r.named or '-'} | {r.value or '-'} | {gap} | {r.seconds:.0f} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run all cases and print what came out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--machine", nargs="+", choices=MACHINES, default=list(MACHINES))
+    parser.add_argument("--only", nargs="+", help="labels of the cases to run")
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    rows: list[Row] = []
+    for name in arguments.machine:
+        machine = MACHINES[name](arguments.data)
+        bare = machine.without_friction()
+        todo = [
+            Case("all friction", bare, "", 0.0, 1.0),
+            Case("nothing", machine.complete, "", 0.0, 0),
+        ]
+        todo += list(cases(machine))
+        for case in todo:
+            if arguments.only and case.label not in arguments.only:
+                continue
+            if case.share < SMALLEST_SHARE and case.label != "nothing":
+                print(
+                    f"{machine.name}: {case.label} is {100 * case.share:.1f} % of the torque: left out"
+                )
+                continue
+            result, found = diagnosed(machine, case)
+            rows.append(result)
+            print(report([result]).splitlines()[-1], flush=True)
+            if case.label == "all friction":
+                reference = least_squares_gap(machine, bare, float(found.provenance["cutoff_hz"]))
+                print(f"{machine.name}: least squares leaves {100 * reference:.3g} %")
+    print(report(rows))
+    if arguments.json:
+        arguments.json.write_text(json.dumps([asdict(r) for r in rows], indent=1))
+
+
+if __name__ == "__main__":
+    main()
