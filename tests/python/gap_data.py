@@ -7,6 +7,9 @@ import numpy as np
 from axisight import Effect, Log, Robot, load_robot, simulate
 from axisight.gap.model import Evidence
 
+PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
+HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
+
 
 def bare_axis() -> Robot:
     """The two-mass axis as a simulator that models no effect."""

@@ -17,6 +17,7 @@ from axisight.cli import app
 from axisight.errors import InputError
 from axisight.gap import verdict_schema
 from axisight.gap.candidates import all_candidates
+from axisight.gap.orders import Turning
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.starts import Situation
 from axisight.logs import read_log
@@ -279,8 +280,11 @@ def test_options_of_the_search_arrive(axis: Path, log: Path, monkeypatch) -> Non
 
 @pytest.mark.parametrize("cutoff_hz", [0, -3, 1000])
 def test_a_cutoff_that_is_none_is_refused(axis: Path, log: Path, cutoff_hz: float) -> None:
-    free = open_loop(log)
-    text = run("diagnose", free, free, "--model", axis, "--cutoff-hz", cutoff_hz, code=2)
+    rows = pd.read_parquet(open_loop(log))
+    halves = [log.with_name("first.parquet"), log.with_name("second.parquet")]
+    for half, part in zip(halves, np.array_split(np.arange(len(rows)), 2), strict=True):
+        rows.iloc[part].assign(time_s=rows["time_s"].iloc[: len(part)].values).to_parquet(half)
+    text = run("diagnose", *halves, "--model", axis, "--cutoff-hz", cutoff_hz, code=2)
     wanted = "cutoff_hz: expected between 0 and the Nyquist frequency 1000 Hz"
     assert f"{wanted}, got {cutoff_hz} Hz" in text
 
@@ -311,8 +315,11 @@ def test_candidates_begin_where_the_simulator_is(axis: Path, log: Path) -> None:
     data = read_log(log)
     rng = np.random.default_rng(0)
     speed = np.gradient(data.position_rad[:, 0], data.sample_time_s)
-    residual = [[rng.normal(size=data.n_samples)]]
-    at = Situation(residual, [[data.position_rad[:, 0]]], [[speed]], 20.0)
+    angle, time = data.position_rad[:, 0], data.sample_time_s
+    # A ripple at another order than the simulator's stands out of noise.
+    residual = rng.normal(size=data.n_samples) + 2 * np.cos(9 * angle)
+    turned = Turning(residual, angle, speed, time)
+    at = Situation([[turned]], lambda _effect, _axis, f: np.ones(len(f), complex), np.ones(1))
     found = {c.effect.label: c for c in all_candidates(robot, [data], at)}
     friction = found["coulomb_friction@1"]
     assert friction.effect.values() == COULOMB.values()

@@ -11,10 +11,7 @@ from axisight import Effect, Log, Settings, diagnose, load_robot
 from axisight.effects import effect_info
 from axisight.errors import CaseError, InputError
 from axisight.gap import verdict_schema
-from gap_data import bare_axis, logs_of, scattered
-
-PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
-HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
+from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 
 
 def run(effects: list[Effect], seed: int = 4) -> axisight.Diagnosis:

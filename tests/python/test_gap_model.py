@@ -9,7 +9,6 @@ import pytest
 from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.errors import InputError
-from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
 from axisight.gap.layout import layout_of
 from axisight.gap.model import Evidence, FreeEffect, Linearized
@@ -41,10 +40,8 @@ def model(fitter: ClosedLoopFitter, *effects: Effect, steps: int = 2) -> Evidenc
 
 def idle(view: ClosedLoopView, at: Evidence) -> list[FreeEffect]:
     """All candidates that do nothing as they are."""
-    seen = situation(view.robot, view.logs, at, view.floor.weighting.decimation, 125.0)
     present = {e.label for e in at.effects}
-    options = all_candidates(view.robot, view.logs, seen)
-    return [o for o in options if not o.effect.acts and o.effect.label not in present]
+    return [o for o in view.candidates(at) if not o.effect.acts and o.effect.label not in present]
 
 
 def differ(a: Linearized, b: Linearized) -> float:

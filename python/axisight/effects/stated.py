@@ -82,5 +82,8 @@ RIGID_BODY_QUANTITIES = {
 }
 """Terms of a torque model by what they take up of effects that the robot has."""
 
+TORQUE_LIMIT = ("torque_saturation", "limit_nm")
+"""What flat tops of a logged torque are, and its parameter."""
+
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""

@@ -48,7 +48,7 @@ def carried_over(
         )
     elif own is not None:
         # Another motion may leave more of what nothing explains, and ask as much of the causes.
-        withdrawn = _no_fall_there(own, stages)
+        withdrawn = _no_fall_there(own, stages, names)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings)
     elif conclusion.verdict == "none":
@@ -97,17 +97,17 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
     )
 
 
-def _no_fall_there(own: OwnAxes, stages: Stages) -> str | None:
+def _no_fall_there(own: OwnAxes, stages: Stages, names: Sequence[str]) -> str | None:
     """Say so where the causes of an axis do not shrink its gap."""
     axis = own.not_carried()
     if axis is None:
         return None
-    before, after = (
-        percent(float(np.sqrt(_squares(s)[:, axis].mean()))) for s in (stages.given, stages.after)
-    )
+    given, left = (_squares(s)[:, axis] for s in (stages.given, stages.after))
+    log = int(np.argmax(left - given))
+    before, after = (percent(float(np.sqrt(x[log]))) for x in (given, left))
     return (
         f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
-        f"logs: with it the gap of the axis goes from {before} to {after} of the torque."
+        f"logs: with it the gap of the axis goes from {before} to {after} of the torque on {names[log]}."
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import TORQUE_LIMIT
 from axisight.gap.result import Interval
 from axisight.logs import Log
 from axisight.logs.frozen import runs
@@ -50,7 +51,8 @@ class TorqueLimit:
     @property
     def effect(self) -> Effect:
         """The limit as an effect."""
-        return Effect("torque_saturation", self.axis, {"limit_nm": self.limit_nm.value})
+        name, parameter = TORQUE_LIMIT
+        return Effect(name, self.axis, {parameter: self.limit_nm.value})
 
 
 def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[TorqueLimit, ...]:
@@ -62,7 +64,7 @@ def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[TorqueLimit, ...]:
 
 def missing(limits: Sequence[TorqueLimit], robot: Robot) -> tuple[TorqueLimit, ...]:
     """Return the limits that a simulator does not have."""
-    own = {e.axis: e.values()[0] for e in robot.effects if e.name == "torque_saturation"}
+    own = {e.axis: e.values()[0] for e in robot.effects if e.name == TORQUE_LIMIT[0]}
     return tuple(
         x for x in limits if abs(own.get(x.axis, np.inf) / x.limit_nm.value - 1) > _SAME_LEVEL
     )
@@ -76,7 +78,7 @@ def reported(torque: Array, limits: Sequence[TorqueLimit], effects: Iterable[Eff
     out = torque.copy()
     after = {x.axis for x in limits}
     for effect in effects:
-        if effect.name == "torque_saturation" and effect.axis in after:
+        if effect.name == TORQUE_LIMIT[0] and effect.axis in after:
             limit, i = effect.values()[0], effect.axis - 1
             out[:, i] = np.clip(out[:, i], -limit, limit)
     return out

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from axisight.effects import Effect, effect_info
+from axisight.effects.stated import TORQUE_LIMIT
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
 from axisight.gap.limits import TorqueLimit
@@ -108,7 +109,7 @@ def conclude(
 def _shown(limit: TorqueLimit) -> NamedCause:
     info = effect_info(limit.effect.name)
     units = {p.name: p.unit for p in info.parameters}
-    value = {"limit_nm": limit.limit_nm}
+    value = {TORQUE_LIMIT[1]: limit.limit_nm}
     return NamedCause(info.name, limit.axis, _SHOWN, value, units, info.family, _SHOWN)
 
 
