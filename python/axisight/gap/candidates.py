@@ -53,12 +53,16 @@ def all_candidates(
     inverse_dynamics: bool = False,
     threads: int = 1,
 ) -> list[FreeEffect]:
-    """Return one candidate per effect and place that can act on this robot."""
+    """Return one candidate per effect and place that can act on this robot and has a gap.
+
+    What an effect does elsewhere, it does on its own axis too: one without a gap needs none.
+    """
     trials = [
         Trial(info, axis, robot, logs, at)
         for info in effect_table().values()
         if not info.stiff and (info.inverse_dynamics or not inverse_dynamics)
         for axis in _axes(robot, info)
+        if axis is None or at.is_left(axis - 1)
     ]
     with ThreadPoolExecutor(threads) as pool:
         found = pool.map(lambda t: STARTS[t.info.name](t), trials)

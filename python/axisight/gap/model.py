@@ -24,6 +24,11 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 
+# Share of the loss that another step of a fit has to be worth.
+_TOLERANCE = 1e-4
+_TRIAL_TOLERANCE = 1e-3
+
+
 @dataclass(frozen=True)
 class FreeEffect:
     """An effect under trial: start values, the parameters to fit, priors and bounds of some.
@@ -241,7 +246,9 @@ class ModelFitter(ABC):
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
         setup = self._setup(free, start, robot_values, held, lazy=lazy, fresh=fresh)
-        options = self._options(max_iterations, refreshes)
+        # What is to be compared with others is fitted to less than the formulas agree.
+        tolerance = _TRIAL_TOLERANCE if lazy else _TOLERANCE
+        options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         return _evidence(result, setup, list(free), renewed=not lazy)
 
@@ -296,10 +303,12 @@ class ModelFitter(ABC):
         names = (_same_quantity(self.robot, f.effect) for f in free)
         return {name for name in names if name is not None}
 
-    def _options(self, max_iterations: int = 0, refreshes: int = 0) -> FitOptions:
+    def _options(
+        self, max_iterations: int = 0, refreshes: int = 0, tolerance: float = _TOLERANCE
+    ) -> FitOptions:
         return FitOptions(
             max_iterations=max_iterations,
-            loss_tolerance=1e-4,
+            loss_tolerance=tolerance,
             step_tolerance=1e-4,
             nuisance_refreshes=refreshes,
             block_s=self.block_s,

@@ -104,9 +104,18 @@ def strongest_orders(
 
 def _columns(log: Turning, response: Complex) -> Array:
     """Return cosines of every order, then sines, through a response (2 orders, n), without means."""
-    passed = log.spectra * response
-    passed[:, 0] = 0.0
-    return np.asarray(np.fft.irfft(passed, len(log.residual)))
+    return _through(log.spectra, response, len(log.residual))
+
+
+def passed(series: Array, response: Complex) -> Array:
+    """Return series (k, n) of the sample time of a residual through a response, without means."""
+    return _through(np.fft.rfft(series), response, series.shape[1])
+
+
+def _through(spectra: Complex, response: Complex, n: int) -> Array:
+    out = spectra * response
+    out[:, 0] = 0.0
+    return np.asarray(np.fft.irfft(out, n))
 
 
 def _gains(normal: Array, along: Array, found: Sequence[int]) -> Array:

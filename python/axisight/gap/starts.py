@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo
 from axisight.gap.model import FreeEffect
-from axisight.gap.orders import Complex, Turning, strongest_orders
+from axisight.gap.orders import Complex, Turning, passed, strongest_orders
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -102,8 +102,6 @@ def _stribeck(trial: Trial) -> FreeEffect:
     """Begin as a law with several speeds over which friction falls: a fit does not cross decades."""
     name = "stribeck_speed_rad_s"
     begin = _law(smoothing_rad_s=_SMOOTHING, **{name: _STRIBECK})(trial)
-    if not trial.at.is_left(trial.index):
-        return begin
     speed = float((begin.effect.parameters or {})[name])
     starts = tuple({name: share / _STRIBECK * speed} for share in _STRIBECK_STARTS)
     bounds = {**begin.bounds, name: (0.1 * starts[0][name], 10 * speed)}
@@ -112,8 +110,6 @@ def _stribeck(trial: Trial) -> FreeEffect:
 
 def _waves(trial: Trial) -> FreeEffect | None:
     """Begin with the strongest orders of the residual over the motor angle."""
-    if not trial.at.is_left(trial.index):
-        return None
     logs = [axes[trial.index] for axes in trial.at.turning]
     found = trial.at.response
     responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
@@ -164,11 +160,28 @@ def _axis_share(at: Situation, index: int) -> float:
     return squares[index] / max(sum(squares), 1e-300)
 
 
+# Limits that are looked at, as shares of the largest torque.
+_LIMITS = np.geomspace(0.05, 0.98, 40)
+
+
 def _limit(trial: Trial) -> FreeEffect:
-    """Begin below the largest torques."""
-    tops = [float(np.abs(torque).max()) for torque in trial.torque()]
-    start = 0.9 * min(max(tops), float(np.median(tops)))
-    return FreeEffect(trial.effect({"limit_nm": start}), ("limit_nm",))
+    """Begin at the limit beyond which the torque explains most of the residual."""
+    torques = trial.torque()
+    limits = _LIMITS * max(float(np.abs(torque).max()) for torque in torques)
+    along, power = np.zeros(len(limits)), np.zeros(len(limits))
+    for axes, torque in zip(trial.at.turning, torques, strict=True):
+        log = axes[trial.index]
+        n = len(log.residual)
+        every = len(torque) // n
+        beyond = np.sign(torque) * np.maximum(np.abs(torque) - limits[:, None], 0.0)
+        beyond = beyond[:, : n * every].reshape(len(limits), n, every).mean(axis=2)
+        response = trial.at.response(trial.info.name, trial.index, log.frequency_hz)
+        seen = passed(beyond, response)
+        along += seen @ log.residual
+        power += np.sum(seen**2, axis=1)
+    # What the limit takes away the residual lacks.
+    gain = np.maximum(-along, 0.0) ** 2 / np.maximum(power, 1e-300)
+    return FreeEffect(trial.effect({"limit_nm": float(limits[np.argmax(gain)])}), ("limit_nm",))
 
 
 def _point_mass(trial: Trial) -> FreeEffect | None:

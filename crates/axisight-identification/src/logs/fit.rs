@@ -107,9 +107,7 @@ const MOVED: f64 = 0.01;
 
 /// Sum of squares of whitened residuals by which a natural change of any parameter is taken to
 /// move them. One that moves them less, a millionth of the noise of one, is left where it is:
-/// the shape of a friction of no size, say. So is one that moves them by less than a millionth of
-/// what the strongest parameter does: weighted in pairs, columns hold some 1e-16 of one another,
-/// and what rounding says of a parameter without influence is a step to its bound.
+/// the shape of a friction of no size, say.
 const LEAST_INFLUENCE: f64 = 1e-12;
 
 /// Derivatives that a trial point gets at once: as many as cost less than another simulation.
@@ -250,14 +248,8 @@ impl<'a, P: Problem> Search<'a, P> {
     /// Normal equations of the present point, for the search.
     fn sum(&mut self) {
         let mut normal = self.total();
-        let scales = self.free.iter().map(|i| self.parameters[*i].scale.powi(2));
-        let squares: Vec<f64> = scales.collect();
-        let influences = squares.iter().enumerate();
-        let strongest = influences.fold(1.0_f64, |most, (slot, square)| {
-            most.max(normal.matrix[(slot, slot)] * square)
-        });
-        for (slot, square) in squares.iter().enumerate() {
-            normal.matrix[(slot, slot)] += LEAST_INFLUENCE * strongest / square;
+        for (slot, i) in self.free.iter().enumerate() {
+            normal.matrix[(slot, slot)] += LEAST_INFLUENCE / self.parameters[*i].scale.powi(2);
         }
         self.normal = normal;
     }
