@@ -20,13 +20,15 @@ def strongest_orders(
     count: int,
     bandwidth_hz: float,
     speed_power: int = 0,
+    least_turns: float = 0.0,
 ) -> list[int]:
     """Return the ``count`` strongest integer orders, strongest first.
 
     Greedy least squares of the residuals (one array per log) on the sine and
     cosine of ``n phi``, each order judged on the samples where it lies below
     ``bandwidth_hz``. ``speed_power`` 2 multiplies the regressors by the square
-    of the speed: an angle error seen through an inertia.
+    of the speed: an angle error seen through an inertia. Orders that come round less often than
+    ``least_turns`` over the travel are left out.
     """
     left = [r - r.mean() for r in residuals]
     waves = [
@@ -35,6 +37,8 @@ def strongest_orders(
     ]
     normal = np.sum([np.einsum("aon,bon->oab", w, w) for w in waves], axis=0)
     usable = np.linalg.cond(normal) < 1e8
+    travel = max(float(np.ptp(a)) for a in angles_rad)
+    usable &= np.arange(1, HIGHEST_ORDER + 1) * travel >= 2 * np.pi * least_turns
     inverse = np.linalg.inv(np.where(usable[:, None, None], normal, np.eye(2)))
     found: list[int] = []
     for _ in range(count):

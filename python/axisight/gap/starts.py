@@ -87,6 +87,9 @@ _SMOOTHING = 0.003
 _STRIBECK = 0.1
 
 
+_SLIDE_TURNS = 2.0
+
+
 def _waves(*, speed_power: int) -> Callable[[Trial], FreeEffect | None]:
     """Begin with the strongest orders of the residual over the motor angle.
 
@@ -102,6 +105,8 @@ def _waves(*, speed_power: int) -> Callable[[Trial], FreeEffect | None]:
             count=MOST_ORDERS,
             bandwidth_hz=at.bandwidth_hz,
             speed_power=speed_power,
+            # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
+            least_turns=_SLIDE_TURNS if trial.robot.axis_is_prismatic[i] else 0.0,
         )
         if not orders:
             return None
