@@ -57,8 +57,11 @@ def log_of(seed: int, moving: range | tuple[int, ...], seconds: float = 10.0) ->
     time = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
     rng = np.random.default_rng(seed)
     q = np.zeros((3, len(time), 7))
-    q[0] += 0.5 * rng.uniform(-1, 1, 7)
-    for axis in moving:
+    q[0] += np.random.default_rng(99).uniform(-0.5, 0.5, 7)
+    for axis in range(7):
+        q[0, :, axis] += 0.2 * rng.normal()
+        if axis not in moving:
+            continue
         for line in range(1, 6):
             wave = 0.3 * rng.normal() / line * np.exp(1j * rng.uniform(0, 2 * np.pi))
             rate = 2j * np.pi * line / 10.0
