@@ -49,4 +49,4 @@ def _standing(motion: MotionEstimate, slow: Array, cutoff_hz: float) -> Mask:
     """Return where speeds stay below ``slow`` (n_axes,) for as long as the filter needs, (n, n_axes)."""
     still = np.abs(motion.velocity_rad_s) < slow
     length = max(2, int(np.ceil(PERIODS / cutoff_hz / motion.sample_time_s)))
-    return np.asarray(scipy.ndimage.binary_opening(still, np.ones((length, 1))))
+    return np.asarray(scipy.ndimage.binary_opening(still, np.ones((length, 1), dtype=np.bool_)))
