@@ -41,7 +41,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """What came out of one diagnosis. ``rank``: of the withheld effect, from 1; 0 if not among any."""
+    """What came out of one diagnosis. ``first``: the withheld effect is the first cause named."""
 
     machine: str
     withheld: str

@@ -71,7 +71,7 @@ def turning(
 
 
 def strongest_orders(
-    logs: Sequence[Turning], responses: Sequence[Complex], *, count: int
+    logs: Sequence[Turning], responses: Sequence[Complex], *, count: int, least_turns: float = 0.0
 ) -> list[int]:
     """Return up to ``count`` integer orders of the motor angle, in the order they were found.
 
@@ -79,7 +79,8 @@ def strongest_orders(
     `Turning.frequency_hz`. Least squares of the residuals of all logs on cosine and sine of
     ``n phi``, passed through the response; one order after another, each with those before it
     (orthogonal matching pursuit; Pati, Rezaiifar, Krishnaprasad, 1993), until one takes less than
-    a twentieth of what is left. An order is one amplitude and phase for all logs.
+    a twentieth of what is left. An order is one amplitude and phase for all logs. Orders that come
+    round less often than ``least_turns`` over the travel are left out.
 
     Cost: two transforms an order and log, and products of 160 numbers a sample.
     """
@@ -91,9 +92,11 @@ def strongest_orders(
         normal += columns @ columns.T
         along += columns @ residual
         power += float(residual @ residual)
+    travel = max(float(np.ptp(log.angle_rad)) for log in logs)
+    comes_round = np.arange(1, HIGHEST_ORDER + 1) * travel >= 2 * np.pi * least_turns
     found: list[int] = []
     while len(found) < count:
-        gains = _gains(normal, along, found)
+        gains = np.where(comes_round, _gains(normal, along, found), 0.0)
         best = int(np.argmax(gains))
         if not gains[best] > _WORTH * power:
             break

@@ -108,13 +108,19 @@ def _stribeck(trial: Trial) -> FreeEffect:
     return replace(begin, bounds=bounds, starts=starts)
 
 
+# Of the longest wave on a slide.
+_SLIDE_TURNS = 2.0
+
+
 def _waves(trial: Trial) -> FreeEffect | None:
     """Begin with the strongest orders of the residual over the motor angle."""
     logs = [axes[trial.index] for axes in trial.at.turning]
     found = trial.at.response
     responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
     terms = trial.info.terms().values()
-    orders = strongest_orders(logs, responses, count=len(terms))
+    # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
+    least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
+    orders = strongest_orders(logs, responses, count=len(terms), least_turns=least)
     if not orders:
         return None
     # Terms without an order are switched off.

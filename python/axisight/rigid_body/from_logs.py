@@ -30,6 +30,7 @@ from axisight.rigid_body.regressor import TorqueModel
 from axisight.rigid_body.result import RigidBodyEstimate
 from axisight.rigid_body.reversal_window import reversal_weight
 from axisight.rigid_body.robot_values import identified_bodies
+from axisight.rigid_body.standstill import at_rest
 from axisight.robot import Robot
 from axisight.robot_file import Identified, Provenance, identified
 from axisight.robot_file.sidecar import known as known_number
@@ -248,7 +249,10 @@ def identify_logs(
     motions = [_estimate(log, robot, cutoff_hz, held) for log in given]
     others = [_estimate(log, robot, cutoff_hz, held) for log in held_out]
     refuse_repeated(given, held_out)
-    weight, left_out = reversal_weight(motions, reversal_s, cutoff_hz)
+    quiet, standing = at_rest([*motions, *others], cutoff_hz)
+    motions, others = quiet[: len(given)], quiet[len(given) :]
+    moving = ~np.concatenate(standing[: len(given)])
+    weight, left_out = reversal_weight(motions, reversal_s, cutoff_hz, moving)
     joint = [_joint_motion(model, motion) for motion in motions]
     stacked = [np.concatenate(parts) for parts in zip(*joint, strict=True)]
     base = base_parameters(model, known=known or (), locked=True)
@@ -278,7 +282,7 @@ def identify_logs(
     if possible is not None:
         thetas["consistent"] = possible.theta
     names = [log.name for log in (*given, *held_out)]
-    errors = _errors(model, thetas, joint, names, len(given))
+    errors = _errors(model, thetas, joint, [~still for still in standing], names, len(given))
     seen = [*left_out, *bending(estimate, given, stacked[0], cutoff_hz), *misfit(errors)]
     for finding in seen:
         if finding.serious:
@@ -331,16 +335,20 @@ def _errors(
     model: TorqueModel,
     thetas: Mapping[str, Array],
     motions: Sequence[Motion],
+    moving: Sequence[NDArray[np.bool_]],
     names: Sequence[str],
     fitted: int,
 ) -> xr.Dataset:
+    """Torque errors by log and axis, where the axis moves; NaN where it never does."""
     shape = (len(thetas), len(motions), model.n_rows)
     rms, relative = np.empty(shape), np.full(shape, np.nan)
     for i, (q, v, a, torque) in enumerate(motions):
         matrix = model.matrix(q, v, a)
-        size = np.sqrt((torque**2).mean(axis=0))
+        count = np.where(moving[i].any(axis=0), moving[i].sum(axis=0), np.nan)
+        size = np.sqrt((torque**2 * moving[i]).sum(axis=0) / count)
         for k, theta in enumerate(thetas.values()):
-            rms[k, i] = np.sqrt(((matrix @ theta - torque) ** 2).mean(axis=0))
+            squares = (matrix @ theta - torque) ** 2 * moving[i]
+            rms[k, i] = np.sqrt(squares.sum(axis=0) / count)
             np.divide(rms[k, i], size, out=relative[k, i], where=size > 0)
     dims = ("parameters", "log", "axis")
     return xr.Dataset(

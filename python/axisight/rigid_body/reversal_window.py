@@ -26,20 +26,28 @@ USUAL_KEPT = 0.2
 
 
 def reversal_weight(
-    motions: Sequence[MotionEstimate], reversal_s: float | None, cutoff_hz: float
+    motions: Sequence[MotionEstimate],
+    reversal_s: float | None,
+    cutoff_hz: float,
+    moving: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, list[IdentificationFinding]]:
     """Return weights (n, n_axes) of one, zero around reversals, of all motions, and what to say.
 
     ``reversal_s`` is how long before and after a reversal samples are left out; by default two periods
     of the cutoff, or less on axes that turn so often that hardly any sample would be left,
-    which is a serious finding. Raises InputError if too little is left.
+    which is a serious finding. Samples where an axis is not ``moving`` (n, n_axes) are left out, and
+    are no part of what counts as left. Raises InputError if too little is left.
     """
     given = reversal_s
     if given is not None and (isinstance(given, bool) or not (np.isfinite(given) and given >= 0)):
         raise InputError(f"reversal_s: expected a number not below zero, got {given!r}")
     choices = [periods / cutoff_hz for periods in USUAL_PERIODS] if given is None else [given]
     weights = [np.concatenate([_away(m, s) for m in motions]) for s in choices]
-    kept = np.array([weight.mean(axis=0) for weight in weights])
+    moves = np.ones(weights[0].shape, dtype=bool) if moving is None else moving
+    _refuse_standing(moves)
+    weights = [weight * moves for weight in weights]
+    whole = np.maximum(moves.sum(axis=0), 1)
+    kept = np.array([weight.sum(axis=0) / whole for weight in weights])
     chosen = np.full(kept.shape[1], len(choices) - 1)
     enough = kept >= USUAL_KEPT
     chosen[enough.any(axis=0)] = enough.argmax(axis=0)[enough.any(axis=0)]
@@ -47,7 +55,7 @@ def reversal_weight(
     margin, share = np.array(choices)[chosen], kept[chosen, axes]
     _refuse_little(share, margin)
     weight = np.stack([weights[k][:, axis] for axis, k in enumerate(chosen)], axis=1)
-    found = _findings(margin, share, len(weight), cutoff_hz, short=bool(chosen.any()))
+    found = _findings(margin, share, moves.sum(axis=0), cutoff_hz, short=bool(chosen.any()))
     return weight, found
 
 
@@ -62,6 +70,16 @@ def _away(motion: MotionEstimate, margin_s: float) -> Array:
     return out
 
 
+def _refuse_standing(moves: NDArray[np.bool_]) -> None:
+    still = np.flatnonzero(~moves.any(axis=0)) + 1
+    if len(still):
+        named = ", ".join(str(axis) for axis in still)
+        raise InputError(
+            f"logs: expected every axis to move in one of those fitted, axis {named} stands still in "
+            "all: its friction and inertia do not show; record it moving too"
+        )
+
+
 def _refuse_little(kept: Array, margin_s: Array) -> None:
     worst = int(kept.argmin())
     if kept[worst] < LEAST_KEPT:
@@ -73,7 +91,7 @@ def _refuse_little(kept: Array, margin_s: Array) -> None:
 
 
 def _findings(
-    margin_s: Array, kept: Array, n: int, cutoff_hz: float, *, short: bool
+    margin_s: Array, kept: Array, n: NDArray[np.intp], cutoff_hz: float, *, short: bool
 ) -> list[IdentificationFinding]:
     if not (kept < 1).any():
         return []
@@ -81,8 +99,9 @@ def _findings(
         f"{100 * (1 - share):.3g} % of axis {axis} (within {margin:.3g} s)"
         for axis, (share, margin) in enumerate(zip(kept, margin_s, strict=True), 1)
     ]
-    counts = ", ".join(f"{n * share:.0f}" for share in kept)
-    text = f"samples left out around reversals: {', '.join(parts)}; {counts} of {n} are kept"
+    counts = ", ".join(f"{k * share:.0f}" for k, share in zip(n, kept, strict=True))
+    whole = ", ".join(str(k) for k in n) if np.ptp(n) else str(n[0])
+    text = f"samples left out around reversals: {', '.join(parts)}; {counts} of {whole} are kept"
     if short:
         usual = USUAL_PERIODS[0] / cutoff_hz
         text += (

@@ -64,7 +64,9 @@ impl Triangle {
             let (v, before) = (&head[j], &head[..j]);
             let row = &mut self.factor[(first + j) * n..(first + j + 1) * n];
             let below = dot(v, v);
-            if below == 0.0 {
+            // Rounding of rounding, as a piece with fewer rows than columns leaves: its square is not
+            // a number that one can divide by.
+            if below < NOTHING {
                 continue;
             }
             let pivot = row[first + j];
@@ -117,6 +119,9 @@ impl Triangle {
         subtract_all(panel, steps, column);
     }
 }
+
+/// Sum of squares below which a column is zero.
+const NOTHING: f64 = 1e-280;
 
 /// Reflections of a panel: their entries in the triangle and the matrix that joins them.
 struct Reflections {
