@@ -211,25 +211,14 @@ def _assemble(
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
     own = _axes_alone(view, found, conclusion, reach, settings)
-    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own)
-    causes = tuple(
-        Cause(
-            c.effect,
-            c.axis,
-            c.probability,
-            c.parameters,
-            c.units,
-            r,
-            c.family,
-            c.family_probability,
-        )
-        for c, r in zip(conclusion.causes, reach.reductions, strict=False)
-    )
+    nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
+    edge = parameters_at_edge(found.model, nominal, tolerances)
+    bent = len(edge) / max(len(found.model.robot_values), 1)
+    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own, bent)
+    causes = _causes(conclusion, reach.reductions)
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
-    nominal = robot_parameters(robot)
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
-    tolerances = settings.tolerances_of(robot)
     return Diagnosis(
         name=name,
         mode=view.mode,
@@ -253,18 +242,40 @@ def _assemble(
         remainder=remainder_of(reach.stages, gap, reach.left, settings),
         findings=(*noted, *parameters_at_edge(fitted, nominal, tolerances)),
         settings=settings.as_dict(robot),
-        provenance={
-            "axisight_version": version("axisight"),
-            "seed": settings.seed,
-            "robot": robot.name,
-            "robot_effects": [effect.label for effect in robot.effects if effect.acts],
-            "axis_kinds": ["prismatic" if p else "revolute" for p in robot.axis_is_prismatic],
-            "estimation_logs": [log.name for log in view.logs],
-            "validation_logs": [log.name for log in held_logs],
-            "position_noise_std_rad": view.floor.position_std_rad.tolist(),
-            "cutoff_hz": view.cutoff_hz,
-        },
+        provenance=_provenance(robot, view, names, settings),
     )
+
+
+def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cause, ...]:
+    return tuple(
+        Cause(
+            c.effect,
+            c.axis,
+            c.probability,
+            c.parameters,
+            c.units,
+            r,
+            c.family,
+            c.family_probability,
+        )
+        for c, r in zip(conclusion.causes, reductions, strict=False)
+    )
+
+
+def _provenance(
+    robot: Robot, view: View, held: Sequence[str], settings: Settings
+) -> dict[str, object]:
+    return {
+        "axisight_version": version("axisight"),
+        "seed": settings.seed,
+        "robot": robot.name,
+        "robot_effects": [effect.label for effect in robot.effects if effect.acts],
+        "axis_kinds": ["prismatic" if p else "revolute" for p in robot.axis_is_prismatic],
+        "estimation_logs": [log.name for log in view.logs],
+        "validation_logs": list(held),
+        "position_noise_std_rad": view.floor.position_std_rad.tolist(),
+        "cutoff_hz": view.cutoff_hz,
+    }
 
 
 def _axes_alone(
