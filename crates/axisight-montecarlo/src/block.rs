@@ -1,8 +1,9 @@
 //! A block of consecutive runs: the unit of work, storage and repetition.
 
+use super::error::StudyError;
 use super::simulate::{Group, GroupPlant, Job, Model, Outcome};
 use super::spread::draw;
-use super::study::{Study, StudyError};
+use super::study::Study;
 use axisight_core::simulation::Status;
 use axisight_numerics::SmallSolver;
 use axisight_scalar::Lanes;

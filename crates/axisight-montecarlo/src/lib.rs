@@ -7,6 +7,7 @@
 //! The one place where simulation and frequency responses meet, so neither waits for the other.
 
 mod block;
+mod error;
 mod record;
 mod simulate;
 mod spread;
@@ -14,7 +15,8 @@ mod study;
 mod summary;
 
 pub use block::{Block, BlockError, Failure, FailureKind, run_block};
+pub use error::StudyError;
 pub use simulate::Model;
 pub use spread::{Distribution, Spread, SpreadTarget};
-pub use study::{Study, StudyError, StudySettings};
+pub use study::{Study, StudySettings};
 pub use summary::{Ensemble, Summary};

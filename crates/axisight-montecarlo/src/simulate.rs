@@ -1,7 +1,8 @@
 //! Simulation of a group of experiments; the one place that knows linear from nonlinear.
 
+use super::error::StudyError;
 use super::record::Recorder;
-use super::study::{Study, StudyError};
+use super::study::Study;
 use axisight_core::plant::{assemble, equilibrium, stepper};
 use axisight_core::robot::{EffectSetting, RobotDescription};
 use axisight_core::simulation::{

@@ -1,6 +1,6 @@
 //! Parameters that vary from run to run, as a function of (seed, run).
 
-use super::study::StudyError;
+use super::error::StudyError;
 use axisight_core::effects;
 use axisight_core::robot::{EffectSetting, Parameter, RobotDescription};
 use axisight_spectra::ensemble::{Purpose, generator};

@@ -1,12 +1,12 @@
 //! What a study simulates: robot, excitation, measurement, spread.
 
+use super::error::StudyError;
 use super::simulate::{GroupPlant, Model};
 use super::spread::Spread;
-use axisight_core::plant::{EquilibriumError, PlantError};
 use axisight_core::robot::{Controller, EffectSetting, RobotDescription};
-use axisight_core::simulation::{LinearPlantError, coloured_noise, measurement_noise};
+use axisight_core::simulation::{coloured_noise, measurement_noise};
 use axisight_numerics::SmallSolver;
-use axisight_spectra::excitation::{ExcitationError, Multisine, Square};
+use axisight_spectra::excitation::{Multisine, Square};
 use axisight_spectra::frf::Output;
 use nalgebra::Complex;
 
@@ -50,45 +50,6 @@ pub struct StudySettings {
 pub struct Study {
     pub(super) settings: StudySettings,
     square_period: Vec<f64>,
-}
-
-/// A study that cannot be run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StudyError {
-    /// A field has an impossible value.
-    #[error("{field}: expected {expected}, got {got}")]
-    Field {
-        /// Field.
-        field: &'static str,
-        /// What it should be.
-        expected: String,
-        /// What came.
-        got: String,
-    },
-    /// The excitation cannot be made.
-    #[error(transparent)]
-    Excitation(#[from] ExcitationError),
-    /// The plant cannot be built.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// The arm does not settle.
-    #[error(transparent)]
-    Equilibrium(#[from] EquilibriumError),
-    /// The robot or its effects have no linear plant.
-    #[error(transparent)]
-    Linear(#[from] LinearPlantError),
-}
-
-impl StudyError {
-    // Callers hand over numbers and fresh strings alike.
-    #[allow(clippy::needless_pass_by_value)]
-    pub(super) fn field(field: &'static str, expected: &str, got: impl std::fmt::Display) -> Self {
-        Self::Field {
-            field,
-            expected: expected.to_owned(),
-            got: got.to_string(),
-        }
-    }
 }
 
 /// Longest simulated time of one experiment: 2^31 samples would not fit in memory.

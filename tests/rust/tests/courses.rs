@@ -6,7 +6,9 @@
 
 use axisight_core::plant::Plant;
 use axisight_core::robot::{Course, Parameter, RobotDescription};
-use axisight_core::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
+use axisight_core::simulation::{
+    CourseOfAnother, Drive, Method, Run, SimulationError, Status, Stepper, simulate,
+};
 use axisight_identification::logs::{
     Courses, FitParameter, Problem, ProblemError, Record, SimulationErrorProblem, SimulationInput,
     SimulationOutput, Target,
@@ -399,7 +401,7 @@ fn a_course_of_another_arm_is_refused() {
     for (of, on) in [(&arm, &preset), (&preset, &arm)] {
         let (got, expected) = (of.chain.len(), on.chain.len());
         let outcome = Stepper::along(on, &course(of)).err();
-        let error = SimulationError::CourseOfAnother { expected, got };
+        let error = CourseOfAnother { expected, got };
         assert_eq!(outcome, Some(error));
     }
 }

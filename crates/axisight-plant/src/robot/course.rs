@@ -10,6 +10,7 @@
 //! For `n` joints an evaluation takes `n^2` multiplications, `2 n^2` more once a sample, all by
 //! numbers without derivatives; the equations themselves take about `30 n^2` with them.
 
+use super::along::{Along, Course, FORCING_STRIDE};
 use super::chain::Chain;
 use super::dynamics::Dynamics;
 use axisight_scalar::{Dual, Scalar};
@@ -17,24 +18,8 @@ use std::sync::Arc;
 
 /// Longest time over which the matrices are taken as straight lines [s].
 const LONGEST_STRIDE_S: f64 = 8e-3;
-/// Samples over which forces of other masses are taken as straight lines.
-const FORCING_STRIDE: usize = 2;
 /// Derivatives at a time.
 const SEEDS: usize = 4;
-
-/// A run, and the arm linearised along it.
-#[derive(Debug, Clone)]
-pub struct Course<R> {
-    chain: Chain<R>,
-    sample_time: f64,
-    samples: usize,
-    /// By sample: angles, rates, bias forces.
-    motion: Vec<R>,
-    /// Samples from node to node.
-    stride: usize,
-    /// By node: inverse of the inertia matrix, `B_q`, `B_v`, row-major.
-    nodes: Vec<R>,
-}
 
 impl<R: Scalar> Course<R> {
     /// Of a run of the arm `chain`: `states` holds its joint angles and rates sample by sample.
@@ -64,22 +49,6 @@ impl<R: Scalar> Course<R> {
         };
         course.linearize(&dynamics);
         course
-    }
-
-    /// Number of joints.
-    pub fn joints(&self) -> usize {
-        self.chain.len()
-    }
-
-    /// Number of samples.
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
-    fn part(&self, sample: usize, which: usize) -> &[R] {
-        let n = self.joints();
-        let first = (3 * sample.min(self.samples - 1) + which) * n;
-        &self.motion[first..first + n]
     }
 
     /// Accelerations at a sample, from the rates on either side.
@@ -167,26 +136,6 @@ impl<R: Scalar> Course<R> {
     }
 }
 
-/// An arm on a [`Course`], as the integrators call it.
-#[derive(Debug, Clone)]
-pub struct Along<S: Scalar> {
-    course: Arc<Course<S::Real>>,
-    /// By node of [`FORCING_STRIDE`] samples.
-    forcing: Option<Vec<S>>,
-    sample: usize,
-    /// Fraction of the sample.
-    at: f64,
-    /// In the middle of the sample: inverse of the inertia matrix, `B_q`, `B_v`.
-    matrices: Vec<S::Real>,
-    /// `q - q0`.
-    off: Vec<S>,
-    /// `B_q (q - q0) + B_v (v - v0)` at the start of the sample: against a gear spring a
-    /// thousandth, and it changes little until the next.
-    held: Vec<S>,
-    is_held: bool,
-    copy: Vec<S>,
-}
-
 impl<S: Scalar> Along<S> {
     /// The arm `chain` on `course`.
     pub fn new(course: &Arc<Course<S::Real>>, chain: &Chain<S>) -> Self {
@@ -204,115 +153,5 @@ impl<S: Scalar> Along<S> {
         };
         along.enter(0);
         along
-    }
-
-    /// Number of samples the course has.
-    pub fn samples(&self) -> usize {
-        self.course.samples
-    }
-
-    /// Go to a sample.
-    pub fn enter(&mut self, sample: usize) {
-        self.sample = sample;
-        self.is_held = false;
-        let (course, size) = (&self.course, self.matrices.len());
-        let node = sample / course.stride;
-        let share = ((sample % course.stride) as f64 + 0.5) / course.stride as f64;
-        let share = S::Real::constant(share);
-        // A run without samples has none; it is refused before the first step.
-        let Some(pair) = course.nodes.get(node * size..(node + 2) * size) else {
-            return;
-        };
-        let (from, to) = pair.split_at(size);
-        for ((out, from), to) in self.matrices.iter_mut().zip(from).zip(to) {
-            *out = (*to - *from).fma(share, *from);
-        }
-    }
-
-    /// Go to a fraction of the sample.
-    #[inline(always)]
-    pub fn go_to(&mut self, at: f64) {
-        self.at = at;
-    }
-
-    /// A part of the motion at the present instant.
-    #[inline(always)]
-    fn motion(&self, which: usize) -> impl Iterator<Item = S::Real> {
-        let at = S::Real::constant(self.at);
-        let from = self.course.part(self.sample, which);
-        let to = self.course.part(self.sample + 1, which);
-        from.iter().zip(to).map(move |(a, b)| (*b - *a).fma(at, *a))
-    }
-
-    /// Take joint angles.
-    #[inline(always)]
-    pub(super) fn place(&mut self, q: &[S]) {
-        if !self.is_held {
-            let mut off = std::mem::take(&mut self.off);
-            self.subtract(0, q, &mut off);
-            self.off = off;
-        }
-    }
-
-    /// `out = x - x0` for a part of the motion.
-    fn subtract(&self, which: usize, x: &[S], out: &mut [S]) {
-        for ((out, x), on) in out.iter_mut().zip(x).zip(self.motion(which)) {
-            *out = *x - S::from_real(on);
-        }
-    }
-
-    /// Forces without acceleration at rates `v` and the angles last placed.
-    #[inline(always)]
-    pub(super) fn bias(&mut self, v: &[S], out: &mut [S]) {
-        if !self.is_held {
-            self.hold(v);
-        }
-        for ((out, on), held) in out.iter_mut().zip(self.motion(2)).zip(&self.held) {
-            *out = *held + S::from_real(on);
-        }
-        if let Some(forcing) = &self.forcing {
-            let n = self.off.len();
-            let place = (self.sample % FORCING_STRIDE) as f64 + self.at;
-            let share = S::Real::constant(place / FORCING_STRIDE as f64);
-            let first = self.sample / FORCING_STRIDE * n;
-            let (from, to) = forcing[first..first + 2 * n].split_at(n);
-            for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
-                *out += (*to - *from).fma_real(share, *from);
-            }
-        }
-    }
-
-    /// What being off the run takes at rates `v`.
-    fn hold(&mut self, v: &[S]) {
-        let n = self.off.len();
-        let mut faster = std::mem::take(&mut self.copy);
-        self.subtract(1, v, &mut faster);
-        let (by_angle, by_rate) = self.matrices[n * n..].split_at(n * n);
-        let rows = by_angle.chunks_exact(n).zip(by_rate.chunks_exact(n));
-        for (out, (by_angle, by_rate)) in self.held.iter_mut().zip(rows) {
-            let mut sum = S::zero();
-            for ((a, off), (b, faster)) in by_angle
-                .iter()
-                .zip(&self.off)
-                .zip(by_rate.iter().zip(&faster))
-            {
-                sum = faster.fma_real(*b, off.fma_real(*a, sum));
-            }
-            *out = sum;
-        }
-        self.copy = faster;
-        self.is_held = true;
-    }
-
-    /// Forces to accelerations.
-    #[inline(always)]
-    pub(super) fn accelerate(&mut self, force: &mut [S]) {
-        let n = self.copy.len();
-        self.copy.copy_from_slice(&force[..n]);
-        let rows = self.matrices.chunks_exact(n.max(1));
-        for (out, row) in force[..n].iter_mut().zip(rows) {
-            let sum = row.iter().zip(&self.copy);
-            *out = sum.fold(S::zero(), |sum, (a, f)| f.fma_real(*a, sum));
-        }
     }
 }

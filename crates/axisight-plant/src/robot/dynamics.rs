@@ -12,8 +12,8 @@
 //! just below one of them is padded with joints that move nothing. Longer chains, and numbers
 //! with derivatives, whose arithmetic hides the loops, share the code for any number.
 
+use super::along::Along;
 use super::chain::{Body, Chain, ChainJoint};
-use super::course::Along;
 use super::description::Motion;
 use super::linear_algebra::{factorize, solve_factorized};
 use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};

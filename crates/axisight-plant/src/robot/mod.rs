@@ -1,5 +1,6 @@
 //! The arm: its description, its chain and the rigid-body algorithms on it.
 
+mod along;
 mod chain;
 mod course;
 pub mod description;
@@ -10,8 +11,8 @@ mod rigid_body;
 mod setting;
 mod vector;
 
+pub use along::{Along, Course};
 pub use chain::{Body, Chain, ChainJoint, Pose};
-pub use course::{Along, Course};
 pub use description::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
 pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
 pub use parameters::{Parameter, ParameterError};

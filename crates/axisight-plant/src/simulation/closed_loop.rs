@@ -116,14 +116,6 @@ pub enum SimulationError {
         /// Integrator.
         method: Method,
     },
-    /// A course of another arm.
-    #[error("course: expected one of {expected} joints, got {got}")]
-    CourseOfAnother {
-        /// Joints of the plant.
-        expected: usize,
-        /// Joints of the course.
-        got: usize,
-    },
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,

@@ -1,6 +1,5 @@
 //! Choice of integrator, and what all of them share.
 
-use super::closed_loop::SimulationError;
 use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
 use super::{dormand_prince, nystrom4, runge_kutta4};
@@ -112,6 +111,16 @@ pub struct Stepper<S: Scalar> {
 /// Sub-step budget of one sample before a run is given up.
 const MAX_SUBSTEPS: usize = 4096;
 
+/// A course of another arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("course: expected one of {expected} joints, got {got}")]
+pub struct CourseOfAnother {
+    /// Joints of the plant.
+    pub expected: usize,
+    /// Joints of the course.
+    pub got: usize,
+}
+
 impl<S: Scalar> Stepper<S> {
     /// Scratch for `plant`; explicit methods only.
     pub fn new(plant: &Plant<S>) -> Self {
@@ -136,11 +145,11 @@ impl<S: Scalar> Stepper<S> {
     /// [`Plant::follows_courses`]; methods of fixed steps only.
     ///
     /// # Errors
-    /// [`SimulationError::CourseOfAnother`] where `course` is of an arm of other joints.
-    pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Result<Self, SimulationError> {
+    /// [`CourseOfAnother`] where `course` is of an arm of other joints.
+    pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Result<Self, CourseOfAnother> {
         let (expected, got) = (plant.chain.len(), course.joints());
         if got != expected {
-            return Err(SimulationError::CourseOfAnother { expected, got });
+            return Err(CourseOfAnother { expected, got });
         }
         let mut stepper = Self::new(plant);
         stepper.plant_scratch.along = Some(Along::new(course, &plant.chain));

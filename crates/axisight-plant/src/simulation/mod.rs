@@ -13,5 +13,5 @@ pub use closed_loop::{
     Drive, Run, Sample, Signals, SimulationError, Status, check, lane_value, simulate,
 };
 pub use controller::ControlLoop;
-pub use method::{Effort, Method, Stepper};
+pub use method::{CourseOfAnother, Effort, Method, Stepper};
 pub use torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};
