@@ -8,7 +8,7 @@ import pytest
 
 from axisight import Settings
 from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
-from axisight.gap.remainder import parameters_at_edge, remainder_of
+from axisight.gap.remainder import parameters_at_edge, refit_worse, remainder_of
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Log
 
@@ -158,6 +158,17 @@ def test_noise_leaves_no_remainder(base):
     found = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
     assert found.where == () and found.varies_with is None
     assert found.gap < 0.005
+
+
+def test_a_refit_that_held_out_logs_contradict_is_said(base):
+    log, error, noise = base
+    given = stage([log, log], [3 * error, 3 * error], 1.0)
+    worse = stage([log, log], [3 * error, 5 * error], 1.0)
+    floor = stage([log, log], [noise, noise], 1.0)
+    (found,) = refit_worse(Stages(given, worse, worse, floor), ["one", "other"])
+    assert (found.name, found.log, found.severity) == ("refit_worse", "other", "flag")
+    assert refit_worse(Stages(given, given, given, floor), ["one", "other"]) == ()
+    assert refit_worse(Stages(worse, given, given, floor), ["one", "other"]) == ()
 
 
 def test_a_simulation_that_broke_off_has_no_place(base):

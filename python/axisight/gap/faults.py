@@ -66,6 +66,7 @@ MEANINGS: dict[str, str] = {
     "torque_off_control_law": "a torque that is not what the robot file's controller gives",
     "gravity_flipped": "gravity of the robot file with the other sign",
     "position_offset": "positions count from another zero than the robot's",
+    "refit_worse": "a re-fit of the simulator's own parameters that held-out logs contradict",
     "parameter_at_edge": "a parameter of the simulator that the re-fit took to the edge of its tolerance",
 }
 """Every name, and what it stands for. Names are part of the interface: they are never changed."""

@@ -23,7 +23,7 @@ from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overl
 from axisight.gap.limits import missing
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
-from axisight.gap.remainder import parameters_at_edge, remainder_of
+from axisight.gap.remainder import parameters_at_edge, refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
@@ -240,7 +240,11 @@ def _assemble(
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
         remainder=remainder_of(reach.stages, gap, reach.left, settings),
-        findings=(*noted, *parameters_at_edge(fitted, nominal, tolerances)),
+        findings=(
+            *noted,
+            *refit_worse(reach.stages, names),
+            *parameters_at_edge(fitted, nominal, tolerances),
+        ),
         settings=settings.as_dict(robot),
         provenance=_provenance(robot, view, names, settings),
     )

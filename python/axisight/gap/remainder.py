@@ -8,6 +8,7 @@ import numpy as np
 
 from axisight.gap.carried import above_floor
 from axisight.gap.faults import Finding
+from axisight.gap.headline import percent
 from axisight.gap.howfar import Stages
 from axisight.gap.model import Evidence
 from axisight.gap.result import Gap, Remainder
@@ -17,6 +18,8 @@ from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
 # A parameter this many of its tolerances off is one machine in four hundred: rather something
 # unmodelled that pulls at it.
 _EDGE = 3.0
+# A squared gap may rise by so much of what stands above noise through scatter of the logs.
+_WORSE = 0.2
 
 
 def remainder_of(
@@ -47,6 +50,26 @@ def remainder_of(
     return Remainder(
         total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
     )
+
+
+def refit_worse(stages: Stages, names: Sequence[str]) -> tuple[Finding, ...]:
+    """Return a finding for each validation log whose gap the re-fit alone raises well above noise.
+
+    ``names``: of the logs.
+    """
+    given, refitted, floor = (
+        np.mean(stage.per_log(), axis=1) for stage in (stages.given, stages.refitted, stages.floor)
+    )
+    out = []
+    for name, before, after, noise in zip(names, given, refitted, floor, strict=True):
+        if after - before > _WORSE * max(before - noise, noise):
+            message = (
+                f"re-fitted on the estimation logs, the simulator's own parameters raise the gap from "
+                f"{percent(float(np.sqrt(before)))} to {percent(float(np.sqrt(after)))}: what they were fitted "
+                f"to is no property of the machine; state tighter tolerances."
+            )
+            out.append(Finding("refit_worse", "flag", message, log=name, field="tolerances"))
+    return tuple(out)
 
 
 def parameters_at_edge(

@@ -1,0 +1,95 @@
+"""Validation logs have the last word."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from axisight import Log, Settings
+from axisight.effects import Effect
+from axisight.gap.carried import carried_over
+from axisight.gap.howfar import Stages, gap_figures, stage
+from axisight.gap.result import AxisVerdict, Interval
+from axisight.gap.verdict import Conclusion, NamedCause
+
+N, T = 4000, 1e-3
+NAMES = ["held"]
+
+
+def log() -> Log:
+    time = np.arange(N) * T
+    wave = np.sin(2 * np.pi * time)[:, None]
+    return Log(
+        name="held",
+        source=Path("held.parquet"),
+        sample_time_s=T,
+        time_s=time,
+        velocity_ref_rad_s=None,
+        torque_nm=wave,
+        position_rad=wave,
+    )
+
+
+def named(effect: str = "coulomb_friction") -> Conclusion:
+    value = {"coulomb_nm": Interval(1.0, 0.9, 1.1)}
+    cause = NamedCause(effect, 1, 0.99, value, {"coulomb_nm": "Nm"}, "friction", 0.99)
+    return Conclusion(
+        verdict="explained",
+        causes=(cause,),
+        alternatives=(),
+        equivalent=(),
+        next_experiment=None,
+        ranking=(),
+        p_none=0.0,
+        p_unknown=0.01,
+        axes=(AxisVerdict(1, "explained", 5.0, 0.99, (0,)),),
+        checks=(),
+        effects=(Effect(effect, 1, {"coulomb_nm": 1.0}),),
+    )
+
+
+def stages(before: float, after: float, noise: float = 0.05) -> Stages:
+    rng = np.random.default_rng(1)
+    shape = rng.normal(size=(N, 1))
+    given, left, floor = (stage([log()], [x * shape], 1.0) for x in (before, after, noise))
+    return Stages(given, given, left, floor)
+
+
+def judged(conclusion: Conclusion, seen: Stages, **more) -> Conclusion:
+    return carried_over(conclusion, seen, gap_figures(seen), NAMES, Settings(), **more)
+
+
+def test_causes_that_explain_the_validation_logs_stand():
+    assert judged(named(), stages(0.5, 0.06)) == named()
+
+
+@pytest.mark.parametrize(
+    ("after", "words"),
+    [(0.6, "does not carry over"), (0.45, "does not carry over"), (0.35, "leaves too much")],
+)
+def test_causes_that_leave_the_gap_are_withdrawn(after: float, words: str):
+    found = judged(named(), stages(0.5, after))
+    assert (found.verdict, found.causes) == ("unknown", ())
+    assert words in (found.withdrawn or "")
+    assert all(a.verdict == "unknown" and a.causes == () for a in found.axes)
+
+
+def test_a_simulator_bent_out_of_shape_explains_nothing():
+    good = stages(0.5, 0.06)
+    assert judged(named(), good, bent=0.2).verdict == "explained"
+    found = judged(named(), good, bent=0.5)
+    assert found.verdict == "unknown"
+    assert "50 % of the simulator's own parameters" in (found.withdrawn or "")
+
+
+def test_none_needs_logs_at_the_floor():
+    none = replace(named(), verdict="none", causes=(), effects=())
+    assert judged(none, stages(0.05, 0.05)) == none
+    assert judged(none, stages(0.3, 0.3)).verdict == "unknown"
+
+
+def test_noise_larger_than_the_gap_is_a_fault_of_the_data():
+    found = judged(named(), stages(0.5, 0.06, noise=0.9))
+    assert found.verdict == "unknown"
+    assert "No verdict" in (found.withdrawn or "")
