@@ -266,6 +266,8 @@ def noise_torques(
         white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
         for i, log in enumerate(logs)
     ]
-    clean = _along(robot, logs, threads)
-    noisy = _along(robot, logs, threads, noise=noise)
+    # With noise and without in one batch: they run in lock-step.
+    both = [np.zeros_like(x) for x in noise] + noise
+    torques = _along(robot, [*logs, *logs], threads, noise=both)
+    clean, noisy = torques[: len(logs)], torques[len(logs) :]
     return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]

@@ -104,7 +104,7 @@ class Evidence(Linearized):
     ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
     fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
     ``size`` (n_blocks,) of the blocks. ``renewed``: the sensitivities are the model's own,
-    none is another's.
+    none is another's; ``fresh``: they were renewed at every step.
     """
 
     effects: tuple[Effect, ...]
@@ -120,6 +120,7 @@ class Evidence(Linearized):
     size: NDArray[np.int64]
     residual: Array
     columns: dict[tuple[str | None, str], _core.Column]
+    fresh: bool = False
 
     @property
     def converged(self) -> bool:
@@ -250,7 +251,7 @@ class ModelFitter(ABC):
         tolerance = _TRIAL_TOLERANCE if lazy else _TOLERANCE
         options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
-        return _evidence(result, setup, list(free), renewed=not lazy)
+        return replace(_evidence(result, setup, list(free), renewed=not lazy), fresh=fresh)
 
     def evaluate(
         self,

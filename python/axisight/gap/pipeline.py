@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -128,9 +129,11 @@ def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:
 
 def _error_logs(view: View, found: Search) -> list[ErrorLog]:
     """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
-    refit = view.torques(Variant(found.baseline.robot_values), view.logs)
+    with ThreadPoolExecutor(view.settings.threads) as pool:
+        noise = pool.submit(view.noises, view.logs, 0)
+        refit = view.torques(Variant(found.baseline.robot_values), view.logs)
+        noises = noise.result()
     errors = _errors(refit, [view.measured(log) for log in view.logs])
-    noises = view.noises(view.logs, 0)
     return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
 
 
@@ -168,13 +171,16 @@ def _reach(
     variants = [Variant(values, tuple(causes[: i + 1])) for i in range(len(causes))]
     refit = Variant(found.baseline.robot_values)
     measured = [view.measured(log) for log in logs]
-    noise = view.noises(logs, len(view.logs))
+    # Few logs are one simulation in lock-step: the simulators run beside one another.
+    simulators = (AS_GIVEN, refit, *variants)
+    with ThreadPoolExecutor(settings.threads) as pool:
+        noises = pool.submit(view.noises, logs, len(view.logs))
+        before, *steps = pool.map(lambda v: view.torques(v, logs), simulators)
+        noise = noises.result()
 
     def measure(errors: Sequence[Array]) -> Stage:
         return stage(logs, errors, settings.block_s, measured)
 
-    before = view.torques(AS_GIVEN, logs)
-    steps = [view.torques(v, logs) for v in (refit, *variants)]
     given = measure(_errors(before, measured))
     refitted, *stages = [measure(_errors(torques, measured)) for torques in steps]
     floor = measure(noise)

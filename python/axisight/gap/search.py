@@ -222,8 +222,9 @@ def _take_in(
 ) -> None:
     label = "adding " + ", ".join(r.trial.label for r, _ in taken)
     progress(label, 0, 1)
-    if len(taken) == 1:
-        start = taken[0][0].trial.evidence
+    start = taken[0][0].trial.evidence
+    # One of a pair that the count of causes has no room for was fitted beside the other.
+    if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:
         state.model = settled(fitter, start.free, start)
     else:
         free = list(state.model.free)

@@ -154,7 +154,7 @@ def _play(trial: Trial) -> FreeEffect:
     deflection = spread / ratio / stiffness
     # The valley around the true width is narrow: impacts must stay in phase.
     worth_it = _axis_share(trial.at, i) > _SMALL_SHARE
-    shares = np.geomspace(0.04, 0.8, 18) if worth_it else ()
+    shares = np.geomspace(0.04, 0.8, 15) if worth_it else ()
     starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
     return FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",), starts=starts)
 

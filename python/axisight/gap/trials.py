@@ -39,6 +39,8 @@ _LOOKED_AT = 3
 # Leaders of an axis that are refined, unless the first already explains nearly everything.
 _REFINED = 2
 _GOOD_ENOUGH = 0.95
+# Steps of the fit of a candidate; leaders go on from there.
+_STEPS = 8
 # Evaluations between two starts of an effect.
 _SCANS = 10
 # Share of a gain that another candidate may have on the same axis and not count as felt.
@@ -69,7 +71,8 @@ def settled(
     """Return a fit with sensitivities of its own, as often renewed as it needs."""
     if not start.renewed or len(free) != len(start.free):
         start = fitter.fit(free, start, refreshes=1)
-    if start.converged:
+    # One that stalled with sensitivities renewed at every step gets no further.
+    if start.converged or (start.fresh and start.status == "stalled"):
         return start
     return fitter.fit(start.free, start, fresh=True, max_iterations=max_iterations)
 
@@ -260,20 +263,22 @@ class Trials:
     def _fitted(self, start: _Start) -> Trial | None:
         # One that bends the simulator has sensitivities of its own.
         bends = start.robot_values is not self.model.robot_values
-        solve = partial(self.fitter.fit, lazy=not bends)
+        solve = partial(self.fitter.fit, lazy=not bends, max_iterations=_STEPS)
         evidence = self._attempt(solve, start.option, start.robot_values)
         return None if evidence is None else trial(start.option, evidence)
 
     def _promising(self, starts: Sequence[_Start]) -> list[int]:
         """Return which candidates to fit: at every place the best, where anything is to be gained."""
-        samples = self.layout.samples()
+        left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
+        worth = np.maximum(
+            self.settings.smallest_gain * self.layout.samples(), self.settings.smallest_score * left
+        )
         places = sorted({s.option.effect.axis or 0 for s in starts})
         keep: list[int] = []
         for place in places:
             mine = [i for i, s in enumerate(starts) if (s.option.effect.axis or 0) == place]
             mine.sort(key=lambda i: -starts[i].gain)
-            worth = samples[place - 1] if place else samples.min()
-            least = _HOPELESS * self.settings.smallest_gain * float(worth)
+            least = _HOPELESS * (worth[place - 1] if place else worth.min())
             best = starts[mine[0]].gain
             keep += [
                 i
