@@ -4,6 +4,11 @@
 //! motion over any scalar, `motion` steps them through a sample with the sign of the friction
 //! followed exactly; `predictor` runs a data set; [`AxisProblem`] turns data sets into
 //! residuals and normal equations, which [`search`] minimizes.
+//!
+//! `Plant` could serve two masses with smoothed friction. It agrees to 3e-13, and takes 12 times as
+//! long a sample with seven derivatives, 4 times without (`benches/benches/axis_paths.rs`: 2054 and 640
+//! against 165 and 146 ns): it steps an arm of any joints, where a chain knows its few springs, and
+//! it does not follow the sign of dry friction. That is what the second path buys.
 
 mod chain;
 mod data;
