@@ -251,7 +251,8 @@ class ModelFitter(ABC):
         tolerance = _TRIAL_TOLERANCE if lazy else _TOLERANCE
         options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
-        return replace(_evidence(result, setup, list(free), renewed=not lazy), fresh=fresh)
+        renewed = not lazy and near is None
+        return replace(_evidence(result, setup, list(free), renewed=renewed), fresh=fresh)
 
     def evaluate(
         self,

@@ -150,9 +150,8 @@ class Trials:
         while todo := next(iter(self._worth_refining(trials, done)), None):
             self.progress(label, len(done), len(done) + 1)
             done.add(todo.label)
-            better = settled(self.fitter, todo.evidence.free, todo.evidence)
-            if better.total < todo.evidence.total:
-                trials = [trial(todo.candidate, better) if t is todo else t for t in trials]
+            better = trial(todo.candidate, settled(self.fitter, todo.evidence.free, todo.evidence))
+            trials = [better if t is todo else t for t in trials]
         self.progress(label, 1, 1)
         return trials
 

@@ -1,0 +1,201 @@
+//! What fits hand back.
+
+use crate::convert::{array1, array2, array3};
+use axisight_identification::logs::{BlockGram, Column as Shared, Fit, Linearization as Point};
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use std::sync::Arc;
+
+/// Log, axis, start and length of a block.
+type BlockTuple = (usize, usize, usize, usize);
+
+/// A column of a Jacobian, kept where it was computed for other fits to use.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Column {
+    pub(crate) shared: Shared,
+}
+
+#[pymethods]
+impl Column {
+    /// A copy.
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.shared.to_vec())
+    }
+}
+
+/// Rows of a matrix from columns that are kept apart.
+fn stacked(columns: &[Shared]) -> Vec<f64> {
+    columns.iter().flat_map(|c| c.iter().copied()).collect()
+}
+
+/// Result of a fit; arrays are copies.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct FitResult {
+    pub(crate) fit: Fit,
+}
+
+#[pymethods]
+impl FitResult {
+    #[getter]
+    fn status(&self) -> &'static str {
+        self.fit.status.name()
+    }
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.fit.theta.clone())
+    }
+    #[getter]
+    fn loss(&self) -> f64 {
+        self.fit.loss
+    }
+    #[getter]
+    fn initial_loss(&self) -> f64 {
+        self.fit.initial_loss
+    }
+    #[getter]
+    fn n_residuals(&self) -> usize {
+        self.fit.n_residuals
+    }
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.fit.iterations
+    }
+    #[getter]
+    fn evaluations(&self) -> usize {
+        self.fit.evaluations
+    }
+    #[getter]
+    fn free(&self) -> Vec<usize> {
+        self.fit.free.clone()
+    }
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, self.fit.covariance.clone(), self.fit.free.len())
+    }
+    #[getter]
+    fn sandwich<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, self.fit.sandwich.clone(), self.fit.free.len())
+    }
+    #[getter]
+    fn condition(&self) -> f64 {
+        self.fit.condition
+    }
+    #[getter]
+    fn at_bound(&self) -> Vec<usize> {
+        self.fit.at_bound.clone()
+    }
+    #[getter]
+    fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.fit.residual.clone())
+    }
+    /// Jacobian columns of the free parameters, `(n_free, n_residuals)`.
+    #[getter]
+    fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, stacked(&self.fit.columns), self.fit.n_residuals)
+    }
+    /// The same, kept where they are.
+    #[getter]
+    fn columns(&self) -> Vec<Column> {
+        let shared = self.fit.columns.iter().map(Arc::clone);
+        shared.map(|shared| Column { shared }).collect()
+    }
+    #[getter]
+    fn blocks(&self) -> Vec<BlockTuple> {
+        places(&self.fit.blocks)
+    }
+    #[getter]
+    fn block_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        matrices(py, &self.fit.blocks, self.fit.free.len())
+    }
+    #[getter]
+    fn block_gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        gradients(py, &self.fit.blocks, self.fit.free.len())
+    }
+    #[getter]
+    fn block_loss<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        losses(py, &self.fit.blocks)
+    }
+}
+
+/// A problem at given parameters; arrays are copies.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Linearization {
+    pub(crate) at: Point,
+}
+
+#[pymethods]
+impl Linearization {
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.at.theta.clone())
+    }
+    #[getter]
+    fn loss(&self) -> f64 {
+        self.at.loss
+    }
+    #[getter]
+    fn free(&self) -> Vec<usize> {
+        self.at.free.clone()
+    }
+    #[getter]
+    fn at_bound(&self) -> Vec<usize> {
+        self.at.at_bound.clone()
+    }
+    #[getter]
+    fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.at.residual.clone())
+    }
+    /// Jacobian columns of the free parameters, `(n_free, n_residuals)`.
+    #[getter]
+    fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array2(py, stacked(&self.at.columns), self.at.residual.len())
+    }
+    #[getter]
+    fn blocks(&self) -> Vec<BlockTuple> {
+        places(&self.at.blocks)
+    }
+    #[getter]
+    fn block_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        matrices(py, &self.at.blocks, self.at.free.len())
+    }
+    #[getter]
+    fn block_gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        gradients(py, &self.at.blocks, self.at.free.len())
+    }
+    #[getter]
+    fn block_loss<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        losses(py, &self.at.blocks)
+    }
+}
+
+/// Blocks as rows (log, axis, start, length).
+fn places(blocks: &[BlockGram]) -> Vec<BlockTuple> {
+    let blocks = blocks.iter().map(|g| g.block);
+    blocks.map(|b| (b.record, b.axis, b.start, b.len)).collect()
+}
+
+/// `J^T W J` by block, `(n_blocks, n_free, n_free)`.
+fn matrices<'py>(
+    py: Python<'py>,
+    blocks: &[BlockGram],
+    n: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat = blocks.iter().flat_map(|g| g.matrix.iter().copied());
+    array3(py, flat.collect(), n, n)
+}
+
+/// `J^T W r` by block, `(n_blocks, n_free)`.
+fn gradients<'py>(
+    py: Python<'py>,
+    blocks: &[BlockGram],
+    n: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat = blocks.iter().flat_map(|g| g.gradient.iter().copied());
+    array2(py, flat.collect(), n)
+}
+
+/// Loss by block.
+fn losses<'py>(py: Python<'py>, blocks: &[BlockGram]) -> Bound<'py, PyArray1<f64>> {
+    array1(py, blocks.iter().map(|g| g.loss).collect())
+}
