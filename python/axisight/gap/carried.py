@@ -45,8 +45,8 @@ def carried_over(
     A cause whose addition does not shrink the validation gap is withdrawn; so is *none* where a
     log stands above the floor; and nothing is said where the noise estimated from the logs is
     larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
-    ``bent``: share of the simulator's own parameters that the re-fit beside causes of the whole arm took
-    to the edge of their tolerance.
+    ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
+    of their tolerance, where that counts.
     """
     withdrawn = None
     if gap.floor > _ABSURD * gap.refitted:

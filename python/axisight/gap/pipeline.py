@@ -219,7 +219,8 @@ def _assemble(
     own = _axes_alone(view, found, conclusion, reach, settings)
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
     edge = parameters_at_edge(found.model, nominal, tolerances)
-    bent = len(edge) / max(len(found.model.robot_values), 1)
+    # Where errors add up, masses that a few seconds hardly tell go to the edge by themselves.
+    bent = 0.0 if view.fitter.adds_up else len(edge) / max(len(found.model.robot_values), 1)
     conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own, bent)
     causes = _causes(conclusion, reach.reductions)
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
