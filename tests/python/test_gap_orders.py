@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from axisight import load_robot, simulate
-from axisight.gap.closed_loop import controller_response
+from axisight.gap.feedback import controller_response
 from axisight.gap.orders import Turning, strongest_orders, turning
 
 T = 4e-3

@@ -25,7 +25,7 @@ def situation(
     baseline: Evidence,
     decimation: int,
     response: Response,
-    noise: Array,
+    enough: Array,
 ) -> Situation:
     """Return the residual of a model and how the motors turned, by log and axis."""
 
@@ -42,7 +42,7 @@ def situation(
 
     axes = range(robot.n_axes)
     turned = [[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)]
-    return Situation(turned, response, noise)
+    return Situation(turned, response, enough)
 
 
 def all_candidates(

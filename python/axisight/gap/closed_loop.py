@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects, effect_info
+from axisight.effects import Effect, EffectTuple, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
-from axisight.fitting.simulation_error import core_spec
+from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.frf.errors import reference_to_input
+from axisight.gap.feedback import controller_response
 from axisight.gap.limits import reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
@@ -25,6 +26,16 @@ from axisight.simulation import simulate_batch, white_noise
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+# Robot, effects, parameters, records and weights, as the core takes them.
+_Problem = tuple[
+    _core.Robot,
+    list[EffectTuple],
+    list[Spec],
+    list[tuple[Array, Array]],
+    list[tuple[list[float], list[float], int]],
+]
 
 
 class ClosedLoopView(View):
@@ -88,19 +99,6 @@ class ClosedLoopView(View):
         )
 
 
-def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
-    """Return the sampled controller from motor angle to torque (n_freq, n_axes, n_axes) [Nm/rad]."""
-    gains, time = robot.controller_gains, robot.sample_time_s
-    kp, ki = gains["kp"], gains.get("ki", 0.0)
-    back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
-    out = (1 - back) / time
-    # The error of a cascade is summed up to the sample before.
-    cascade = "kv" in gains
-    summed = ki * time * back / (1 - back)
-    out = (out + gains["kv"]) * (kp + summed) if cascade else kp * out + ki
-    return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
-
-
 def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)
 
@@ -125,6 +123,11 @@ class ClosedLoopFitter(ModelFitter):
         super().__init__(robot, weighting, tolerances, block_s)
         self.records = records
 
+    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:
+        """Return the problem as the core takes it."""
+        specs = [core_spec(p, effects) for p in parameters]
+        return self.robot.core, core_effects(effects), specs, self.records, self.weighting.core()
+
     def solve(
         self,
         effects: Sequence[Effect],
@@ -135,11 +138,7 @@ class ClosedLoopFitter(ModelFitter):
     ) -> _core.FitResult:
         """Run the fit in the core."""
         return _core.fit_simulation(
-            self.robot.core,
-            core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
-            self.records,
-            self.weighting.core(),
+            *self._problem(effects, parameters),
             options,
             input="tracking",
             output="torque",
@@ -153,11 +152,7 @@ class ClosedLoopFitter(ModelFitter):
     ) -> _core.Courses:
         """Run the model in the core."""
         return _core.courses(
-            self.robot.core,
-            core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
-            self.records,
-            self.weighting.core(),
+            *self._problem(effects, parameters),
             options,
             input="tracking",
             output="torque",
@@ -174,11 +169,7 @@ class ClosedLoopFitter(ModelFitter):
     ) -> _core.Linearization:
         """Evaluate the model in the core."""
         return _core.evaluate_simulation(
-            self.robot.core,
-            core_effects(effects),
-            [core_spec(p, effects) for p in parameters],
-            self.records,
-            self.weighting.core(),
+            *self._problem(effects, parameters),
             options,
             input="tracking",
             output="torque",

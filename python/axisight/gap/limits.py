@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.effects.stated import TORQUE_LIMIT
+from axisight.gap.feedback import before, feedback
 from axisight.gap.result import Interval
 from axisight.logs import Log
 from axisight.logs.frozen import runs
@@ -88,19 +89,9 @@ def _command(robot: Robot, log: Log) -> Array:
     """Return what the controller commands before any limit, but for a constant, (n, n_axes) [Nm]."""
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
-    gains = robot.controller_gains
     position = log.position_rad - log.position_rad[0]
     speed = np.diff(position, axis=0, prepend=position[:1]) / time
-    behind = _before(reference) * time - position
-    slower = reference - speed
-    if "kv" in gains:
-        error = slower + gains["kv"] * behind
-        return np.asarray(gains["kp"] * error + gains["ki"] * _before(error) * time)
-    return np.asarray(gains["kp"] * slower + gains.get("ki", 0.0) * behind)
-
-
-def _before(x: Array) -> Array:
-    return np.asarray(np.cumsum(x, axis=0) - x)
+    return feedback(robot, reference - speed, before(reference) * time - position)
 
 
 def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> TorqueLimit | None:

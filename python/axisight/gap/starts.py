@@ -24,10 +24,6 @@ Response = Callable[[str, int, Array], Complex]
 """Of the weighted residual on an axis (from 0) to an effect there, by its name, at frequencies [Hz]."""
 
 
-# Mean square of a weighted residual that no cause is worth naming for.
-_LEFT = 0.05
-
-
 @dataclass(frozen=True)
 class Situation:
     """What start values are taken from.
@@ -38,14 +34,14 @@ class Situation:
 
     turning: Sequence[Sequence[Turning]]
     response: Response
-    noise: Array
-    """Mean square of the residual of each axis that is noise only."""
+    enough: Array
+    """Mean square of the residual of each axis up to which no cause is worth naming."""
 
     def is_left(self, index: int) -> bool:
-        """Whether the residual of an axis holds more than noise."""
+        """Whether the residual of an axis holds something worth a cause."""
         logs = [axes[index].residual for axes in self.turning]
         square = sum(float(r @ r) for r in logs) / sum(len(r) for r in logs)
-        return bool(square > self.noise[index] + _LEFT)
+        return bool(square > self.enough[index])
 
 
 @dataclass(frozen=True)

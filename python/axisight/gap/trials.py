@@ -218,7 +218,7 @@ class Trials:
         if len(option.free) > 1:
             # Further starts of one that does nothing as it is: by what a step from there promises.
             # Only sizes: where it has none, its shape shows nothing.
-            sizes = replace(option, free=tuple(n for n in option.free if n in _sizes(option)))
+            sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
             for begin in (option.at(values) for values in option.starts):
                 at = sizes.at(begin.effect.parameters or {})
                 other = self._attempt(self.fitter.evaluate, at, None)
@@ -298,7 +298,7 @@ class Trials:
         return out
 
 
-def _sizes(option: FreeEffect) -> set[str]:
+def _amplitudes(option: FreeEffect) -> set[str]:
     info = effect_info(option.effect.name)
     return {p.name for p in info.parameters if p.role == "amplitude"}
 

@@ -46,7 +46,7 @@ class View(ABC):
             model,
             self.fitter.weighting.decimation,
             self._weighted_response,
-            self.floor.expected,
+            self.floor.expected + self.settings.smallest_gain,
         )
         found = all_candidates(
             self.robot,

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.feedback import before, feedback
 from axisight.logs import Log, lowpass
 from axisight.logs.frozen import runs
 from axisight.robot import Robot
@@ -63,19 +64,17 @@ class ControlLaw:
         self.step = max(1, int(1.0 / (time * band * _SAMPLES_PER_BAND)))
         self.sample_time_s = time
         self._band_hz = band
-        self._gains = robot.controller_gains
+        self._robot = robot
         position = log.position_rad - log.position_rad[0]
         speed = np.diff(position, axis=0, prepend=position[:1]) / time
-        self._reference = self._states(reference, _before(reference) * time)
-        self._position = self._states(-speed, -position)
+        self._errors = {
+            "reference": (reference, before(reference) * time),
+            "position": (-speed, -position),
+        }
         self.torque = lowpass(log.torque_nm, time, band)
         self._shares: dict[tuple[str, int, int], Array] = {}
         width = int(_SMEARED_PERIODS / (band * time))
         self.kept = np.column_stack([_free(x, width) for x in log.torque_nm.T])
-
-    def _states(self, speed: Array, angle: Array) -> tuple[Array, Array, Array]:
-        """Return speed, angle, and the angle summed once more (for the integral of a cascade)."""
-        return speed, angle, _before(angle) * self.sample_time_s
 
     def share(self, kind: str, axis: int, source: int) -> Array:
         """Return what channel ``source`` adds to the command of ``axis``, (n,) [Nm], from 0.
@@ -84,22 +83,12 @@ class ControlLaw:
         """
         key = kind, axis, source
         if key not in self._shares:
-            states = self._reference if kind == "reference" else self._position
-            speed, angle, area = (x[:, source] for x in states)
-            kp, ki, kv = (self._gain(name, axis) for name in ("kp", "ki", "kv"))
-            if "kv" in self._gains:
-                travel = angle if kind == "reference" else _before(speed) * self.sample_time_s
-                out = kp * (speed + kv * angle) + ki * (travel + kv * area)
-            else:
-                out = kp * speed + ki * angle
+            speed, angle = (x[:, source] for x in self._errors[kind])
+            out = feedback(self._robot, speed, angle, axis)
             self._shares[key] = lowpass(
                 np.ascontiguousarray(out), self.sample_time_s, self._band_hz
             )
         return self._shares[key]
-
-    def _gain(self, name: str, axis: int) -> float:
-        values = self._gains.get(name)
-        return 0.0 if values is None else float(values[axis])
 
     def fit(
         self,
@@ -129,11 +118,6 @@ class ControlLaw:
             read(self.share("position", own, position), shifts[2]),
             kept,
         )
-
-
-def _before(x: Array) -> Array:
-    """Return the sum over all earlier samples."""
-    return np.asarray(np.cumsum(x, axis=0) - x)
 
 
 def _free(torque: Array, width: int) -> Mask:

@@ -1,0 +1,42 @@
+"""The controller of a robot file as algebra, in time and over frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def before(x: Array) -> Array:
+    """Return the sum over all earlier samples (n, ...)."""
+    return np.asarray(np.cumsum(x, axis=0) - x)
+
+
+def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) -> Array:
+    """Return the torque for errors of speed [rad/s] and angle [rad], (n, n_axes), or (n,) of ``axis`` from 0.
+
+    Before any limit. Linear: shares of references and of positions may be given apart.
+    """
+    gains = {k: v if axis is None else v[axis] for k, v in robot.controller_gains.items()}
+    kp, ki = gains["kp"], gains.get("ki", 0.0)
+    if "kv" not in gains:
+        return np.asarray(kp * speed + ki * angle)
+    error = speed + gains["kv"] * angle
+    return np.asarray(kp * error + ki * before(error) * robot.sample_time_s)
+
+
+def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
+    """Return the sampled controller from motor angle to torque (n_freq, n_axes, n_axes) [Nm/rad]."""
+    gains, time = robot.controller_gains, robot.sample_time_s
+    kp, ki = gains["kp"], gains.get("ki", 0.0)
+    back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
+    out = (1 - back) / time
+    # The error of a cascade is summed up to the sample before.
+    cascade = "kv" in gains
+    summed = ki * time * back / (1 - back)
+    out = (out + gains["kv"]) * (kp + summed) if cascade else kp * out + ki
+    return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
