@@ -6,7 +6,9 @@ use crate::entry::{AxisightError, RobotError, input_error};
 use axisight_core::plant::{
     Linearization, assemble, equilibrium, linearize, zoh_frequency_response,
 };
-use axisight_core::robot::{Controller, Joint, Motion, Parameter, RigidBody, RobotDescription};
+use axisight_core::robot::{
+    Controller, Joint, Motion, Parameter, RigidBody, RobotDescription, ShapeError,
+};
 use axisight_core::robot_file::read_robot;
 use axisight_identification::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
@@ -58,12 +60,14 @@ impl Robot {
         linearize(&self.description, &settings(effects), &at).map_err(input_error)
     }
 
-    /// Apply `f` to each row of one to three `(n, joints)` arrays of equal length.
-    fn each_row<'py>(
+    /// Apply `f` to each row of `K` `(n, joints)` arrays of equal length; it fills a row of
+    /// `width` numbers.
+    fn each_row<'py, const K: usize>(
         &self,
         py: Python<'py>,
-        arrays: &[(&str, &PyReadonlyArray2<'_, f64>)],
-        f: impl Fn(&RigidBody, &[&[f64]]) -> PyResult<Vec<f64>>,
+        arrays: [(&str, &PyReadonlyArray2<'_, f64>); K],
+        width: usize,
+        mut f: impl FnMut(&RigidBody, [&[f64]; K], &mut [f64]) -> Result<(), ShapeError>,
     ) -> PyResult<Matrix2<'py>> {
         let n = self.body.n_joints();
         let data = arrays
@@ -78,12 +82,11 @@ impl Robot {
                 "{name}: expected {count} rows, got {got}"
             )));
         }
-        let mut out = Vec::new();
-        for row in 0..count {
-            let at: Vec<&[f64]> = data.iter().map(|d| &d[row * n..(row + 1) * n]).collect();
-            out.extend(f(&self.body, &at)?);
+        let mut out = vec![0.0; count * width];
+        for (row, out) in out.chunks_exact_mut(width).enumerate() {
+            let at = std::array::from_fn(|k| &data[k][row * n..(row + 1) * n]);
+            f(&self.body, at, out).map_err(input_error)?;
         }
-        let width = out.len().checked_div(count).unwrap_or(n);
         array2(py, out, width)
     }
 }
@@ -285,8 +288,9 @@ impl Robot {
         q: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix3<'py>> {
         let n = self.body.n_joints();
-        let flat = self.each_row(py, &[("q", &q)], |b, x| {
-            b.inertia_matrix(x[0]).map_err(input_error)
+        let flat = self.each_row(py, [("q", &q)], n * n, |body, [q], out| {
+            out.copy_from_slice(&body.inertia_matrix(q)?);
+            Ok(())
         })?;
         flat.reshape([q.as_array().nrows(), n, n])
     }
@@ -296,8 +300,10 @@ impl Robot {
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| {
-            b.bias(x[0], x[1]).map_err(input_error)
+        let n = self.body.n_joints();
+        self.each_row(py, [("q", &q), ("v", &v)], n, |body, [q, v], out| {
+            out.copy_from_slice(&body.bias(q, v)?);
+            Ok(())
         })
     }
     fn gravity<'py>(
@@ -305,8 +311,10 @@ impl Robot {
         py: Python<'py>,
         q: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q)], |b, x| {
-            b.gravity(x[0]).map_err(input_error)
+        let n = self.body.n_joints();
+        self.each_row(py, [("q", &q)], n, |body, [q], out| {
+            out.copy_from_slice(&body.gravity(q)?);
+            Ok(())
         })
     }
     fn inverse_dynamics<'py>(
@@ -316,8 +324,10 @@ impl Robot {
         v: PyReadonlyArray2<'py, f64>,
         a: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q), ("v", &v), ("a", &a)], |b, x| {
-            b.inverse_dynamics(x[0], x[1], x[2]).map_err(input_error)
+        let (n, mut scratch) = (self.body.n_joints(), self.body.scratch());
+        let arrays = [("q", &q), ("v", &v), ("a", &a)];
+        self.each_row(py, arrays, n, |body, at, out| {
+            body.inverse_dynamics_into(at, &mut scratch, out)
         })
     }
     fn forward_dynamics<'py>(
@@ -327,8 +337,10 @@ impl Robot {
         v: PyReadonlyArray2<'py, f64>,
         tau: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q), ("v", &v), ("tau", &tau)], |b, x| {
-            b.forward_dynamics(x[0], x[1], x[2]).map_err(input_error)
+        let (n, mut scratch) = (self.body.n_joints(), self.body.scratch());
+        let arrays = [("q", &q), ("v", &v), ("tau", &tau)];
+        self.each_row(py, arrays, n, |body, at, out| {
+            body.forward_dynamics_into(at, &mut scratch, out)
         })
     }
     fn energy<'py>(
@@ -337,10 +349,10 @@ impl Robot {
         q: PyReadonlyArray2<'py, f64>,
         v: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Matrix2<'py>> {
-        self.each_row(py, &[("q", &q), ("v", &v)], |b, x| {
-            b.energy(x[0], x[1])
-                .map(|(t, u)| vec![t, u])
-                .map_err(input_error)
+        self.each_row(py, [("q", &q), ("v", &v)], 2, |body, [q, v], out| {
+            let (kinetic, potential) = body.energy(q, v)?;
+            out.copy_from_slice(&[kinetic, potential]);
+            Ok(())
         })
     }
     /// Rotation and origin of the frame of joint `joint` (0-based).

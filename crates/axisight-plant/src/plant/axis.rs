@@ -1,7 +1,7 @@
 //! One driven axis: motor, transmission, and the effects on them.
 
 use super::own::Own;
-use crate::effect::{Joint, Kernel, Spring};
+use crate::effect::{Joint, Kernel, Motor, Spring};
 use crate::robot::{Parameter, RobotDescription};
 use axisight_scalar::Scalar;
 use std::sync::Arc;
@@ -72,9 +72,42 @@ impl<S: Scalar> Axis<S> {
         torque
     }
 
+    /// Torque of the effects on the motor [Nm] at the load torque that it feels.
+    #[inline(never)]
+    pub(super) fn motor_torque(&self, at: &Motor<S>, own: &[S], own_rates: &mut [S]) -> S {
+        let mut torque = S::zero();
+        for Own { kernel, internal } in &self.on_motor {
+            let state = Motor {
+                internal: &own[internal.clone()],
+                ..*at
+            };
+            torque += kernel.motor_torque(&state);
+            if let Some(rates) = own_rates.get_mut(internal.clone()) {
+                kernel.motor_rates(&state, rates);
+            }
+        }
+        torque
+    }
+
     /// Torque of the gear at deflection `delta` [rad] that changes at `rate` [Nm, joint side].
     #[inline]
     pub(super) fn gear_torque(
+        &self,
+        gear: &Gear<S>,
+        delta: S,
+        rate: S,
+        own: &[S],
+        own_rates: &mut [S],
+    ) -> S {
+        // Apart from the calls of effects, around which nothing stays in registers.
+        if self.on_gear.is_empty() {
+            return gear.stiffness.fma(delta, gear.damping * rate);
+        }
+        self.torque_of_gear_with_effects(gear, delta, rate, own, own_rates)
+    }
+
+    #[inline(never)]
+    fn torque_of_gear_with_effects(
         &self,
         gear: &Gear<S>,
         delta: S,

@@ -208,7 +208,7 @@ impl<S: Scalar> Plant<S> {
     }
 
     /// Torques of an axis; rates of the effects' own states go where there is room for them.
-    #[inline]
+    #[inline(always)]
     fn driven(
         &self,
         axis: &Axis<S>,
@@ -240,18 +240,15 @@ impl<S: Scalar> Plant<S> {
             (q * up, v * up, S::zero(), S::zero())
         };
         let mut motor = applied - axis.viscous_friction * speed;
-        for Own { kernel, internal } in &axis.on_motor {
+        if !axis.on_motor.is_empty() {
             let state = Motor {
                 angle,
                 speed,
                 command,
                 load,
-                internal: &own[internal.clone()],
+                internal: &[],
             };
-            motor += kernel.motor_torque(&state);
-            if let Some(rates) = own_rates.get_mut(internal.clone()) {
-                kernel.motor_rates(&state, rates);
-            }
+            motor += axis.motor_torque(&state, own, own_rates);
         }
         Driven { motor, gear, load }
     }

@@ -226,7 +226,7 @@ impl<S: Scalar> DynamicsScratch<S> {
     #[inline(always)]
     fn sized<const N: usize>(&mut self, len: usize) -> Option<Sized<'_, S, N>> {
         Some(Sized {
-            n: if N == MOST_JOINTS { len } else { N },
+            n: rows::<N>(len),
             inertia: self.inertia.as_chunks_mut().0.first_chunk_mut()?,
             bias: self.bias.first_chunk_mut()?,
             angles: self.angles.first_chunk_mut()?,
@@ -236,6 +236,23 @@ impl<S: Scalar> DynamicsScratch<S> {
             moments: self.moments.first_chunk_mut()?,
         })
     }
+
+    /// Rows that count, inertia matrix and forces alone: looking at all of it takes as long as
+    /// a solve.
+    #[inline(always)]
+    #[allow(clippy::type_complexity)] // seen twice, ten lines below
+    fn system<const N: usize>(
+        &mut self,
+        len: usize,
+    ) -> Option<(usize, &mut [[S; N]; N], &mut [S; N])> {
+        let inertia = self.inertia.as_chunks_mut().0.first_chunk_mut()?;
+        Some((rows::<N>(len), inertia, self.bias.first_chunk_mut()?))
+    }
+}
+
+/// Rows of a chain of `len` joints that count, padding included.
+const fn rows<const N: usize>(len: usize) -> usize {
+    if N == MOST_JOINTS { len } else { N }
 }
 
 /// Inertia matrix and bias forces for callers that are in no hurry.
@@ -326,17 +343,25 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Accelerations of the joints under forces `tau` [Nm or N].
-    pub fn accelerate(&self, q: &[S], v: &[S], tau: &[S]) -> Vec<S> {
-        let mut scratch = self.scratch();
-        self.place(q, &mut scratch);
-        self.add_rates(v, &mut scratch);
-        self.factorize(&mut scratch);
+    /// Accelerations of the joints under forces `tau` [Nm or N], in `acceleration`.
+    pub fn accelerate(
+        &self,
+        q: &[S],
+        v: &[S],
+        tau: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        acceleration: &mut [S],
+    ) {
+        self.place(q, scratch);
+        self.add_rates(v, scratch);
+        self.factorize(scratch);
         for (i, f) in scratch.bias.iter_mut().enumerate() {
             *f = tau.get(i).map_or_else(S::zero, |t| *t - *f);
         }
-        self.solve(&mut scratch);
-        scratch.bias[..self.len()].to_vec()
+        self.solve(scratch);
+        for (out, a) in acceleration.iter_mut().zip(&scratch.bias) {
+            *out = *a;
+        }
     }
 
     /// Scratch for an evaluation.
@@ -393,15 +418,15 @@ impl<S: Scalar> Dynamics<S> {
 
     #[inline(never)]
     fn factorize_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
-        if let Some(sized) = scratch.sized::<N>(self.len()) {
-            factorize(sized.inertia, sized.n);
+        if let Some((n, inertia, _)) = scratch.system::<N>(self.len()) {
+            factorize(inertia, n);
         }
     }
 
     #[inline(never)]
     fn solve_sized<const N: usize>(&self, scratch: &mut DynamicsScratch<S>) {
-        if let Some(sized) = scratch.sized::<N>(self.len()) {
-            solve_factorized(sized.inertia, sized.bias, sized.n);
+        if let Some((n, inertia, forces)) = scratch.system::<N>(self.len()) {
+            solve_factorized(inertia, forces, n);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::chain::{Chain, Pose};
 use super::description::{Motion, RobotDescription};
-use super::dynamics::{Dynamics, DynamicsState};
+use super::dynamics::{Dynamics, DynamicsScratch, DynamicsState};
 use nalgebra::DMatrix;
 
 /// Kinematics and dynamics of the chain of all joints (driven and elastic).
@@ -107,11 +107,9 @@ impl RigidBody {
         v: &[f64],
         a: &[f64],
     ) -> Result<Vec<f64>, ShapeError> {
-        self.check("a", a)?;
-        let state = self.evaluate(q, v)?;
-        let n = a.len();
-        let row = |i: usize| (0..n).map(|j| state.inertia[i * n + j] * a[j]).sum::<f64>();
-        Ok((0..n).map(|i| state.bias[i] + row(i)).collect())
+        let mut tau = vec![0.0; self.n_joints()];
+        self.inverse_dynamics_into([q, v, a], &mut self.scratch(), &mut tau)?;
+        Ok(tau)
     }
 
     /// Joint accelerations under forces `tau`.
@@ -124,10 +122,48 @@ impl RigidBody {
         v: &[f64],
         tau: &[f64],
     ) -> Result<Vec<f64>, ShapeError> {
+        let mut a = vec![0.0; self.n_joints()];
+        self.forward_dynamics_into([q, v, tau], &mut self.scratch(), &mut a)?;
+        Ok(a)
+    }
+
+    /// Scratch for states one after another.
+    pub fn scratch(&self) -> DynamicsScratch<f64> {
+        self.dynamics.scratch()
+    }
+
+    /// [`RigidBody::inverse_dynamics`] in `tau`, one number a joint.
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn inverse_dynamics_into(
+        &self,
+        [q, v, a]: [&[f64]; 3],
+        scratch: &mut DynamicsScratch<f64>,
+        tau: &mut [f64],
+    ) -> Result<(), ShapeError> {
+        self.check("a", a)?;
+        self.check("q", q)?;
+        self.check("v", v)?;
+        self.dynamics.forces_along(q, v, a, scratch, tau);
+        Ok(())
+    }
+
+    /// [`RigidBody::forward_dynamics`] in `a`, one number a joint.
+    ///
+    /// # Errors
+    /// [`ShapeError`].
+    pub fn forward_dynamics_into(
+        &self,
+        [q, v, tau]: [&[f64]; 3],
+        scratch: &mut DynamicsScratch<f64>,
+        a: &mut [f64],
+    ) -> Result<(), ShapeError> {
         self.check("tau", tau)?;
         self.check("q", q)?;
         self.check("v", v)?;
-        Ok(self.dynamics.accelerate(q, v, tau))
+        self.dynamics.accelerate(q, v, tau, scratch, a);
+        Ok(())
     }
 
     /// Pose of the link frame of joint `joint`: rotation (rows) and origin [m], base frame.
