@@ -44,13 +44,17 @@ def test_linear_gain_is_what_least_squares_gains(regression):
     np.testing.assert_allclose(linear_gain(moved), step @ total @ step, rtol=1e-6)
 
 
+# The size of an effect is judged in test_gap_amplitude.py.
+NO_EFFECT = linear_evidence(np.ones((800, 1)), np.zeros(800), np.zeros(800, int))
+
+
 def a_trial(name: str, n_free: int, held_out: np.ndarray, axis: int = 1) -> Trial:
     names = {
         1: ("viscous_nm_s_rad",),
         2: ("coulomb_nm", "smoothing_rad_s"),
         3: ("forward_nm", "backward_nm", "smoothing_rad_s"),
     }[n_free]
-    return Trial(FreeEffect(Effect(name, axis), names), None, held_out)  # type: ignore[arg-type]
+    return Trial(FreeEffect(Effect(name, axis), names), NO_EFFECT, held_out)
 
 
 FLOOR = np.full(40, 1.0)

@@ -18,8 +18,9 @@ from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.trials import settled
 
-# Share of a fall of the gap on the estimation logs that validation logs have to show: other motions
-# ask less of an effect, but not nothing.
+# Share of what causes change on validation logs, in squares, by which they have to lower the gap
+# there: 1 where they are right, 0 where half of their size would be, -1 where they have nothing to
+# do with it. A motion that asks little of an effect changes little, and is asked for little.
 _CARRIED = 0.25
 
 
@@ -47,19 +48,20 @@ def believed_by_axis(found: Search, fitter: ModelFitter, settings: Settings) -> 
 
 @dataclass(frozen=True)
 class OwnAxes:
-    """How causes fare on the ``axes`` (from 0) they explain.
+    """How causes fare on the ``axes`` (from 0) they explain, on the validation logs.
 
-    ``estimation``, ``validation``: with the simulator as given and with the causes.
+    ``given``, ``after``: the error of the simulator as given and with the causes; ``change``: what
+    the causes change of its torque.
     """
 
     axes: Sequence[int]
-    estimation: tuple[Stage, Stage]
-    validation: tuple[Stage, Stage]
+    given: Stage
+    after: Stage
+    change: Stage
 
     def not_carried(self) -> int | None:
-        """Return the first axis (from 0) whose gap does not fall on the validation logs; or None."""
-        seen, held = (
-            np.mean(given.per_log(), axis=0) - np.mean(after.per_log(), axis=0)
-            for given, after in (self.estimation, self.validation)
+        """Return the first axis (from 0) whose gap does not fall as the causes say; or None."""
+        given, after, change = (
+            np.mean(s.per_log(), axis=0) for s in (self.given, self.after, self.change)
         )
-        return next((i for i in self.axes if held[i] < _CARRIED * seen[i]), None)
+        return next((i for i in self.axes if given[i] - after[i] < _CARRIED * change[i]), None)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss
@@ -151,13 +152,26 @@ def stand(
             t,
             float((before - loss) / explainable),
             float((before - loss) / samples),
-            layout.significance(current, t.held_out, axis),
+            _significance(t, current, layout, axis, explains=p > probability[-1]),
             float(p),
         )
         for t, loss, p in zip(mine, losses, probability, strict=False)
     ]
     ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
     return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
+
+
+def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explains: bool) -> float:
+    """Return how sure a trial is on an axis: by its gain, or by its size.
+
+    The size counts where the effect acts itself and ``explains`` the axis: one that explains part
+    of it has a size too, whatever the cause is.
+    """
+    gain = layout.significance(current, t.held_out, axis)
+    own = t.candidate.effect.axis in (None, axis + 1)
+    return (
+        max(gain, amplitude_significance(t.evidence, layout.stretch)) if own and explains else gain
+    )
 
 
 def clearly_worse(loss: float, than: float) -> bool:

@@ -151,12 +151,16 @@ def _stands_out(logs: Sequence[ErrorLog]) -> bool:
 
 @dataclass(frozen=True)
 class Reach:
-    """The gap on the validation logs before, re-fitted and with the causes one after another."""
+    """The gap on the validation logs before, re-fitted and with the causes one after another.
+
+    ``change``: what all of it changes of the simulator's torque there.
+    """
 
     stages: Stages
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
     left: tuple[ErrorLog, ...]
+    change: Stage
 
 
 def _reach(
@@ -197,6 +201,7 @@ def _reach(
         reductions,
         overlays(logs, before, steps[-1]),
         tuple(ErrorLog(*each) for each in remaining),
+        measure([b - a for a, b in zip(before, steps[-1], strict=True)]),
     )
 
 
@@ -216,7 +221,7 @@ def _assemble(
     reach = _reach(view, held_logs, found, conclusion.effects, settings)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
-    own = _axes_alone(view, found, conclusion, reach, settings)
+    own = _axes_alone(view, conclusion, reach)
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
     edge = parameters_at_edge(found.model, nominal, tolerances)
     # Where errors add up, masses that a few seconds hardly tell go to the edge by themselves.
@@ -289,21 +294,13 @@ def _provenance(
     }
 
 
-def _axes_alone(
-    view: View, found: Search, conclusion: Conclusion, reach: Reach, settings: Settings
-) -> OwnAxes | None:
-    """Return how causes fare on their axes on both kinds of logs, where errors of axes add up."""
+def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | None:
+    """Return how causes fare on their axes, where errors of axes add up."""
     arm = any(c.axis is None for c in conclusion.causes)
     if not view.fitter.adds_up or not conclusion.causes or arm:
         return None
-    measured = [view.measured(log) for log in view.logs]
-    after = Variant(found.model.robot_values, found.model.effects)
-    given, left = (
-        stage(view.logs, _errors(view.torques(v, view.logs), measured), settings.block_s, measured)
-        for v in (AS_GIVEN, after)
-    )
     axes = sorted({c.axis - 1 for c in conclusion.causes if c.axis is not None})
-    return OwnAxes(axes, (given, left), (reach.stages.given, reach.stages.after))
+    return OwnAxes(axes, reach.stages.given, reach.stages.after, reach.change)
 
 
 def _filtered(view: View) -> tuple[str, ...]:

@@ -25,12 +25,13 @@ def held_out_loss(evidence: Evidence) -> Array:
     out = np.zeros(len(evidence.loss))
     for group in np.unique(groups):
         inside = groups == group
-        step = _step_without(evidence, inside)
+        step = step_without(evidence, inside)
         out[inside] = predicted_loss(evidence, inside, step)
     return out
 
 
-def _step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
+def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
+    """Return how a re-fit without the blocks ``inside`` moves the parameters, to first order."""
     matrix = evidence.matrix[~inside].sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient[~inside].sum(axis=0) + evidence.prior_gradient
     free = ~_pinned(evidence)

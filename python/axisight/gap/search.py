@@ -200,13 +200,14 @@ def _is_cause(
 ) -> bool:
     """Whether what a candidate explains on an axis is real and worth naming.
 
-    It is one of ``tried`` candidates: its significance is held against the level
-    that keeps the false alarms of all of them together at ``settings.false_alarms``
-    (Bonferroni).
+    It is one of ``tried`` candidates, each with two chances (its gain and its size): its
+    significance is held against the level that keeps the false alarms of all of them together at
+    ``settings.false_alarms`` (Bonferroni).
     """
     first = float(state.layout.by_axis(held_out_loss(state.baseline) - state.floor)[standing.axis])
     needed = max(
-        settings.significance, float(scipy.stats.norm.isf(settings.false_alarms / max(tried, 1)))
+        settings.significance,
+        float(scipy.stats.norm.isf(settings.false_alarms / max(2 * tried, 1))),
     )
     share = best.gain * float(state.layout.samples()[standing.axis]) / max(first, 1e-12)
     real = best.significance > needed and best.gain > settings.smallest_gain
