@@ -141,18 +141,36 @@ def _gear_waves(trial: Trial) -> FreeEffect:
 _SMALL_SHARE = 0.1
 
 
-def _play(trial: Trial) -> FreeEffect:
-    """Begin at several widths, as shares of the deflection the largest torque gives."""
+def _deflection_rad(trial: Trial) -> float:
+    """Return the deflection of the gear under the torque of the log that moves it most."""
     robot, i = trial.robot, trial.index
     stiffness = robot.parameters()[f"{robot.axis_names[i]}.stiffness"]
     ratio = abs(float(robot.gear_ratio[i]))
-    spread = max(float(np.std(torque)) for torque in trial.torque())
-    deflection = spread / ratio / stiffness
+    return max(float(np.std(torque)) for torque in trial.torque()) / ratio / stiffness
+
+
+def _play(trial: Trial) -> FreeEffect:
+    """Begin at several widths, as shares of the deflection the largest torque gives."""
+    i, deflection = trial.index, _deflection_rad(trial)
     # The valley around the true width is narrow: impacts must stay in phase.
     worth_it = _axis_share(trial.at, i) > _SMALL_SHARE
     shares = np.geomspace(0.04, 0.8, 15) if worth_it else ()
     starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
     return FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",), starts=starts)
+
+
+# Where slipping begins in earnest, as shares of the deflection: far below, it is dry friction;
+# far above, a stiffer spring.
+_SLIPS = (0.1, 0.4, 1.6)
+
+
+def _slip(trial: Trial) -> FreeEffect:
+    """Begin at several deflections at which the gear slips."""
+    name, deflection = "deflection_rad", _deflection_rad(trial)
+    starts = tuple({name: share * deflection} for share in _SLIPS)
+    bounds = {name: (0.1 * starts[0][name], 10 * starts[-1][name])}
+    begin = trial.effect({"share": 0.0, **starts[1]})
+    return FreeEffect(begin, ("share", name), bounds=bounds, starts=(starts[0], starts[2]))
 
 
 def _axis_share(at: Situation, index: int) -> float:
@@ -236,5 +254,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "cable_stiffness": _neutral,
     "transmission_error": _gear_waves,
     "torque_saturation": _limit,
+    "gear_hysteresis": _slip,
 }
 """By effect."""

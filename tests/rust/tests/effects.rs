@@ -424,6 +424,7 @@ fn springs_and_dampers_of_gears_restore() {
             kernel.gear_torque(&Spring {
                 loaded,
                 rate,
+                stiffness: 1e5,
                 internal: &internal,
             })
         };

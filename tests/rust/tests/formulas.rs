@@ -4,6 +4,7 @@ use axisight_core::effects::formulas::{
     dead_zone, dead_zone_inverse, harmonic, harmonic_slope, smoothed_sign, spring_torque,
     stribeck_level,
 };
+use axisight_core::effects::{Spring, build};
 use axisight_core::plant::assemble;
 use axisight_core::robot::Parameter;
 use axisight_core::robot::{EffectSetting, Place};
@@ -28,6 +29,77 @@ fn the_dead_zone_is_a_shifted_line_outside_its_edge_and_nothing_inside() {
     // A gap of no width is no gap.
     assert_eq!(dead_zone(0.3, 0.0), (0.3, 1.0));
     assert_eq!(dead_zone(0.0, 0.0).0, 0.0);
+}
+
+/// Torques of a gear that slips, `a k D z`, along a way of its deflection in small steps (midpoint
+/// rule: the error of the way is the square of a step over D, 1e-6).
+fn slipping(share: f64, deflection: f64, stiffness: f64, way: &[f64]) -> Vec<f64> {
+    let kernel = build("gear_hysteresis", &[share, deflection]).expect("in the table");
+    let (mut z, mut rate) = ([0.0], [0.0]);
+    let mut torques = Vec::new();
+    for step in way.windows(2) {
+        let change = step[1] - step[0];
+        for half in [0.5, 1.0] {
+            let spring = |internal| Spring {
+                loaded: step[0],
+                rate: change,
+                stiffness,
+                internal,
+            };
+            let middle = [z[0] + 0.5 * rate[0]];
+            let at = if half < 1.0 { z } else { middle };
+            kernel.gear_rates(&spring(&at), &mut rate);
+        }
+        z[0] += rate[0];
+        rate[0] = 0.0;
+        torques.push(kernel.gear_torque(&Spring {
+            loaded: step[1],
+            rate: 0.0,
+            stiffness,
+            internal: &z,
+        }));
+    }
+    torques
+}
+
+#[test]
+fn a_gear_that_slips_follows_the_bouc_wen_model() {
+    let (a, d, k, n) = (0.3, 2e-4, 1e5, 3000);
+    let full = a * k * d;
+    let line =
+        |from: f64, to: f64| (0..=n).map(move |i| from + (to - from) * f64::from(i) / f64::from(n));
+    // Loading from rest: z = 1 - exp(-delta / D).
+    let loading: Vec<f64> = line(0.0, 3.0 * d).collect();
+    let torques = slipping(a, d, k, &loading);
+    for (torque, delta) in torques.iter().zip(&loading[1..]) {
+        assert!((torque - full * (1.0 - (-delta / d).exp())).abs() < 1e-5 * full);
+    }
+    // Turned round, it unloads along the stiff line until it is relaxed.
+    let top = torques[n as usize - 1];
+    let back: Vec<f64> = loading
+        .iter()
+        .copied()
+        .chain(line(3.0 * d, 2.5 * d).skip(1))
+        .collect();
+    let end = *slipping(a, d, k, &back).last().expect("steps");
+    assert!((end - (top - a * k * 0.5 * d)).abs() < 1e-5 * full);
+}
+
+#[test]
+fn a_gear_that_slips_takes_energy_out() {
+    let (a, d, k) = (0.3, 2e-4, 1e5);
+    for amplitude in [0.1 * d, d, 10.0 * d] {
+        let turns = std::f64::consts::TAU / 4000.0;
+        let way: Vec<f64> = (0..8000)
+            .map(|i| amplitude * (turns * f64::from(i)).sin())
+            .collect();
+        let torques = slipping(a, d, k, &way);
+        let work = |i: usize| torques[i] * (way[i + 1] - way[i]);
+        // The second turn: the first forgets how it began.
+        let loss: f64 = (4000..7999).map(work).sum();
+        let most = 4.0 * amplitude * a * k * d;
+        assert!(loss > 0.0 && loss < most, "{amplitude}: {loss} of {most}");
+    }
 }
 
 #[test]

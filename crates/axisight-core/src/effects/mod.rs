@@ -68,6 +68,7 @@ effect_table!(
     cable_stiffness,
     transmission_error,
     torque_saturation,
+    gear_hysteresis,
 );
 
 /// Description of effect `name`.

@@ -351,6 +351,7 @@ mod tests {
         let at = |loaded| Spring {
             loaded,
             rate: 0.0,
+            stiffness: 0.0,
             internal: &[],
         };
         for deflection in sweep() {

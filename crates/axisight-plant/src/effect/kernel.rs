@@ -25,6 +25,8 @@ pub struct Spring<'a, S> {
     pub loaded: S,
     /// Its rate [rad/s]; zero at rest.
     pub rate: S,
+    /// Stiffness of the linear spring [Nm/rad].
+    pub stiffness: S,
     /// States of the effect itself; empty at rest.
     pub internal: &'a [S],
 }

@@ -125,6 +125,7 @@ impl<S: Scalar> Axis<S> {
             let state = Spring {
                 loaded,
                 rate: slope * rate,
+                stiffness: gear.stiffness,
                 internal: &own[internal.clone()],
             };
             torque += kernel.gear_torque(&state);
@@ -179,6 +180,7 @@ impl<S: Scalar> Axis<S> {
                 let state = Spring {
                     loaded,
                     rate: S::zero(),
+                    stiffness: gear.stiffness,
                     internal: &[],
                 };
                 extra += on_gear.kernel.gear_torque(&state);
