@@ -59,6 +59,11 @@ def facts(effect: Mapping[str, Any]) -> str:
     out = [f"Family: {effect['family'].replace('_', ' ')}."]
     if effect["contains"]:
         out.append(f"Contains {', '.join(f'`{n}`' for n in effect['contains'])}.")
+    if effect["usual"]:
+        usual = ", ".join(f"`{n}`" for n in effect["usual"])
+        out.append(
+            f"Where speed or load hardly change it looks like {usual}, which is met more often."
+        )
     if effect["parts"]:
         out.append(f"Two simpler ones imitate it: {', '.join(f'`{n}`' for n in effect['parts'])}.")
     if effect["stands_for"]:

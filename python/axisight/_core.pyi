@@ -99,6 +99,7 @@ class EffectInfo(TypedDict):
     family: str
     contains: list[str]
     parts: list[str]
+    usual: list[str]
     stands_for: tuple[str, str] | None
     linear: str
     inverse_dynamics: bool

@@ -39,7 +39,7 @@ def test_an_effect_states_all_of_itself(info: EffectInfo) -> None:
     assert info.parameters
     assert any(p.role == "amplitude" for p in info.parameters)
     # Effects that it names are effects, of the same scope, and other ones.
-    for name in (*info.contains, *info.parts):
+    for name in (*info.contains, *info.parts, *info.usual):
         assert TABLE[name].scope == info.scope
         assert name != info.name
     assert all(info.name in TABLE[name].contained_in for name in info.contains)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
+from axisight.effects import Effect, effect_info
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect
@@ -96,6 +96,19 @@ class Standing:
         winner = self.best
         bar = _RIVAL * winner.probability / (1 - _RIVAL)
         return [winner, *(r for r in self.ranked[1:] if r.probability > bar)]
+
+    def usual_first(self) -> Standing:
+        """Return the same led by the more usual effect that the data cannot tell the winner from.
+
+        What both explain as well is more often the usual one.
+        """
+        effect = self.best.trial.candidate.effect
+        labels = {Effect(name, effect.axis).label for name in effect_info(effect.name).usual}
+        usual = next((r for r in self.inseparable() if r.trial.label in labels), None)
+        if usual is None:
+            return self
+        rest = tuple(r for r in self.ranked if r is not usual)
+        return replace(self, ranked=(usual, *rest))
 
 
 # A rival this likely beside the winner leaves the cause open.

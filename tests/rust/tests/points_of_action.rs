@@ -27,6 +27,7 @@ const fn info(scope: Scope, acts: Acts) -> EffectInfo {
         family: Family::Arm,
         contains: &[],
         parts: &[],
+        usual: &[],
         stands_for: None,
         linear: Linear::No,
         inverse_dynamics: false,

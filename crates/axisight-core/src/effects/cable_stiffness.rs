@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::Slope,
     inverse_dynamics: true,

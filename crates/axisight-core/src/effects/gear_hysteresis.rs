@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Transmission,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,

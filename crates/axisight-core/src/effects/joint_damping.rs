@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Transmission,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: Some(StandsFor { quantity: "damping", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: false,

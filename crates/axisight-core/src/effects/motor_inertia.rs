@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: true,

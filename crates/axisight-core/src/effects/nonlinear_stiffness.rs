@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Transmission,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::Slope,
     inverse_dynamics: false,

@@ -26,6 +26,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::Parameters,
     inverse_dynamics: true,

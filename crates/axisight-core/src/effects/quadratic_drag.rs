@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Friction,
     contains: &[],
     parts: &[],
+    usual: &["viscous_friction"],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,

@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Periodic,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::Waves { constant: 0, proportional: 0, reading: 12 },
     inverse_dynamics: false,

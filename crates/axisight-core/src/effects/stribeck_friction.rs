@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Friction,
     contains: &["coulomb_friction"],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,

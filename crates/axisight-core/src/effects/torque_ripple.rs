@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Periodic,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::Waves { constant: 9, proportional: 3, reading: 0 },
     inverse_dynamics: true,

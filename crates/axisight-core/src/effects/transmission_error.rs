@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Periodic,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,

@@ -13,6 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Friction,
     contains: &[],
     parts: &[],
+    usual: &[],
     stands_for: Some(StandsFor { quantity: "viscous_friction", change: Change::Absolute }),
     linear: Linear::Slope,
     inverse_dynamics: true,

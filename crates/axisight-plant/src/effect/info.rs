@@ -187,6 +187,9 @@ pub struct EffectInfo {
     pub contains: &'static [&'static str],
     /// Simpler effects that together do what this one does.
     pub parts: &'static [&'static str],
+    /// Effects met more often, of the same family, that this one looks like where speed or load
+    /// hardly change.
+    pub usual: &'static [&'static str],
     /// Parameter of the robot it is a change of.
     pub stands_for: Option<StandsFor>,
     /// How a linear model holds it.
