@@ -210,6 +210,20 @@ def test_that_one_log_shows_an_effect_and_another_does_not_is_no_doubt_of_it():
     assert mixed < 6
 
 
+@pytest.mark.parametrize(
+    ("behind", "leader"), [(1.02, "viscous_friction"), (1.5, "quadratic_drag")]
+)
+def test_the_usual_law_leads_where_the_special_one_cannot_be_told_from_it(behind, leader):
+    drag = a_trial("quadratic_drag", 1, np.full(40, 1.5))
+    viscous = a_trial("viscous_friction", 1, np.full(40, 1.5 * behind))
+    found = standing([drag, viscous])
+    assert found.best.trial is drag
+    led = found.usual_first()
+    assert led.best.trial.candidate.effect.name == leader
+    assert total(led) == pytest.approx(1.0)
+    assert len(led.ranked) == 2
+
+
 def test_clearly_worse_needs_a_likelihood_ratio():
     assert not clearly_worse(1.01, 1.0)
     assert clearly_worse(1.2, 1.0)
