@@ -27,6 +27,12 @@ _FORMULA_ERROR = 0.02
 _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
 
 
+def numbers(effect: FreeEffect) -> float:
+    """Return the number of fitted values of an effect; the order of a harmonic counts too."""
+    harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in effect.free)
+    return float(len(effect.free) + harmonics)
+
+
 @dataclass(frozen=True)
 class Trial:
     """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,)."""
@@ -43,10 +49,7 @@ class Trial:
     @property
     def cost(self) -> float:
         """Number of fitted values; the order of a harmonic counts too."""
-        harmonics = sum(
-            name.startswith("cosine_") and name[7].isdigit() for name in self.candidate.free
-        )
-        return float(len(self.candidate.free) + harmonics)
+        return numbers(self.candidate)
 
 
 @dataclass(frozen=True)
@@ -185,6 +188,12 @@ def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explai
     return (
         max(gain, amplitude_significance(t.evidence, layout.stretch)) if own and explains else gain
     )
+
+
+def likelier(loss: float, cost: float, *, than: tuple[float, float]) -> bool:
+    """Whether a held-out loss with so many fitted numbers is likelier than another."""
+    gain = 0.5 * _INDEPENDENT_BLOCKS * float(np.log(than[0] / loss))
+    return gain > _PARAMETER_COST * (cost - than[1])
 
 
 def clearly_worse(loss: float, than: float) -> bool:

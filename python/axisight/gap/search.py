@@ -14,6 +14,7 @@ from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
 from axisight.gap.layout import Layout, layout_of
+from axisight.gap.merged import one_for_several, several_together
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.settings import Settings
@@ -107,6 +108,7 @@ def search(
             break
         _take_in(fitter, out, taken, progress)
         refused |= _drop_idle(fitter, out, settings)
+        refused |= _merge(fitter, out, settings, candidates)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
     return out
@@ -257,6 +259,27 @@ def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[st
         rest = [*free[:worst], *free[worst + 1 :]]
         state.model = settled(fitter, rest, state.model)
     return dropped
+
+
+def _merge(
+    fitter: ModelFitter,
+    state: Search,
+    settings: Settings,
+    candidates: Callable[[Evidence], list[FreeEffect]],
+) -> set[str]:
+    """Put one effect in the place of several that it does as well as; return their labels."""
+    gone: set[str] = set()
+    while several_together(state.model):
+        options = candidates(state.model)
+        found = one_for_several(fitter, state.model, options, state.floor, state.layout, settings)
+        if found is None:
+            break
+        evidence = found[0].trial.evidence
+        kept = {f.effect.label for f in evidence.free}
+        gone |= {f.effect.label for f in state.model.free} - kept
+        state.model = settled(fitter, evidence.free, evidence)
+        state.rounds.append(Round((found[1],), (found,)))
+    return gone
 
 
 def _first_part(standing: Standing) -> Ranked | None:

@@ -1,0 +1,88 @@
+"""One effect in the place of several: what two laws on an axis imitate together may be a third.
+
+A search that takes in the best of each round may begin with the wrong law, as long as causes
+elsewhere are missing, and mend it with another one.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.errors import InputError
+from axisight.gap.decide import Ranked, Standing, Trial, likelier, numbers, stand, trial
+from axisight.gap.layout import Layout
+from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.score import held_out_loss
+from axisight.gap.settings import Settings
+
+Array = NDArray[np.float64]
+
+
+def one_for_several(
+    fitter: ModelFitter,
+    model: Evidence,
+    options: Sequence[FreeEffect],
+    floor: Array,
+    layout: Layout,
+    settings: Settings,
+) -> tuple[Ranked, Standing] | None:
+    """Return the first effect that does what several of its axis and family do; None without.
+
+    ``options``: the candidates, of which those that the model does not have are tried; ``floor``
+    (n_blocks,): loss of noise alone. It has fewer numbers, and may leave a little more.
+    """
+    for (axis, family), several in several_together(model).items():
+        rest = [f for f in model.free if f not in several]
+        count = sum(numbers(f) for f in several)
+        others = [
+            o
+            for o in options
+            if numbers(o) < count
+            and o.effect.axis == axis
+            and effect_info(o.effect.name).family == family
+            and o.effect.label not in {f.effect.label for f in several}
+        ]
+        try:
+            without = fitter.fit(rest, model, lazy=True)
+        except InputError:
+            continue
+        trials = [t for o in others if (t := _tried(fitter, rest, o, without)) is not None]
+        standing = stand(
+            trials,
+            held_out_loss(without),
+            floor,
+            layout,
+            axis - 1,
+            explained_share=settings.explained_share,
+        )
+        if standing is None:
+            continue
+        here = layout.axis == axis - 1
+        loss = float(held_out_loss(model)[here].sum())
+        best = standing.best.trial
+        if likelier(float(best.held_out[here].sum()), best.cost, than=(loss, count)):
+            return standing.best, standing
+    return None
+
+
+def several_together(model: Evidence) -> dict[tuple[int, str], list[FreeEffect]]:
+    """Return the causes of each axis and family that has more than one."""
+    found: dict[tuple[int, str], list[FreeEffect]] = defaultdict(list)
+    for f in model.free:
+        if f.effect.axis is not None:
+            found[f.effect.axis, effect_info(f.effect.name).family].append(f)
+    return {key: several for key, several in found.items() if len(several) > 1}
+
+
+def _tried(
+    fitter: ModelFitter, rest: Sequence[FreeEffect], option: FreeEffect, start: Evidence
+) -> Trial | None:
+    try:
+        return trial(option, fitter.fit([*rest, option], start, lazy=True))
+    except InputError:
+        return None

@@ -1,0 +1,70 @@
+"""One effect in the place of several that imitate it."""
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.decide import likelier
+from axisight.gap.layout import layout_of
+from axisight.gap.merged import one_for_several, several_together
+from axisight.gap.model import Evidence, FreeEffect
+from gap_data import bare_axis, logs_of
+
+PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
+COULOMB = FreeEffect(
+    Effect("coulomb_friction", 1, {"coulomb_nm": 0.05, "smoothing_rad_s": 2.0}),
+    ("coulomb_nm", "smoothing_rad_s"),
+)
+DRAG = FreeEffect(
+    Effect("quadratic_drag", 1, {"drag_nm_s2_rad2": 1e-4}),
+    ("drag_nm_s2_rad2",),
+)
+OFFSET = FreeEffect(Effect("torque_offset", 1, {"offset_nm": 0.0}), ("offset_nm",))
+
+
+def found(real: list[Effect], free: list[FreeEffect]) -> tuple[Evidence, str | None]:
+    """A fit with effects of a machine that has others, and what takes their place."""
+    view = ClosedLoopView(
+        bare_axis(), logs_of(bare_axis(), real, PLAN, seconds=1.5), Settings(block_s=0.25)
+    )
+    model = view.fitter.fit(free)
+    floor = view.floor.expected[model.axis] * model.size
+    one = one_for_several(
+        view.fitter, model, view.candidates(model), floor, layout_of(model), view.settings
+    )
+    return model, None if one is None else one[0].trial.label
+
+
+@pytest.fixture(scope="module")
+def viscous() -> list[Effect]:
+    return [Effect("viscous_friction", 1, {"viscous_nm_s_rad": 0.01})]
+
+
+def test_two_laws_that_imitate_a_third_give_way_to_it(viscous):
+    model, label = found(viscous, [COULOMB, DRAG])
+    assert list(several_together(model)) == [(1, "friction")]
+    assert label == "viscous_friction@1"
+
+
+def test_two_laws_that_are_there_stay(viscous):
+    dry = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.3})
+    names = ("viscous_nm_s_rad",), ("coulomb_nm", "smoothing_rad_s")
+    free = [FreeEffect(e, n) for e, n in zip([*viscous, dry], names, strict=True)]
+    model, label = found([*viscous, dry], free)
+    assert several_together(model)
+    assert label is None
+
+
+def test_effects_of_other_kinds_are_not_several(viscous):
+    model, label = found(viscous, [COULOMB, OFFSET])
+    assert not several_together(model)
+    assert label is None
+
+
+def test_a_number_more_costs_as_in_the_ranking():
+    # Half the logarithm of sixty blocks a number: a loss 7.06 % smaller is worth one.
+    worth = float(np.exp(np.log(60) / 60))
+    assert likelier(1.0, 3.0, than=(1.001 * worth, 2.0))
+    assert not likelier(1.0, 3.0, than=(0.999 * worth, 2.0))
+    assert likelier(1.0, 2.0, than=(1.0, 3.0))
