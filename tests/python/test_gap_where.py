@@ -52,6 +52,15 @@ def test_a_tone_is_found_on_its_axis_and_in_its_band(base):
     assert places[0].band_hz == (6.0, 15.0)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_log_of_a_single_block_is_sure_of_nothing(base):
+    log, error, noise = base
+    short = a_log(log.torque_nm[:1500], log.position_rad[:1500])
+    bands = band_map([ErrorLog(short, error[:1500] + 0.5, noise[:1500])], 1.0)
+    assert not bands.significance.any()
+    assert float(bands.excess.sel(axis=1).isel(band=0)) > 100
+
+
 def test_noise_alone_is_no_finding(base):
     log, error, noise = base
     bands = band_map([ErrorLog(log, error, noise)], 1.0)

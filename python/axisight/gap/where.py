@@ -184,9 +184,11 @@ def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Data
     """Return share, excess and significance from cells (n_blocks, n_axes, n_bins)."""
     excess = error - noise.mean(axis=0)
     mean = excess.mean(axis=0)
-    standard_error = np.hypot(excess.std(axis=0, ddof=1), noise.std(axis=0, ddof=1)) / np.sqrt(
-        len(excess)
-    )
+    # A single block has no scatter to be sure by.
+    standard_error = np.full_like(mean, np.inf)
+    if len(excess) > 1:
+        scatter = np.hypot(excess.std(axis=0, ddof=1), noise.std(axis=0, ddof=1))
+        standard_error = scatter / np.sqrt(len(excess))
     positive = np.maximum(mean, 0.0)
     total = positive.sum(axis=1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
