@@ -72,6 +72,16 @@ def test_false_alarms_are_as_rare_as_the_deviate_says():
     assert 0.005 < np.mean(found > 2.0) < 0.0228 + 4 * 0.0033
 
 
+def test_an_effect_that_the_simulator_has_is_sure_where_it_differs():
+    noise = 0.1 * np.random.default_rng(2).normal(size=N_BLOCKS * BLOCK)
+    column = in_stretches(8)
+    found = viscous(column, column + noise)
+    size = found.effects[0].values()[0]
+    for stated, low, high in ((0.0, 4.0, 40.0), (size, 0.0, 0.1), (0.5 * size, 3.0, 40.0)):
+        free = replace(found.free[0], stated={"viscous_nm_s_rad": stated})
+        assert low <= amplitude_significance(replace(found, free=(free,)), STRETCH) <= high
+
+
 def test_a_shape_chosen_among_many_says_nothing():
     column = in_stretches(16)
     found = viscous(column, column)

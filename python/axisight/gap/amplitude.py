@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def amplitude_significance(evidence: Evidence, stretch: NDArray[np.int64]) -> float:
-    """Return how sure the amplitudes of the last effect are not zero, as a normal deviate.
+    """Return how sure the amplitudes of the last effect are not the simulator's, as a normal deviate.
 
     ``stretch`` (n_blocks,): the stretch of time of each block. Zero without an effect, for one
     whose neutral values are not zero, and where fewer stretches than amplitudes fix them.
@@ -30,7 +30,7 @@ def amplitude_significance(evidence: Evidence, stretch: NDArray[np.int64]) -> fl
     groups = np.unique(stretch)
     if not columns or len(groups) < 2:
         return 0.0
-    size = np.array([_value(evidence, i) for i in columns])
+    size = np.array([_change(evidence, i) for i in columns])
     moved = np.array([step_without(evidence, stretch == g)[columns] for g in groups])
     scatter = (len(groups) - 1) / len(groups) * moved.T @ moved
     freedom = min(_freedom(evidence, stretch, columns), len(groups) - 1)
@@ -67,8 +67,11 @@ def _amplitudes(evidence: Evidence) -> list[int]:
     ]
 
 
-def _value(evidence: Evidence, column: int) -> float:
-    return float((evidence.effects[-1].parameters or {})[evidence.parameters[column][1]])
+def _change(evidence: Evidence, column: int) -> float:
+    """Return by how much an amplitude differs from what the simulator has, mostly nothing."""
+    name = evidence.parameters[column][1]
+    stated = evidence.free[-1].stated.get(name, 0.0)
+    return float((evidence.effects[-1].parameters or {})[name]) - stated
 
 
 def _freedom(evidence: Evidence, stretch: NDArray[np.int64], columns: list[int]) -> float:

@@ -96,6 +96,7 @@ def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
     """Return the candidate that begins where the simulator has the same effect already."""
     info = effect_info(own.name)
     values = dict(zip((p.name for p in info.parameters), own.values(), strict=True))
+    stated = dict(values)
     bounds = {
         name: (min(low, values[name]), max(high, values[name]))
         for name, (low, high) in candidate.bounds.items()
@@ -106,7 +107,9 @@ def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
     terms = [t for t in info.terms().values() if t[0] in given and len(info.terms()) > 1]
     if terms:
         free = _merged_terms(values, given, terms)
-    return replace(candidate, effect=own.with_values(values), bounds=bounds, free=free)
+    return replace(
+        candidate, effect=own.with_values(values), bounds=bounds, free=free, stated=stated
+    )
 
 
 def _merged_terms(

@@ -34,7 +34,7 @@ class FreeEffect:
     """An effect under trial: start values, the parameters to fit, priors and bounds of some.
 
     ``starts`` are further start values worth trying, of one parameter, for effects whose fit may
-    end in the wrong valley.
+    end in the wrong valley. ``stated`` are the values of an effect that the simulator has itself.
     """
 
     effect: Effect
@@ -42,6 +42,7 @@ class FreeEffect:
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     starts: tuple[Mapping[str, float], ...] = ()
+    stated: Mapping[str, float] = field(default_factory=dict)
 
     def at(self, values: Mapping[str, float]) -> FreeEffect:
         """Return the same with other start values."""
