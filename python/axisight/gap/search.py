@@ -14,7 +14,7 @@ from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
 from axisight.gap.layout import Layout, layout_of
-from axisight.gap.merged import one_for_several, several_together
+from axisight.gap.merged import one_for_several
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.settings import Settings
@@ -97,7 +97,8 @@ def search(
     refused: set[str] = set()
     for number in range(1, _MOST_ROUNDS + 1):
         round_ = Trials(fitter, out.model, floor, out.layout, settings, progress)
-        options = fresh(candidates(out.model), out.model, refused)
+        offered = candidates(out.model)
+        options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
         out.skipped |= round_.skipped
         room = settings.max_causes - len(out.model.free)
@@ -108,7 +109,7 @@ def search(
             break
         _take_in(fitter, out, taken, progress)
         refused |= _drop_idle(fitter, out, settings)
-        refused |= _merge(fitter, out, settings, candidates)
+        refused |= _merge(fitter, out, settings, offered)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
     return out
@@ -262,21 +263,15 @@ def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[st
 
 
 def _merge(
-    fitter: ModelFitter,
-    state: Search,
-    settings: Settings,
-    candidates: Callable[[Evidence], list[FreeEffect]],
+    fitter: ModelFitter, state: Search, settings: Settings, options: Sequence[FreeEffect]
 ) -> set[str]:
     """Put one effect in the place of several that it does as well as; return their labels."""
     gone: set[str] = set()
-    while several_together(state.model):
-        options = candidates(state.model)
-        found = one_for_several(fitter, state.model, options, state.floor, state.layout, settings)
-        if found is None:
-            break
+    while found := one_for_several(
+        fitter, state.model, options, state.floor, state.layout, settings
+    ):
         evidence = found[0].trial.evidence
-        kept = {f.effect.label for f in evidence.free}
-        gone |= {f.effect.label for f in state.model.free} - kept
+        gone |= {f.effect.label for f in state.model.free} - {e.label for e in evidence.effects}
         state.model = settled(fitter, evidence.free, evidence)
         state.rounds.append(Round((found[1],), (found,)))
     return gone
