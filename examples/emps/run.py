@@ -99,9 +99,9 @@ def story(
         xlabel="time [s]",
         ylabel="force [N]",
         title="A run it has not seen (with 5 V pulses)",
-        ylim=(-230, 290),
+        ylim=(-230, 310),
     )
-    right.legend(loc="upper center", fontsize=8, ncols=3, handlelength=1.5, columnspacing=1.2)
+    right.legend(loc="upper center", fontsize=8, ncols=2, handlelength=1.5, columnspacing=1.2)
     return figure
 
 
