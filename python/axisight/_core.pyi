@@ -313,6 +313,8 @@ class Robot:
 
         An effect given to a call takes the place of an own one of the same name and place.
         """
+    def with_controller_speed(self, factor: float) -> Robot:
+        """Return the same robot with a controller for a loop so many times as fast as stated."""
     def with_effects(self, effects: _Effects) -> Robot:
         """Return the same robot with other effects of its own; raises InputError."""
     @property
@@ -380,6 +382,8 @@ def status_advice() -> list[tuple[str, str]]:
 class Column:
     """A column of a Jacobian, kept where it was computed for other fits to use."""
 
+    def part(self, rows: list[tuple[int, int]]) -> Column:
+        """Return ranges of rows (first, behind the last) as a column; raises InputError."""
     @property
     def values(self) -> _Array:
         """A copy, (n_residuals,)."""

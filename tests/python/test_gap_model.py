@@ -1,6 +1,7 @@
 """Models under trial: many candidates in one evaluation, models near runs, groups, best starts."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,9 @@ from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
-from axisight.gap.layout import layout_of
+from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, Linearized
-from axisight.gap.trials import Trials
+from axisight.gap.screening import Bench, Screen, loudest_logs
 from gap_data import bare_axis, linear_evidence, logs_of, scattered
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -192,10 +193,8 @@ class Valley:
         return self.curve(value)
 
 
-def trials(model: Evidence, fitter: object = None) -> Trials:
-    fitter = fitter or Valley(float)
-    none = np.zeros(len(model.loss))
-    return Trials(fitter, model, none, layout_of(model), Settings(), lambda *_: None)  # type: ignore[arg-type]
+def screen(model: Evidence, fitter: object = None) -> Screen:
+    return Screen(Bench(fitter or Valley(float), model))  # type: ignore[arg-type]
 
 
 def candidate(name: str, n_free: int, *, acts: bool = False, axis: int = 1) -> FreeEffect:
@@ -219,7 +218,7 @@ def test_candidates_share_evaluations_of_no_more_parameters_than_the_core_takes(
         candidate("input_delay", 1),
         candidate("load_dependent_friction", 2, axis=2),
     ]
-    groups = trials(evidence())._groups(options)
+    groups = screen(evidence()).groups(options)
     assert sorted(o.effect.label for g in groups for o in g) == sorted(
         o.effect.label for o in options
     )
@@ -236,7 +235,7 @@ def test_what_takes_the_place_of_an_effect_is_evaluated_alone():
     # Stribeck friction contains the Coulomb friction of the model; on another axis it does not.
     here, there = candidate("stribeck_friction", 2), candidate("stribeck_friction", 2, axis=2)
     others = [candidate("torque_offset", 1), candidate("input_delay", 1)]
-    groups = trials(evidence(FRICTION))._groups([here, there, *others])
+    groups = screen(evidence(FRICTION)).groups([here, there, *others])
     assert [[o.effect.label for o in g] for g in groups] == [
         ["stribeck_friction@1"],
         ["stribeck_friction@2", "torque_offset@1", "input_delay@1"],
@@ -257,7 +256,7 @@ def test_the_bottom_of_a_valley_narrower_than_the_steps_between_starts_is_found(
     model = evidence()
     # Starts lie a factor of 1.5 apart; the valley falls to half its depth within a fifth.
     fitter = Valley(lambda v: 2 * model.total * (1 - np.exp(-((v / true - 1) ** 2) / 0.06)))
-    option, gain = trials(model, fitter)._best_of_starts(play(STARTS[::-1]))
+    option, gain = screen(model, fitter).best_of_starts(play(STARTS[::-1]))
     found = (option.effect.parameters or {})["half_width_rad"]
     # The scan stops within 0.003 of the value; the loss there is 2e-4 of the depth.
     assert found == pytest.approx(true, rel=0.01)
@@ -268,7 +267,7 @@ def test_the_bottom_of_a_valley_narrower_than_the_steps_between_starts_is_found(
 def test_where_no_start_is_better_none_is_looked_at_closer():
     model = evidence()
     fitter = Valley(lambda v: model.total * (1 + v))
-    option, gain = trials(model, fitter)._best_of_starts(play())
+    option, gain = screen(model, fitter).best_of_starts(play())
     assert (option.effect.parameters or {})["half_width_rad"] == STARTS[0]
     assert gain == pytest.approx(-model.total * STARTS[0])
     assert fitter.asked == list(STARTS)
@@ -277,16 +276,77 @@ def test_where_no_start_is_better_none_is_looked_at_closer():
 def test_starts_that_cannot_be_simulated_are_passed_over():
     model, true = evidence(), 5e-5
     fitter = Valley(lambda v: model.total * (v / true - 1) ** 2, fails=3e-4)
-    round_ = trials(model, fitter)
-    option, gain = round_._best_of_starts(play())
+    screened = screen(model, fitter)
+    option, gain = screened.best_of_starts(play())
     assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
     assert gain == pytest.approx(model.total, rel=1e-3)
-    assert round_.skipped == {"backlash@1": "the simulation failed"}
+    assert screened.bench.skipped == {"backlash@1": "the simulation failed"}
 
 
 def test_a_single_start_is_a_start():
     model = evidence()
     fitter = Valley(lambda v: model.total * (v / 1e-4 - 1) ** 2)
-    option, gain = trials(model, fitter)._best_of_starts(play([1.2e-4]))
+    option, gain = screen(model, fitter).best_of_starts(play([1.2e-4]))
     assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(1.2e-4)
     assert gain == pytest.approx(0.96 * model.total)
+
+
+def test_part_of_the_logs_is_what_they_are_alone(view: ClosedLoopView, fitter: ClosedLoopFitter):
+    start = model(fitter, FRICTION)
+    kept = start.part([1])
+    alone = fitter.part([1])
+    # The same columns are warm, so that both see the same sensitivities.
+    found = alone.evaluate(kept.free, kept)
+    np.testing.assert_allclose(found.loss, kept.loss, rtol=1e-9)
+    assert kept.total == pytest.approx(start.loss[start.log == 1].sum())
+    np.testing.assert_array_equal(
+        kept.residual[: kept.size[0]], start.residual[-kept.size.sum() :][: kept.size[0]]
+    )
+    option = idle(view, start)[0]
+    of_all = fitter.evaluate([*start.free, option], start)
+    of_part = alone.evaluate([*kept.free, option], kept)
+    np.testing.assert_allclose(
+        of_part.gradient, of_all.gradient[start.log == 1], rtol=1e-8, atol=1e-8
+    )
+
+
+def test_the_screen_takes_the_logs_with_most_to_explain_on_every_axis():
+    n_logs, n_axes = 6, 2
+    log, axis = (x.ravel() for x in np.meshgrid(range(n_logs), range(n_axes), indexing="ij"))
+    size = np.ones(len(log), dtype=np.int64)
+    layout = Layout(axis, log, log, size)
+    above = np.zeros(len(log))
+    # Axis 1 errs a thousand times as much as axis 2, which has its error in the last log alone.
+    above[axis == 0] = [1e3, 2e3, 3e3, 4e3, 5e3, 0.0]
+    above[(axis == 1) & (log == 5)] = 1.0
+    # Half of six logs is three; four cost as much.
+    assert loudest_logs(above, layout) == [2, 3, 4, 5]
+    few = log < 4
+    layout = Layout(axis[few], log[few], log[few], size[few])
+    assert loudest_logs(above[few], layout) == [0, 1, 2, 3]
+
+
+def turns_of(losses: Sequence[float]) -> int:
+    """How often a curve turns between falling and rising."""
+    slope = np.sign(np.diff(losses))
+    return int(np.sum(slope[1:] != slope[:-1]))
+
+
+def test_the_loss_over_the_width_of_a_play_is_smooth():
+    true = 5e-4
+    play_of_machine = Effect("backlash", 1, {"half_width_rad": true})
+    logs = logs_of(scattered(bare_axis(), 4), [play_of_machine], PLAN, seconds=4.0)
+    view = ClosedLoopView(bare_axis(), logs, Settings())
+    tight = copy(view.fitter)
+    tight.robot = view.robot
+    widths = true * np.linspace(0.9, 1.1, 41)
+
+    def losses(fitter: ClosedLoopFitter) -> list[float]:
+        start = fitter.fit([], max_iterations=0)
+        return [fitter.loss([play().at({"half_width_rad": float(w)})], start) for w in widths]
+
+    found = losses(view.fitter)
+    # The simulator's own parameters are one per cent off.
+    assert widths[int(np.argmin(found))] == pytest.approx(true, rel=0.01)
+    # A loop as fast as the machine's goes up and down.
+    assert turns_of(found) < turns_of(losses(tight)) / 4

@@ -1,6 +1,7 @@
 """Results written into robot files: the robot is that of the result, covariance carried along."""
 
 import dataclasses
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -502,3 +503,21 @@ def test_standard_errors_of_a_rotation_vector_against_finite_differences() -> No
     np.testing.assert_allclose([g["value"] for g in got], vector(theta), rtol=1e-12)
     # Differences of h: errors of h^2 and of rounding over h.
     np.testing.assert_allclose([g["standard_error"] for g in got], want, rtol=1e-8)
+
+
+@pytest.mark.parametrize("preset", ["two_mass_axis", "irb6600_like"])
+def test_a_controller_for_a_slower_loop_has_its_stiffness_by_the_square(preset: str):
+    robot = load_robot(preset)
+    slow = robot.with_controller_speed(0.5)
+    # Twice as slow once more is from what the description states, not from what it is now.
+    for other in (slow, slow.with_controller_speed(0.5), pickle.loads(pickle.dumps(slow))):
+        for name, power in (("kp", 1), ("ki", 2), ("kv", 1)):
+            if name in robot.controller_gains:
+                stated = robot.controller_gains[name]
+                np.testing.assert_array_equal(other.controller_gains[name], 0.5**power * stated)
+    assert slow.parameters() == robot.parameters()
+    assert slow.with_controller_speed(1.0).controller_gains["kp"] == pytest.approx(
+        robot.controller_gains["kp"], rel=0
+    )
+    with pytest.raises(InputError, match="factor: expected a positive number, got 0"):
+        robot.with_controller_speed(0.0)

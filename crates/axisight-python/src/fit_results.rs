@@ -1,6 +1,7 @@
 //! What fits hand back.
 
 use crate::convert::{array1, array2, array3};
+use crate::entry::input_error;
 use axisight_identification::logs::{BlockGram, Column as Shared, Fit, Linearization as Point};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -21,6 +22,23 @@ impl Column {
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.shared.to_vec())
+    }
+
+    /// Ranges of rows, as a column.
+    fn part(&self, rows: Vec<(usize, usize)>) -> PyResult<Self> {
+        let mut kept = Vec::with_capacity(rows.iter().map(|(a, b)| b.saturating_sub(*a)).sum());
+        for (first, last) in rows {
+            let range = self.shared.get(first..last).ok_or_else(|| {
+                input_error(format!(
+                    "rows: expected ranges within {}, got {first}..{last}",
+                    self.shared.len()
+                ))
+            })?;
+            kept.extend_from_slice(range);
+        }
+        Ok(Self {
+            shared: Shared::new(kept),
+        })
     }
 }
 

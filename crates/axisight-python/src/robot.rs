@@ -22,10 +22,12 @@ pub struct Robot {
     body: RigidBody,
     source: String,
     changes: Vec<(String, f64)>,
+    controller_speed: f64,
 }
 
-/// What pickle keeps of a robot: its text, the changes made to it, its effects.
-type Kept = (String, Vec<(String, f64)>, Vec<EffectTuple>);
+/// What pickle keeps of a robot: its text, the changes made to it, the speed of its controller,
+/// its effects.
+type Kept = (String, Vec<(String, f64)>, f64, Vec<EffectTuple>);
 
 type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
 type Matrix3<'py> = Bound<'py, PyArray3<f64>>;
@@ -103,6 +105,7 @@ impl Robot {
             body,
             source: text,
             changes: Vec::new(),
+            controller_speed: 1.0,
         })
     }
 
@@ -118,6 +121,26 @@ impl Robot {
             description,
             source: self.source.clone(),
             changes: [&self.changes[..], &values[..]].concat(),
+            controller_speed: self.controller_speed,
+        })
+    }
+
+    /// The same robot with a controller for a loop `factor` times as fast as the stated one's.
+    fn with_controller_speed(&self, factor: f64) -> PyResult<Self> {
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(input_error(format!(
+                "factor: expected a positive number, got {factor}"
+            )));
+        }
+        let stated = read_robot(&self.source).map_err(input_error)?;
+        let mut description = self.description.clone();
+        description.controller = stated.controller.at_speed(factor);
+        Ok(Self {
+            body: self.body.clone(),
+            description,
+            source: self.source.clone(),
+            changes: self.changes.clone(),
+            controller_speed: factor,
         })
     }
 
@@ -137,6 +160,7 @@ impl Robot {
             description,
             source: self.source.clone(),
             changes: self.changes.clone(),
+            controller_speed: self.controller_speed,
         })
     }
 
@@ -151,17 +175,24 @@ impl Robot {
     fn _restore(
         text: String,
         changes: Vec<(String, f64)>,
+        controller_speed: f64,
         effects: Vec<EffectTuple>,
     ) -> PyResult<Self> {
         Self::from_toml(text)?
             .with_parameters(changes)?
+            .with_controller_speed(controller_speed)?
             .with_effects(effects)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
         let maker = slf.get_type().getattr("_restore")?;
         let robot = slf.get();
-        let kept = (robot.source.clone(), robot.changes.clone(), robot.effects());
+        let kept = (
+            robot.source.clone(),
+            robot.changes.clone(),
+            robot.controller_speed,
+            robot.effects(),
+        );
         Ok((maker, kept))
     }
 

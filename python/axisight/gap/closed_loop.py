@@ -12,8 +12,7 @@ from axisight.effects import Effect, EffectTuple, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
-from axisight.frf.errors import reference_to_input
-from axisight.gap.feedback import controller_response
+from axisight.gap.feedback import loop_responses
 from axisight.gap.limits import reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
@@ -27,6 +26,13 @@ from axisight.simulation import simulate_batch, white_noise
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+
+# Speed of the loop that keeps a simulator on a log, relative to the machine's own. Any loop will do
+# where all is linear: weights undo its response. But with lost motion or stiction in the model a
+# tight one chatters: widths of a play two thousandths apart differ by a third in loss, where a
+# loop of a third of the speed leaves one smooth valley. Slower still, the simulator strays from
+# the log by more than waves of a ripple are long.
+TRACKING_SPEED = 1 / 3
 
 # Robot, effects, parameters, records and weights, as the core takes them.
 _Problem = tuple[
@@ -42,11 +48,13 @@ class ClosedLoopView(View):
     """Simulator and machine driven by the same references."""
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        floor = closed_loop_floor(robot, logs, settings)
+        self.tracking = robot.with_controller_speed(TRACKING_SPEED)
+        floor = tracking_floor(self.tracking, robot, logs, settings)
         limits = torque_limits(robot, logs)
         # A torque reported after the limit is what the motor got: it needs no limit once more.
         after = {limit.effect.label for limit in limits}
-        kept_on_log = robot.with_effects([e for e in robot.effects if e.label not in after])
+        own = [e for e in robot.effects if e.label not in after]
+        kept_on_log = self.tracking.with_effects(own)
         data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
         fitter = ClosedLoopFitter(
             kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
@@ -69,11 +77,7 @@ class ClosedLoopView(View):
         """Return the responses to errors of sensors and to torques (n_freq, n_axes, n_axes)."""
         key = (len(frequency_hz), float(frequency_hz[-1]))
         if key not in self._loops:
-            # At zero frequency machine and controller are infinite.
-            f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
-            machine = self.robot.zoh_response(f).values
-            out = reference_to_input(machine, controller_response(self.robot, f))
-            self._loops[key] = out, out @ machine
+            self._loops[key] = loop_responses(self.tracking, frequency_hz)
         return self._loops[key]
 
     def measured(self, log: Log) -> Array:
@@ -108,7 +112,8 @@ class ClosedLoopFitter(ModelFitter):
 
     In a linear loop this is the torque by which a run driven by the references
     would be off; in a nonlinear one the simulator also stays in phase with the
-    log, without which lost motion and stiction have no smooth error to fit.
+    log, without which lost motion and stiction have no smooth error to fit. The controller is
+    that of ``robot``, which need not be the machine's.
     ``records``: (position [rad], torque [Nm]) of each log, (n, n_axes).
     """
 
@@ -122,6 +127,9 @@ class ClosedLoopFitter(ModelFitter):
     ) -> None:
         super().__init__(robot, weighting, tolerances, block_s)
         self.records = records
+
+    def _keep(self, logs: Sequence[int]) -> None:
+        self.records = [self.records[i] for i in logs]
 
     def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:
         """Return the problem as the core takes it."""
@@ -224,16 +232,22 @@ def _reference(log: Log) -> Array:
     return log.velocity_ref_rad_s
 
 
-def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floor:
-    """Return the floor of closed-loop logs, by simulating the loop with and without noise."""
-    nominal = robot.position_noise_std
+def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Settings) -> Floor:
+    """Return the floor of the feedback that keeps a simulator on logs, and the weights it implies.
+
+    ``tracking`` has the controller that keeps it there, ``own`` the machine's. Noise is simulated
+    in the loop. Errors of formulas are a share of the torque as the machine's own controller would
+    command it: they pass the loop as any torque on the motor does.
+    """
+    nominal = own.position_noise_std
     std = np.maximum(position_noise_std(logs), nominal)
     log = logs[0]
-    (noise,) = noise_torques(robot, [log], std, settings.seed)
+    (noise,) = noise_torques(tracking, [log], std, settings.seed)
     rate, segment = 1.0 / log.sample_time_s, segment_of(log)
     f, noise_density = torque_density(noise, rate, segment)
     torque = np.mean([torque_density(x.torque_nm, rate, segment)[1] for x in logs], axis=0)
-    total = noise_density + settings.model_error**2 * torque
+    passed = _passed(tracking, f) / _passed(own, f)
+    total = noise_density + settings.model_error**2 * torque * passed**2
     # A noise-free simulated log still needs a finite weight.
     total = np.maximum(total, 1e-12 * torque.max())
     decimation = max(1, int(rate / (2 * settings.bandwidth_hz)))
@@ -241,6 +255,12 @@ def closed_loop_floor(robot: Robot, logs: list[Log], settings: Settings) -> Floo
     band = f <= rate / (2 * decimation)
     expected = np.mean((noise_density / total)[:, band], axis=1)
     return Floor(std, f, noise_density, weighting, expected)
+
+
+def _passed(robot: Robot, frequency_hz: Array) -> Array:
+    """Return the share of a torque on the motor that the loop answers with (n_axes, n_freq)."""
+    _, from_torque = loop_responses(robot, frequency_hz)
+    return np.asarray(np.abs(np.einsum("fii->if", from_torque)))
 
 
 def noise_torques(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.frf.errors import reference_to_input
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -40,3 +41,15 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
     summed = ki * time * back / (1 - back)
     out = (out + gains["kv"]) * (kp + summed) if cascade else kp * out + ki
     return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
+
+
+def loop_responses(robot: Robot, frequency_hz: Array) -> tuple[Complex, Complex]:
+    """Return how the controller answers errors of sensors and torques on the motors.
+
+    ``F (I + G F)^-1`` [Nm/rad] and ``F (I + G F)^-1 G`` [1], each (n_freq, n_axes, n_axes). Zero
+    frequency, where machine and controller are infinite, is taken as the first above it.
+    """
+    f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
+    machine = robot.zoh_response(f).values
+    from_angle = reference_to_input(machine, controller_response(robot, f))
+    return from_angle, from_angle @ machine

@@ -108,6 +108,9 @@ class InverseDynamicsFitter(ModelFitter):
         super().__init__(robot, weighting, tolerances, block_s)
         self.motions = list(motions)
 
+    def _keep(self, logs: Sequence[int]) -> None:
+        self.motions = [self.motions[i] for i in logs]
+
     def takes_part(self, name: str) -> bool:
         """Springs and their damping do not show in a rigid prediction."""
         quantity = name.rsplit(".", 1)[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -123,6 +124,24 @@ class Evidence(Linearized):
     columns: dict[tuple[str | None, str], _core.Column]
     fresh: bool = False
 
+    def part(self, logs: Sequence[int]) -> Evidence:
+        """Return the same of some logs, by their numbers; what was fitted stays."""
+        kept = np.isin(self.log, logs)
+        first, size = self.start[kept], self.size[kept]
+        rows = list(zip(first.tolist(), (first + size).tolist(), strict=True))
+        return replace(
+            self,
+            matrix=self.matrix[kept],
+            gradient=self.gradient[kept],
+            loss=self.loss[kept],
+            log=self.log[kept],
+            axis=self.axis[kept],
+            start=np.cumsum(size) - size,
+            size=size,
+            residual=np.concatenate([self.residual[a:b] for a, b in rows]),
+            columns={key: column.part(rows) for key, column in self.columns.items()},
+        )
+
     @property
     def converged(self) -> bool:
         """Whether the fit ended where no step lowers the loss further."""
@@ -203,6 +222,16 @@ class ModelFitter(ABC):
         near: _core.Courses | None,
     ) -> _core.Linearization:
         """Evaluate the model in the core, at the initial values."""
+
+    def part(self, logs: Sequence[int]) -> ModelFitter:
+        """Return the same for some of the logs, by their numbers; one is cancelled with the other."""
+        other = copy(self)
+        other._keep(logs)
+        return other
+
+    @abstractmethod
+    def _keep(self, logs: Sequence[int]) -> None:
+        """Keep only some of the logs, by their numbers."""
 
     def runs(
         self, model: Evidence, robot_values: Mapping[str, float] | None = None

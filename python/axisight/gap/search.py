@@ -17,8 +17,9 @@ from axisight.gap.layout import Layout, layout_of
 from axisight.gap.merged import one_for_several
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
+from axisight.gap.screening import kept_beside
 from axisight.gap.settings import Settings
-from axisight.gap.trials import Progress, Trials, fresh, interact, kept_beside, settled
+from axisight.gap.trials import Progress, Trials, fresh, interact, settled
 
 Array = NDArray[np.float64]
 
@@ -100,10 +101,12 @@ def search(
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
+        standings, taken = _judged(round_, trials, out, settings, len(options))
+        if not taken and round_.waiting:
+            # What they waited for is no cause.
+            trials = round_.refined([*trials, *round_.run_waiting(number)], number)
+            standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
-        room = settings.max_causes - len(out.model.free)
-        standings = tuple(round_.standings(trials))
-        taken = _taken(round_, trials, standings, out, settings, len(options), room)
         out.rounds.append(Round(standings, taken))
         if not taken:
             break
@@ -115,6 +118,16 @@ def search(
     return out
 
 
+def _judged(
+    round_: Trials, trials: Sequence[Trial], state: Search, settings: Settings, tried: int
+) -> tuple[tuple[Standing, ...], tuple[tuple[Ranked, Standing], ...]]:
+    """Return how the trials stand on every axis, and what is taken in, as room permits."""
+    standings = tuple(round_.standings(trials))
+    taken = _taken(round_, trials, standings, state, settings, tried)
+    room = settings.max_causes - len(state.model.free)
+    return standings, taken[: max(room, 0)]
+
+
 def _taken(
     round_: Trials,
     trials: Sequence[Trial],
@@ -122,7 +135,6 @@ def _taken(
     state: Search,
     settings: Settings,
     tried: int,
-    room: int,
 ) -> tuple[tuple[Ranked, Standing], ...]:
     """Return the winners of all axes that are causes and do not feel one another."""
     fall = falls(trials, round_.current, state.layout)
@@ -149,7 +161,7 @@ def _taken(
             found += _named_simply(led, round_.fitter, state)
     if not found and round_.fitter.adds_up:
         found = _pairs(round_, trials, state, settings, tried)
-    return tuple(found[: max(room, 0)])
+    return tuple(found)
 
 
 def _named_simply(

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
-from axisight._core import Courses
 from axisight.effects import effect_info
-from axisight.errors import InputError
-from axisight.gap.decide import Standing, Trial, stand, trial
+from axisight.gap.decide import Standing, Trial, falls, stand, trial
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
-from axisight.gap.score import held_out_loss, linear_gain
+from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.score import held_out_loss
+from axisight.gap.screening import Bench, Start, thinned
 from axisight.gap.settings import Settings
 
 Array = NDArray[np.float64]
@@ -27,8 +24,6 @@ Progress = Callable[[str, int, int], None]
 A = TypeVar("A")
 B = TypeVar("B")
 
-# Parameters of candidates that are screened together: the core takes so many derivatives at once.
-_TOGETHER = 4
 # Candidates of a place fitted in full: the best of the screen, and all that come near them.
 _FITTED = 4
 _NEAR = 0.3
@@ -36,21 +31,15 @@ _NEAR = 0.3
 _HOPELESS = 0.3
 # Candidates fitted where none is worth it.
 _LOOKED_AT = 3
+# Share of what is left on an axis that one fitted elsewhere explains: what is tried there waits.
+_MOST = 0.5
 # Leaders of an axis that are refined, unless the first already explains nearly everything.
 _REFINED = 2
 _GOOD_ENOUGH = 0.95
 # Steps of the fit of a candidate; leaders go on from there.
 _STEPS = 8
-# Evaluations between two starts of an effect.
-_SCANS = 10
 # Share of a gain that another candidate may have on the same axis and not count as felt.
 _FELT = 0.2
-
-
-def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]:
-    """Return the effects of a model without those that a new one contains at the same place."""
-    contains = effect_info(new.effect.name).contains
-    return [f for f in free if f.effect.name not in contains or f.effect.axis != new.effect.axis]
 
 
 def fresh(options: Sequence[FreeEffect], model: Evidence, refused: set[str]) -> list[FreeEffect]:
@@ -77,15 +66,6 @@ def settled(
     return fitter.fit(start.free, start, fresh=True, max_iterations=max_iterations)
 
 
-@dataclass(frozen=True)
-class _Start:
-    """Where the fit of a candidate begins, and the gain it promises."""
-
-    option: FreeEffect
-    robot_values: Mapping[str, float]
-    gain: float
-
-
 class Trials:
     """Candidates on top of one model. Failures are kept in ``skipped`` with their reason."""
 
@@ -101,28 +81,82 @@ class Trials:
         self.fitter, self.model, self.floor = fitter, model, floor
         self.layout, self.settings, self.progress = layout, settings, progress
         self.current = held_out_loss(model)
-        self.near = fitter.runs(model)
-        self.near_nominal: Courses | None = None
-        self.skipped: dict[str, str] = {}
+        self.bench = Bench(fitter, model)
+        self.waiting: list[Start] = []
+
+    @property
+    def skipped(self) -> dict[str, str]:
+        """Candidates that failed, with the reason."""
+        return self.bench.skipped
 
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
         """Screen all candidates by one linear step, fit the promising ones in full."""
+        chosen = self._promising(self._screened(options, number))
+        if any(self._bends(start) for start in chosen):
+            self.bench.begin_nominal()
+        with self._threads() as pool:
+            return self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
+
+    def _screened(self, options: Sequence[FreeEffect], number: int) -> list[Start]:
+        screen = thinned(self.fitter, self.model, self.current - self.floor, self.layout)
         if any(option.starts and len(option.free) == 1 for option in options):
-            self.near_nominal = self.fitter.runs(self.model, {})
+            screen.bench.begin_nominal()
+        label = f"screening candidates, round {number}"
+        with self._threads() as pool:
+            screened = self._each(pool, screen.starts, screen.groups(options), label)
+        self.skipped.update(screen.bench.skipped)
+        return [start for group in screened for start in group]
+
+    def run_waiting(self, number: int) -> list[Trial]:
+        """Fit the candidates that were left to the next round."""
+        chosen, self.waiting = self.waiting, []
+        label = f"fitting further candidates, round {number}"
+        with self._threads() as pool:
+            fitted = self._each(pool, self._fitted, chosen, label)
+        return [t for t in fitted if t is not None]
+
+    @contextmanager
+    def _threads(self) -> Iterator[ThreadPoolExecutor]:
+        """Yield threads; what they do is cancelled where the caller is interrupted."""
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
-                label = f"screening candidates, round {number}"
-                groups = self._groups(options)
-                screened = self._each(pool, self._screened, groups, label)
-                starts = [start for group in screened for start in group]
-                chosen = [starts[i] for i in self._promising(starts)]
-                label = f"fitting candidates, round {number}"
-                fitted = self._each(pool, self._fitted, chosen, label)
+                yield pool
             except BaseException:
                 self.fitter.cancel.cancel()
                 pool.shutdown(wait=True, cancel_futures=True)
                 raise
-        return [t for t in fitted if t is not None]
+
+    def _fitted_by_place(
+        self, pool: ThreadPoolExecutor, chosen: Sequence[Start], label: str
+    ) -> list[Trial]:
+        """Fit the chosen, place after place, the most promising first.
+
+        Where one found before explains most of what is left on an axis, what is tried there would
+        be felt by it and have to wait for the next round: it goes to ``waiting``.
+        """
+        left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
+        promise: dict[int | None, float] = {}
+        for start in chosen:
+            place = start.option.effect.axis
+            promise[place] = max(promise.get(place, -np.inf), start.gain)
+        found: list[Trial] = []
+        done = 0
+        axes = sorted((p for p in promise if p is not None), key=lambda p: -promise[p])
+        # The arm's own effects are felt on every axis.
+        turns: list[tuple[int | None, ...]] = [(None, *axes[:1])]
+        turns += [(axis,) for axis in axes[1:]]
+        for places in turns:
+            here = [s for s in chosen if s.option.effect.axis in places]
+            explained = (falls(found, self.current, self.layout) / left).max(axis=0, initial=0.0)
+            if all(p is not None and explained[p - 1] > _MOST for p in places):
+                self.waiting += here
+            else:
+                for k, fitted in enumerate(pool.map(self._fitted, here)):
+                    self.progress(label, done + k, len(chosen))
+                    found += [] if fitted is None else [fitted]
+            done += len(here)
+        self.progress(label, done, len(chosen))
+        return found
 
     def standings(self, trials: Sequence[Trial]) -> list[Standing]:
         """Return how the trials stand on each axis that one of them improves."""
@@ -168,125 +202,35 @@ class Trials:
                     out.append(r.trial)
         return out
 
-    def _attempt(
-        self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None
-    ) -> A | None:
-        effects = [*kept_beside(self.model.free, option), option]
-        # Runs serve where the simulator's own parameters are those of the runs, or near them.
-        near = (
-            self.near if values is None or values == self.model.robot_values else self.near_nominal
-        )
-        try:
-            return solve(effects, self.model, robot_values=values, near=near)
-        except InputError as error:
-            # A candidate that cannot be simulated is out, and the result says so.
-            self.skipped[option.effect.label] = str(error)
-            return None
-
-    def _groups(self, options: Sequence[FreeEffect]) -> list[list[FreeEffect]]:
-        """Return the candidates by evaluation: those that do nothing as they are share one."""
-        alone: list[FreeEffect] = []
-        together: list[FreeEffect] = []
-        for option in options:
-            beside = kept_beside(self.model.free, option)
-            idle = not option.effect.acts and len(beside) == len(self.model.free)
-            (together if idle and len(option.free) <= _TOGETHER else alone).append(option)
-        groups: list[list[FreeEffect]] = []
-        for option in sorted(together, key=lambda o: -len(o.free)):
-            room = (g for g in groups if _size(g) + len(option.free) <= _TOGETHER)
-            group = next(room, None)
-            if group is None:
-                groups.append([option])
-            else:
-                group.append(option)
-        return [[option] for option in alone] + groups
-
-    def _screened(self, group: list[FreeEffect]) -> list[_Start]:
-        """Return where fits of the candidates would begin, and what they promise."""
-        found: Sequence[Linearized | None] = []
-        if len(group) > 1:
-            # One that cannot be simulated leaves all to be tried alone.
-            with suppress(InputError):
-                found = self.fitter.evaluate_each(group, self.model, self.near)
-        found = found or [self._attempt(self.fitter.evaluate, o, None) for o in group]
-        return [self._best_start(o, e) for o, e in zip(group, found, strict=True)]
-
-    def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> _Start:
-        best = _Start(option, self.model.robot_values, -np.inf)
-        if evidence is not None:
-            best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
-        if len(option.free) > 1:
-            # Further starts of one that does nothing as it is: by what a step from there promises.
-            # Only sizes: where it has none, its shape shows nothing.
-            sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
-            for begin in (option.at(values) for values in option.starts):
-                at = sizes.at(begin.effect.parameters or {})
-                other = self._attempt(self.fitter.evaluate, at, None)
-                gain = -np.inf if other is None else linear_gain(other)
-                if gain > best.gain:
-                    best = replace(best, option=begin, gain=gain)
-        elif option.starts:
-            begin, gain = self._best_of_starts(option)
-            if gain > best.gain:
-                best = _Start(begin, {}, gain)
-        return best
-
-    def _best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
-        """Return the candidate at the best of its own starts, and what it gains there.
-
-        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted.
-        """
-        name = option.free[0]
-
-        def loss(value: float) -> float:
-            found = self._attempt(self.fitter.loss, option.at({name: value}), {})
-            return np.inf if found is None else found
-
-        values = sorted(s[name] for s in option.starts)
-        losses = [loss(v) for v in values]
-        at = int(np.argmin(losses))
-        least, value = losses[at], values[at]
-        if least < self.model.total:
-            # The valley is narrower than the steps between starts.
-            between = (values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)])
-            finer = minimize_scalar(
-                loss,
-                bounds=between,
-                method="bounded",
-                options={"maxiter": _SCANS, "xatol": 0.003 * value},
-            )
-            if finer.fun < least:
-                least, value = float(finer.fun), float(finer.x)
-        return option.at({name: value}), self.model.total - least
-
-    def _fitted(self, start: _Start) -> Trial | None:
-        # One that bends the simulator has sensitivities of its own.
-        bends = start.robot_values is not self.model.robot_values
-        solve = partial(self.fitter.fit, lazy=not bends, max_iterations=_STEPS)
-        evidence = self._attempt(solve, start.option, start.robot_values)
+    def _fitted(self, start: Start) -> Trial | None:
+        solve = partial(self.fitter.fit, lazy=not self._bends(start), max_iterations=_STEPS)
+        evidence = self.bench.attempt(solve, start.option, start.robot_values)
         return None if evidence is None else trial(start.option, evidence)
 
-    def _promising(self, starts: Sequence[_Start]) -> list[int]:
-        """Return which candidates to fit: at every place the best, where anything is to be gained."""
+    def _bends(self, start: Start) -> bool:
+        """Whether a candidate bends the simulator, and has sensitivities of its own."""
+        return start.robot_values is not self.model.robot_values
+
+    def _promising(self, starts: Sequence[Start]) -> list[Start]:
+        """Return the candidates to fit: at every place the best, where anything is to be gained."""
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
         worth = np.maximum(
             self.settings.smallest_gain * self.layout.samples(), self.settings.smallest_score * left
         )
         places = sorted({s.option.effect.axis or 0 for s in starts})
-        keep: list[int] = []
+        ranked = sorted(starts, key=lambda s: -s.gain)
+        keep: list[Start] = []
         for place in places:
-            mine = [i for i, s in enumerate(starts) if (s.option.effect.axis or 0) == place]
-            mine.sort(key=lambda i: -starts[i].gain)
+            mine = [s for s in ranked if (s.option.effect.axis or 0) == place]
             least = _HOPELESS * (worth[place - 1] if place else worth.min())
-            best = starts[mine[0]].gain
+            near = _NEAR * mine[0].gain
             keep += [
-                i
-                for k, i in enumerate(mine)
-                if starts[i].gain > least
-                and (k < _FITTED or (k < 2 * _FITTED and starts[i].gain > _NEAR * best))
+                s
+                for k, s in enumerate(mine)
+                if s.gain > least and (k < _FITTED or (k < 2 * _FITTED and s.gain > near))
             ]
         # Where nothing is worth a cause, the best of all still say what was looked at.
-        return keep or sorted(range(len(starts)), key=lambda i: -starts[i].gain)[:_LOOKED_AT]
+        return keep or ranked[:_LOOKED_AT]
 
     def _each(
         self, pool: ThreadPoolExecutor, work: Callable[[A], B], items: Sequence[A], label: str
@@ -296,15 +240,6 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
-
-
-def _amplitudes(option: FreeEffect) -> set[str]:
-    info = effect_info(option.effect.name)
-    return {p.name for p in info.parameters if p.role == "amplitude"}
-
-
-def _size(group: Sequence[FreeEffect]) -> int:
-    return sum(len(option.free) for option in group)
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

@@ -159,6 +159,14 @@ class Robot:
         """
         return Robot(self.core.with_parameters(list(values.items())))
 
+    def with_controller_speed(self, factor: float) -> Robot:
+        """Return the same robot with a controller for a loop ``factor`` times as fast as stated.
+
+        ``kp`` and ``kv`` times the factor, ``ki`` times its square: the shape of the loop stays.
+        Raises InputError unless the factor is positive.
+        """
+        return Robot(self.core.with_controller_speed(factor))
+
     def with_effects(self, effects: Iterable[Effect]) -> Robot:
         """Return the same robot with ``effects`` in place of all its own; none switch them off.
 

@@ -95,6 +95,29 @@ pub enum Controller {
     None,
 }
 
+impl Controller {
+    /// The same controller for a loop `factor` times as fast: damping torque with the factor,
+    /// stiffness torque with its square.
+    pub fn at_speed(&self, factor: f64) -> Self {
+        let scaled = |gains: &[f64], by: f64| gains.iter().map(|g| g * by).collect();
+        match self {
+            Self::PiVelocity { kp, ki } => Self::PiVelocity {
+                kp: scaled(kp, factor),
+                ki: scaled(ki, factor * factor),
+            },
+            Self::PVelocity { kp } => Self::PVelocity {
+                kp: scaled(kp, factor),
+            },
+            Self::Cascade { kv, kp, ki } => Self::Cascade {
+                kv: scaled(kv, factor),
+                kp: scaled(kp, factor),
+                ki: scaled(ki, factor * factor),
+            },
+            Self::None => Self::None,
+        }
+    }
+}
+
 /// A serial robot, base to tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {

@@ -1,0 +1,199 @@
+"""The screen: what every candidate promises by one linear step, and where its fit begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from axisight._core import Courses
+from axisight.effects import effect_info
+from axisight.errors import InputError
+from axisight.gap.layout import Layout
+from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
+from axisight.gap.score import linear_gain
+
+Array = NDArray[np.float64]
+A = TypeVar("A")
+
+# Parameters of candidates that are screened together: the core takes so many derivatives at once.
+_TOGETHER = 4
+# Evaluations between two starts of an effect.
+_SCANS = 10
+# Logs that the core runs in lock-step: fewer cost as much.
+_LOCK_STEP = 4
+
+
+def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]:
+    """Return the effects of a model without those that a new one contains at the same place."""
+    contains = effect_info(new.effect.name).contains
+    return [f for f in free if f.effect.name not in contains or f.effect.axis != new.effect.axis]
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the fit of a candidate begins, and the gain it promises."""
+
+    option: FreeEffect
+    robot_values: Mapping[str, float]
+    gain: float
+
+
+class Bench:
+    """A model that candidates are tried on, with its runs, which those close to it follow.
+
+    Candidates that cannot be simulated are out; ``skipped`` has them with the reason.
+    """
+
+    def __init__(self, fitter: ModelFitter, model: Evidence) -> None:
+        self.fitter, self.model = fitter, model
+        self.near = fitter.runs(model)
+        self.near_nominal: Courses | None = None
+        self.skipped: dict[str, str] = {}
+
+    def begin_nominal(self) -> None:
+        """Get ready for candidates that begin at the nominal values of the simulator's own parameters."""
+        self.near_nominal = self.fitter.runs(self.model, {})
+
+    def attempt(
+        self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None
+    ) -> A | None:
+        """Return what ``solve`` of the fitter makes of a candidate; None where it cannot."""
+        effects = [*kept_beside(self.model.free, option), option]
+        # Runs serve where the simulator's own parameters are those of the runs, or near them.
+        near = (
+            self.near if values is None or values == self.model.robot_values else self.near_nominal
+        )
+        try:
+            return solve(effects, self.model, robot_values=values, near=near)
+        except InputError as error:
+            self.skipped[option.effect.label] = str(error)
+            return None
+
+
+class Screen:
+    """The screen of one model. ``scale``: of gains, where the bench has only some of the logs."""
+
+    def __init__(self, bench: Bench, scale: float = 1.0) -> None:
+        self.bench, self.scale = bench, scale
+        self.fitter, self.model = bench.fitter, bench.model
+
+    def groups(self, options: Sequence[FreeEffect]) -> list[list[FreeEffect]]:
+        """Return the candidates by evaluation: those that do nothing as they are share one."""
+        alone: list[FreeEffect] = []
+        together: list[FreeEffect] = []
+        for option in options:
+            beside = kept_beside(self.model.free, option)
+            idle = not option.effect.acts and len(beside) == len(self.model.free)
+            (together if idle and len(option.free) <= _TOGETHER else alone).append(option)
+        groups: list[list[FreeEffect]] = []
+        for option in sorted(together, key=lambda o: -len(o.free)):
+            room = (g for g in groups if _size(g) + len(option.free) <= _TOGETHER)
+            group = next(room, None)
+            if group is None:
+                groups.append([option])
+            else:
+                group.append(option)
+        return [[option] for option in alone] + groups
+
+    def starts(self, group: list[FreeEffect]) -> list[Start]:
+        """Return where fits of the candidates would begin, and what they promise."""
+        found: Sequence[Linearized | None] = []
+        if len(group) > 1:
+            # One that cannot be simulated leaves all to be tried alone.
+            with suppress(InputError):
+                found = self.fitter.evaluate_each(group, self.model, self.bench.near)
+        found = found or [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
+        best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
+        return [replace(start, gain=self.scale * start.gain) for start in best]
+
+    def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
+        best = Start(option, self.model.robot_values, -np.inf)
+        if evidence is not None:
+            best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
+        if len(option.free) > 1:
+            # Further starts of one that does nothing as it is: by what a step from there promises.
+            # Only sizes: where it has none, its shape shows nothing.
+            sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
+            for begin in (option.at(values) for values in option.starts):
+                at = sizes.at(begin.effect.parameters or {})
+                other = self.bench.attempt(self.fitter.evaluate, at, None)
+                gain = -np.inf if other is None else linear_gain(other)
+                if gain > best.gain:
+                    best = replace(best, option=begin, gain=gain)
+        elif option.starts:
+            begin, gain = self.best_of_starts(option)
+            if gain > best.gain:
+                best = Start(begin, {}, gain)
+        return best
+
+    def best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
+        """Return the candidate at the best of its own starts, and what it gains there.
+
+        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted.
+        """
+        name = option.free[0]
+
+        def loss(value: float) -> float:
+            found = self.bench.attempt(self.fitter.loss, option.at({name: value}), {})
+            return np.inf if found is None else found
+
+        values = sorted(s[name] for s in option.starts)
+        losses = [loss(v) for v in values]
+        at = int(np.argmin(losses))
+        least, value = losses[at], values[at]
+        if least < self.model.total:
+            # The valley is narrower than the steps between starts.
+            between = (values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)])
+            finer = minimize_scalar(
+                loss,
+                bounds=between,
+                method="bounded",
+                options={"maxiter": _SCANS, "xatol": 0.003 * value},
+            )
+            if finer.fun < least:
+                least, value = float(finer.fun), float(finer.x)
+        return option.at({name: value}), self.model.total - least
+
+
+def thinned(fitter: ModelFitter, model: Evidence, above: Array, layout: Layout) -> Screen:
+    """Return the screen of a model on the logs that have most to explain.
+
+    ``above`` (n_blocks,): loss above the floor.
+    """
+    logs = loudest_logs(above, layout)
+    kept = np.isin(layout.log, logs)
+    if kept.all():
+        return Screen(Bench(fitter, model))
+    scale = float(above.sum() / max(above[kept].sum(), 1e-300))
+    return Screen(Bench(fitter.part(logs), model.part(logs)), max(scale, 1.0))
+
+
+def loudest_logs(above: Array, layout: Layout) -> list[int]:
+    """Return the logs to screen on: at least half of them, with most of what is to be explained.
+
+    ``above`` (n_blocks,): loss above the floor. Every axis counts alike. As many as run in
+    lock-step at the cost of fewer.
+    """
+    logs = np.unique(layout.log)
+    count = _LOCK_STEP * -(-len(logs) // (2 * _LOCK_STEP))
+    share = np.zeros(len(logs))
+    for axis in range(layout.n_axes):
+        here = [float(above[(layout.axis == axis) & (layout.log == log)].sum()) for log in logs]
+        share += np.maximum(here, 0.0) / max(sum(np.maximum(here, 0.0)), 1e-300)
+    kept = np.argsort(-share, kind="stable")[:count]
+    return sorted(int(log) for log in logs[kept])
+
+
+def _amplitudes(option: FreeEffect) -> set[str]:
+    info = effect_info(option.effect.name)
+    return {p.name for p in info.parameters if p.role == "amplitude"}
+
+
+def _size(group: Sequence[FreeEffect]) -> int:
+    return sum(len(option.free) for option in group)
