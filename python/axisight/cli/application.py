@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from json import dumps
 from pathlib import Path
@@ -30,11 +29,14 @@ from axisight.cli.show import show_diagnosis
 from axisight.cli.simulate import simulate_command
 from axisight.effects import effect_table
 from axisight.errors import InputError
+from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose, verdict_schema
 from axisight.gap.inputs import read_inputs
 from axisight.gap.settings import DEFAULT_TOLERANCES
+from axisight.gap.tolerances import with_tolerances
 from axisight.logs import check_log, render
 from axisight.report import save_report
+from axisight.robot import Robot
 
 app = typer.Typer(
     help="Identify industrial robots, simulate them, and explain the sim-to-real gap.",
@@ -71,8 +73,9 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
         yield report
 
 
-def _tolerances(given: list[str]) -> dict[str, float]:
-    """Return the tolerances given by quantity; raises InputError naming the option."""
+def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
+    """Return the tolerances given by quantity or name; raises InputError naming the option."""
+    own = [n for n in robot_parameters(robot) if n.rsplit(".", 1)[1] in DEFAULT_TOLERANCES]
     changed = {}
     for item in given:
         name, _, value = item.partition("=")
@@ -80,9 +83,10 @@ def _tolerances(given: list[str]) -> dict[str, float]:
             changed[name] = float(value)
         except ValueError:
             raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
-        if name not in DEFAULT_TOLERANCES:
+        if name not in DEFAULT_TOLERANCES and name not in own:
             raise InputError(
-                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, got {name!r}"
+                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, or one of a joint "
+                f"({own[0]}), got {name!r}"
             )
         if not 0 < changed[name] < 1:
             raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
@@ -130,7 +134,6 @@ def diagnose_command(
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     with _errors():
-        given = _tolerances(tolerance or [])
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
@@ -140,7 +143,8 @@ def diagnose_command(
             max_causes=max_causes,
             threads=threads or os.cpu_count() or 1,
         )
-        settings = replace(settings, tolerances={**settings.tolerances_of(inputs.robot), **given})
+        given = _tolerances(tolerance or [], inputs.robot)
+        settings = with_tolerances(settings, inputs.robot, inputs.robot_source, given)
         with _progress() as progress:
             found = diagnose(
                 name=inputs.name,

@@ -16,10 +16,11 @@ from axisight.robot import Robot, load_robot
 
 @dataclass(frozen=True)
 class Inputs:
-    """A simulator, the logs to fit and choose on, and those for the final figures."""
+    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures."""
 
     name: str
     robot: Robot
+    robot_source: Path | str
     estimation: tuple[Log, ...]
     validation: tuple[Log, ...]
 
@@ -96,9 +97,10 @@ def _read(
 ) -> Inputs:
     if len(paths) == 1 and paths[0].is_dir():
         case = read_case(paths[0], columns)
-        robot = load(model if model is not None else case.robot_path)
+        source = model if model is not None else case.robot_path
+        robot = load(source)
         extra = tuple(read_log(p, columns, n_axes=robot.n_axes) for p in validation)
-        return Inputs(case.name, robot, tuple(case.estimation), (*case.validation, *extra))
+        return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         raise InputError(
             "--model: expected a robot.toml or a preset when logs are given, got nothing"
@@ -110,4 +112,4 @@ def _read(
         if len(logs) < 2:
             raise InputError("--validation: expected a log to hold out, or at least two logs")
         held = [logs.pop()]
-    return Inputs(paths[0].stem, robot, tuple(logs), tuple(held))
+    return Inputs(paths[0].stem, robot, model, tuple(logs), tuple(held))

@@ -20,6 +20,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.gap.tolerances import tolerance_of
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -176,9 +177,9 @@ class ModelFitter(ABC):
         self.cancel = _core.CancelToken()
         self.tolerances = tolerances
         self.own = [
-            robot_parameter(robot, name, relative_tolerance=tolerances[quantity])
+            robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
-            if (quantity := name.rsplit(".", 1)[1]) in tolerances
+            if (tolerance := tolerance_of(tolerances, name)) is not None
             # What the simulator leaves out has no tolerance: it would be an effect.
             and value != 0
             and self.takes_part(name)
@@ -189,7 +190,7 @@ class ModelFitter(ABC):
         name = _same_quantity(self.robot, effect)
         if name is None:
             return False
-        tolerance = self.tolerances.get(name.rsplit(".", 1)[1], 0.0)
+        tolerance = tolerance_of(self.tolerances, name) or 0.0
         change = effect.values()[0]
         for own in self.robot.effects:
             if own.label == effect.label:

@@ -28,6 +28,7 @@ from axisight.gap.remainder import parameters_at_edge, refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
+from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
@@ -78,7 +79,8 @@ def diagnose(
     """
     started = time.monotonic()
     chosen = settings or Settings()
-    found_name, machine, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
+    machine, chosen = _with_robot(source, chosen)
     progress("looking at the logs", 0, 1)
     noted = pass_gate(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
@@ -102,7 +104,8 @@ def _inputs(
     robot: Robot | Path | str | None,
     estimation: Sequence[Log],
     validation: Sequence[Log],
-) -> tuple[str, Robot, list[Log], list[Log]]:
+) -> tuple[str, Robot | Path | str, list[Log], list[Log]]:
+    source: Robot | Path | str | None
     if case is not None:
         read = case if isinstance(case, Case) else read_case(Path(case))
         name, source = read.name, robot if robot is not None else read.robot_path
@@ -114,13 +117,22 @@ def _inputs(
         raise InputError(
             "diagnose: expected a case, or a robot with estimation and validation logs"
         )
-    machine = source if isinstance(source, Robot) else load_robot(source)
     if not fit_logs or not held_logs:
         raise CaseError(
             f"{name}: expected at least one estimation and one validation log, "
             f"got {len(fit_logs)} and {len(held_logs)}"
         )
-    return name, machine, fit_logs, held_logs
+    return name, source, fit_logs, held_logs
+
+
+def _with_robot(source: Robot | Path | str, settings: Settings) -> tuple[Robot, Settings]:
+    """Return the simulator and settings with the tolerances that stand beside its file."""
+    if isinstance(source, Robot):
+        return source, settings
+    machine = load_robot(source)
+    if settings.tolerances is not None:
+        return machine, settings
+    return machine, with_tolerances(settings, machine, source)
 
 
 def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:

@@ -13,6 +13,7 @@ from axisight.gap.howfar import Stages
 from axisight.gap.model import Evidence
 from axisight.gap.result import Gap, Remainder
 from axisight.gap.settings import Settings
+from axisight.gap.tolerances import tolerance_of
 from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
 
 # A parameter this many of its tolerances off is one machine in four hundred: rather something
@@ -77,11 +78,11 @@ def parameters_at_edge(
 ) -> tuple[Finding, ...]:
     """Return a finding for each re-fitted parameter three tolerances off, or at its bound.
 
-    ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity.
+    ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity or name.
     """
     out = []
     for name, value in fitted.robot_values.items():
-        tolerance = tolerances[name.rsplit(".", 1)[1]]
+        tolerance = tolerance_of(tolerances, name) or 0.0
         change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
         bound = (None, name) in fitted.at_bound
         if bound or abs(change) >= _EDGE * tolerance:

@@ -31,8 +31,9 @@ class Settings:
     """Settings of a diagnosis.
 
     ``tolerances``: relative standard deviation of the simulator's parameters by
-    quantity; quantities left out are taken as exact. None: those that the robot
-    file states, ``DEFAULT_TOLERANCES`` for others. ``model_error``: error of
+    quantity (``mass``) or name (``axis1.mass``, which comes first); what is left out is
+    taken as exact. None: those that the robot file states, ``DEFAULT_TOLERANCES`` for
+    others, and by name the standard errors of an identification beside the file. ``model_error``: error of
     a perfect diagnosis relative to the torque spectrum (formulas differ from
     nature), part of the weight of residuals. ``bandwidth_hz``: residuals above
     are not used. ``block_s``: length of data blocks for cross-validation and
@@ -66,7 +67,7 @@ class Settings:
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
 
     def tolerances_of(self, robot: Robot) -> Mapping[str, float]:
-        """Return the tolerances of a robot's parameters by quantity."""
+        """Return the tolerances of a robot's parameters by quantity or name."""
         if self.tolerances is not None:
             return self.tolerances
         return {**DEFAULT_TOLERANCES, **robot.tolerances}

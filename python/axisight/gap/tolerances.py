@@ -1,0 +1,68 @@
+"""How far the simulator's own parameters may be off: by quantity, or by name from an identification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from axisight.errors import InputError
+from axisight.fitting import robot_parameters
+from axisight.gap.settings import Settings
+from axisight.robot import Robot
+from axisight.robot_file import load_identified
+from axisight.robot_file.sidecar import sidecar_path
+
+
+def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
+    """Return the relative tolerance [1] of a parameter, its own before that of its quantity.
+
+    None: it is taken as exact.
+    """
+    return tolerances.get(name, tolerances.get(name.rsplit(".", 1)[1]))
+
+
+def with_tolerances(
+    settings: Settings,
+    robot: Robot,
+    robot_file: Path | str,
+    given: Mapping[str, float] = MappingProxyType({}),
+) -> Settings:
+    """Return settings with all tolerances of a robot.
+
+    The defaults, then what its file states, what an identification beside the file says of single
+    parameters, and what is ``given``, each before the one before.
+    """
+    known = identified_tolerances(robot_file, settings.model_error)
+    # One given for a quantity is meant for all parameters of it.
+    known = {n: t for n, t in known.items() if n.rsplit(".", 1)[1] not in given}
+    return replace(settings, tolerances={**settings.tolerances_of(robot), **known, **given})
+
+
+def identified_tolerances(robot_file: Path | str, model_error: float) -> dict[str, float]:
+    """Return relative tolerances by name from the identification beside a robot file.
+
+    Standard errors know of noise and not of the errors of formulas: ``model_error``, the relative
+    error of a perfect simulator, is added in squares. Empty where there is no identification, or for
+    a preset. Raises InputError where the robot file was changed after it.
+    """
+    path = sidecar_path(robot_file)
+    if not path.is_file():
+        return {}
+    try:
+        found = load_identified(path)
+    except InputError as error:
+        raise InputError(
+            f"{error}; a diagnosis takes its tolerances from there: to go on without, move it away"
+        ) from None
+    if found.robot is None:
+        return {}
+    stated = robot_parameters(found.robot)
+    out = {}
+    for name, deviation in zip(found.names, found.standard_errors, strict=True):
+        if stated.get(name) and np.isfinite(deviation):
+            out[name] = float(np.hypot(deviation / abs(stated[name]), model_error))
+    return out
