@@ -1,7 +1,10 @@
 """The decision: held-out losses, ranks, what cannot be told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import scipy.optimize
 
 from axisight.effects import Effect
 from axisight.gap.decide import Standing, Trial, clearly_worse, stand
@@ -42,6 +45,31 @@ def test_linear_gain_is_what_least_squares_gains(regression):
     step = np.array([0.1, 0.2, -0.3])
     total = evidence.matrix.sum(axis=0)
     np.testing.assert_allclose(linear_gain(moved), step @ total @ step, rtol=1e-6)
+
+
+def test_linear_gain_takes_the_simulator_no_further_than_its_bounds(regression):
+    x, y, log = regression
+    at_least = linear_evidence(x, y, log)
+    # Three parameters of the simulator, from whose nominal values the least lies 5, 1 and 0 away.
+    least, deviation = np.array([5.0, 1.0, 0.0]), np.array([1.0, 1.0, 1.0])
+    evidence = replace(
+        at_least,
+        gradient=at_least.gradient - at_least.matrix @ least,
+        loss=at_least.loss
+        - 2 * at_least.gradient @ least
+        + np.einsum("bij,i,j->b", at_least.matrix, least, least),
+        prior_matrix=np.diag(deviation**-2),
+        prior_gradient=np.zeros(3),
+    )
+    rows = np.vstack([x, np.diag(1 / deviation)])
+    aims = np.concatenate([x @ least, np.zeros(3)])
+    bounded = scipy.optimize.lsq_linear(rows, aims, bounds=(-4 * deviation, 4 * deviation))
+    free = np.linalg.lstsq(rows, aims, rcond=None)[0]
+    assert free[0] > 4.0
+    assert bounded.x[0] == pytest.approx(4.0)
+    gained = aims @ aims - 2 * bounded.cost
+    np.testing.assert_allclose(linear_gain(evidence), gained, rtol=1e-6)
+    assert gained < 0.99 * (aims @ aims - ((rows @ free - aims) ** 2).sum())
 
 
 # The size of an effect is judged in test_gap_amplitude.py.

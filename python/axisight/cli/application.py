@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from axisight.cli.common import ERR as _err
+from axisight.cli.blind import blind_app
 from axisight.cli.common import OUT as _out
-from axisight.cli.common import From, To
+from axisight.cli.common import From, To, bars
 from axisight.cli.common import errors as _errors
 from axisight.cli.demo import write_demo_case
 from axisight.cli.excite import excite_command
@@ -46,31 +43,12 @@ app = typer.Typer(
 )
 app.command("excite")(excite_command)
 app.add_typer(identify_app, name="identify")
+app.add_typer(blind_app, name="blind")
 app.command("montecarlo")(montecarlo_command)
 app.command("reproduce")(reproduce_command)
 app.command("simulate")(simulate_command)
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show one bar per stage of the work."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=_err) as bars:
-        tasks: dict[str, int] = {}
-
-        def report(label: str, done: int, total: int) -> None:
-            if label not in tasks:
-                tasks[label] = bars.add_task(label, total=total)
-            bars.update(bars.task_ids[tasks[label]], completed=done, total=total)
-
-        yield report
 
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
@@ -145,7 +123,7 @@ def diagnose_command(
         )
         given = _tolerances(tolerance or [], inputs.robot)
         settings = with_tolerances(settings, inputs.robot, inputs.robot_source, given)
-        with _progress() as progress:
+        with bars() as progress:
             found = diagnose(
                 name=inputs.name,
                 robot=inputs.robot,
@@ -205,7 +183,7 @@ def demo(
     with _errors():
         case = write_demo_case(out / "case")
         _out.print(f"case: {case} (a simulated machine with an effect its simulator lacks)")
-        with _progress() as progress:
+        with bars() as progress:
             found = diagnose(case, progress=progress)
         _write(found, out / "verdict.json", out / "report.html")
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from axisight.errors import AxisightError, InputError
 
@@ -38,6 +39,26 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
     except KeyboardInterrupt:
         ERR.print(stopped, highlight=False, soft_wrap=True)
         raise typer.Exit(130) from None
+
+
+@contextmanager
+def bars() -> Iterator[Callable[[str, int, int], None]]:
+    """Show one bar per stage of the work."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=ERR) as shown:
+        tasks: dict[str, int] = {}
+
+        def report(label: str, done: int, total: int) -> None:
+            if label not in tasks:
+                tasks[label] = shown.add_task(label, total=total)
+            shown.update(shown.task_ids[tasks[label]], completed=done, total=total)
+
+        yield report
 
 
 def numbers(option: str, text: str) -> list[float]:

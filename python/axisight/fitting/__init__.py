@@ -1,6 +1,7 @@
 """Fitting robot and effect parameters to logs."""
 
 from axisight.fitting.simulation_error import (
+    PRIOR_REACH,
     FitOptions,
     Fitted,
     Parameter,
@@ -12,6 +13,7 @@ from axisight.fitting.simulation_error import (
 )
 
 __all__ = [
+    "PRIOR_REACH",
     "FitOptions",
     "Fitted",
     "Parameter",

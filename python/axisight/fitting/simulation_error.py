@@ -147,6 +147,10 @@ class Spec:
     nuisance: bool
 
 
+PRIOR_REACH = 4.0
+"""Bounds of a parameter with a tolerance, in standard deviations of its prior."""
+
+
 def robot_parameters(robot: Robot) -> dict[str, float]:
     """Return the names and values of all physical parameters of a robot."""
     return robot.parameters()
@@ -170,12 +174,13 @@ def robot_parameter(
         lower = -10 * size if signed else 1e-6 * size
         return Parameter(name, nominal, lower, max(100 * size, lower), size, nuisance=nuisance)
     spread = relative_tolerance * size
-    lower = nominal - 4 * spread if signed else max(nominal - 4 * spread, 1e-6 * size)
+    reach = PRIOR_REACH * spread
+    lower = nominal - reach if signed else max(nominal - reach, 1e-6 * size)
     return Parameter(
         name,
         nominal,
         lower,
-        nominal + 4 * spread,
+        nominal + reach,
         spread,
         prior=(nominal, spread),
         nuisance=nuisance,

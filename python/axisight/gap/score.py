@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.fitting import PRIOR_REACH
 from axisight.gap.model import Evidence, Linearized
 
 Array = NDArray[np.float64]
@@ -68,13 +69,43 @@ def predicted_loss(evidence: Evidence, blocks: NDArray[np.bool_], step: Array) -
 
 
 def linear_gain(evidence: Linearized) -> float:
-    """Return how much loss one undamped step from here promises."""
+    """Return how much loss one undamped step from here promises.
+
+    The simulator's own parameters go no further than their bounds, as in a fit: what would take
+    them beyond is an effect.
+    """
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
     # An amplitude may start on its bound; a parameter of the simulator there is held.
     held = np.array([n in evidence.at_bound and n[0] is None for n in evidence.parameters])
-    influence = (np.diag(matrix) > 0) & ~held
-    a, g = matrix[np.ix_(influence, influence)], gradient[influence]
+    free = (np.diag(matrix) > 0) & ~held
+    least, most = _room(evidence)
+    step = np.zeros(len(gradient))
+    # Every pass holds at least one more parameter, where it met its bound.
+    for _ in range(len(gradient)):
+        step[free] = _newton_step(matrix, gradient + matrix @ np.where(free, 0.0, step), free)
+        beyond = free & ((step < least) | (step > most))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, least, most)[beyond]
+        free &= ~beyond
+    return float(-step @ (2 * gradient + matrix @ step))
+
+
+def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Array:
+    """Return the step of the free parameters to the least of a parabola."""
+    a, g = matrix[np.ix_(free, free)], gradient[free]
     scale = 1 / np.sqrt(np.diag(a))
     normal = a * np.outer(scale, scale) + 1e-9 * np.eye(len(a))
-    return float((g * scale) @ np.linalg.solve(normal, g * scale))
+    return np.asarray(-scale * np.linalg.solve(normal, g * scale))
+
+
+def _room(evidence: Linearized) -> tuple[Array, Array]:
+    """Return the least and the largest step of every parameter (n_parameters,)."""
+    precision = np.diag(evidence.prior_matrix)
+    own = np.array([n[0] is None for n in evidence.parameters], dtype=bool) & (precision > 0)
+    deviation = 1 / np.sqrt(np.where(own, precision, 1.0))
+    # How far it is from its nominal value already.
+    off = evidence.prior_gradient * deviation**2
+    reach = np.where(own, PRIOR_REACH * deviation, np.inf)
+    return np.minimum(-reach - off, 0.0), np.maximum(reach - off, 0.0)

@@ -30,10 +30,14 @@ _MOST_ROUNDS = 8
 
 @dataclass(frozen=True)
 class Round:
-    """One round: how candidates stood on each axis, what was taken in."""
+    """One round: how candidates stood on each axis, what was taken in.
+
+    ``left`` (n_axes,): held-out loss above the floor before.
+    """
 
     standings: tuple[Standing, ...]
     accepted: tuple[tuple[Ranked, Standing], ...]
+    left: Array
 
 
 @dataclass
@@ -65,6 +69,10 @@ class Search:
         used = predictable(self.model)
         above = held_out_loss(self.baseline) - self.floor
         return self.layout.by_axis(np.where(used, above, 0.0))
+
+    def left(self) -> Array:
+        """Return the held-out loss of the model above the floor, by axis (n_axes,)."""
+        return self.layout.by_axis(held_out_loss(self.model) - self.floor)
 
     def removed(self) -> Array:
         """Return how much of it the causes remove, by axis (n_axes,)."""
@@ -107,7 +115,7 @@ def search(
             trials = round_.refined([*trials, *round_.run_waiting(number)], number)
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
-        out.rounds.append(Round(standings, taken))
+        out.rounds.append(Round(standings, taken, out.left()))
         if not taken:
             break
         _take_in(fitter, out, taken, progress)
@@ -115,6 +123,8 @@ def search(
         refused |= _merge(fitter, out, settings, offered)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
+    if not fitter.adds_up:
+        _withdraw_doubtful(fitter, out, settings)
     return out
 
 
@@ -274,6 +284,25 @@ def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[st
     return dropped
 
 
+def _withdraw_doubtful(fitter: ModelFitter, state: Search, settings: Settings) -> None:
+    """Take out the causes that something unknown is likelier than, and stays so.
+
+    One that explains a small part of its axis is a cause if others explain the rest. Where the rest
+    is still there in the end, both are rather parts of something that no effect stands for.
+    """
+    now = state.left()
+    doubtful = {
+        r.trial.label
+        for x in state.rounds
+        for r, s in x.accepted
+        if s.p_unknown > r.probability
+        and x.left[s.axis] - now[s.axis] < settings.explained_share * x.left[s.axis]
+    }
+    kept = [f for f in state.model.free if f.effect.label not in doubtful]
+    if len(kept) < len(state.model.free):
+        state.model = settled(fitter, kept, state.model)
+
+
 def _merge(
     fitter: ModelFitter, state: Search, settings: Settings, options: Sequence[FreeEffect]
 ) -> set[str]:
@@ -284,8 +313,9 @@ def _merge(
     ):
         evidence = found[0].trial.evidence
         gone |= {f.effect.label for f in state.model.free} - {e.label for e in evidence.effects}
+        left = state.left()
         state.model = settled(fitter, evidence.free, evidence)
-        state.rounds.append(Round((found[1],), (found,)))
+        state.rounds.append(Round((found[1],), (found,), left))
     return gone
 
 
@@ -334,5 +364,4 @@ def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> boo
 
 def _settled(state: Search, settings: Settings) -> bool:
     """Whether what is left on every axis is within formula error or close to the floor."""
-    left = state.layout.by_axis(held_out_loss(state.model) - state.floor)
-    return bool(np.all(left / state.layout.samples() < settings.smallest_gain))
+    return bool(np.all(state.left() / state.layout.samples() < settings.smallest_gain))

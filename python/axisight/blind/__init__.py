@@ -1,0 +1,17 @@
+"""The withheld-effect benchmark: machines of another engine, diagnoses that cannot see the truth, a score.
+
+`axisight.blind.make` needs MuJoCo (extra ``blind``), the others nothing.
+"""
+
+from axisight.blind.score import Judged, Share, calibration_error, figures, judged_cases, markdown
+from axisight.blind.solve import solve_cases
+
+__all__ = [
+    "Judged",
+    "Share",
+    "calibration_error",
+    "figures",
+    "judged_cases",
+    "markdown",
+    "solve_cases",
+]

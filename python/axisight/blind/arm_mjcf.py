@@ -1,0 +1,114 @@
+"""An arm as a MuJoCo model, with what MuJoCo itself has to make a machine differ from its simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from axisight.robot import Robot
+from axisight.robot.description import Joint
+
+
+@dataclass(frozen=True)
+class Native:
+    """What MuJoCo changes by itself on one axis, or at the tip.
+
+    ``half_width_rad``: the gear's tendon is slack within; ``friction_nm``: dry friction of the motor by
+    the constraint solver; ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
+    to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
+    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``tip_kg`` at
+    ``tip_m`` in the frame of the last link.
+    """
+
+    half_width_rad: float = 0.0
+    friction_nm: float = 0.0
+    armature: float = 0.0
+    spring: float = 0.0
+    damper: float = 0.0
+    viscous: float = 0.0
+    gear: float = 0.0
+    lag_s: float = 0.0
+    tip_kg: float = 0.0
+    tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+NOTHING = Native()
+
+
+@dataclass
+class _Parts:
+    """Text of a model, part by part."""
+
+    bodies: str = ""
+    close: str = ""
+    rotors: str = ""
+    tendons: str = ""
+    actuators: str = ""
+    axes: list[str] = field(default_factory=list)
+
+
+def mjcf(robot: Robot, native: Mapping[int, Native], tip: Native, step_s: float) -> str:
+    """Return the model (MJCF) of a robot: rotors on tendons that pull at their joints.
+
+    ``native``: changes by axis, from 0. Positions are motor angles, then joint angles.
+    """
+    parts = _Parts()
+    for joint in robot.joints:
+        _add_joint(parts, joint, native)
+    if tip.tip_kg:
+        parts.bodies += (
+            f'<body pos="{_vector(tip.tip_m)}">'
+            f'<inertial pos="0 0 0" mass="{tip.tip_kg!r}" diaginertia="1e-6 1e-6 1e-6"/></body>'
+        )
+    return f"""<mujoco><compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
+    <option timestep="{step_s!r}" integrator="RK4" gravity="{_vector(robot.gravity_m_s2)}">
+    <flag contact="disable"/></option>
+    <worldbody>{parts.rotors}{parts.bodies}{parts.close}</worldbody>
+    <tendon>{parts.tendons}</tendon><actuator>{parts.actuators}</actuator></mujoco>"""
+
+
+def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> None:
+    spring = ""
+    if joint.drive is None and joint.spring is not None:
+        spring = f'stiffness="{joint.spring.stiffness!r}" damping="{joint.spring.damping!r}"'
+    parts.bodies += f'<body pos="{_vector(joint.origin_m)}">'
+    parts.bodies += f'<joint name="{joint.name}" axis="{_vector(joint.axis)}" {spring}/>'
+    if joint.link is None:
+        # MuJoCo wants mass in every moving body; this much changes nothing visible.
+        parts.bodies += '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
+    else:
+        parts.bodies += (
+            f'<inertial pos="{_vector(joint.link.com_m)}" mass="{joint.link.mass_kg!r}"'
+            f' fullinertia="{_vector(joint.link.inertia_kg_m2)}"/>'
+        )
+    parts.close += "</body>"
+    if joint.drive is not None:
+        _add_drive(parts, joint, native.get(len(parts.axes), NOTHING))
+
+
+def _add_drive(parts: _Parts, joint: Joint, change: Native) -> None:
+    drive, spring, name = joint.drive, joint.spring, joint.name
+    if drive is None or spring is None:
+        raise ValueError(f"{name}: expected an elastic gear")
+    parts.axes.append(name)
+    inertia = drive.motor_inertia
+    parts.rotors += (
+        f'<body pos="0 0 -1"><joint name="{name}_rotor" axis="0 0 1"'
+        f' damping="{drive.viscous_friction * (1 + change.viscous)!r}"'
+        f' armature="{inertia * change.armature!r}" frictionloss="{change.friction_nm!r}"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="{_vector([inertia] * 3)}"/></body>'
+    )
+    width = change.half_width_rad
+    parts.tendons += (
+        f'<fixed name="{name}_gear" stiffness="{spring.stiffness * (1 + change.spring)!r}"'
+        f' damping="{spring.damping * (1 + change.damper)!r}"'
+        f' springlength="{-width!r} {width!r}">'
+        f'<joint joint="{name}_rotor" coef="{drive.gear_ratio!r}"/>'
+        f'<joint joint="{name}" coef="-1"/></fixed>'
+    )
+    lag = f' dyntype="filterexact" dynprm="{change.lag_s!r}"' if change.lag_s else ""
+    parts.actuators += f'<general joint="{name}_rotor" gear="{1 + change.gear!r}"{lag}/>'
+
+
+def _vector(x: Iterable[float]) -> str:
+    return " ".join(repr(float(v)) for v in x)

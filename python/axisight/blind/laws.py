@@ -1,0 +1,264 @@
+"""Laws that a machine follows and its simulator does not, from other papers than the library's.
+
+A law acts on one axis. Every step it is told where the axis is, and answers with a torque on the motor
+and one on the joint; it may bend what the sensor says and what the drive does with a command.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import copysign, cos, exp, pi, sin
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Where an axis is: time [s], motor angle [rad] and speed [rad/s], the joint's, gear deflection."""
+
+    time_s: float
+    motor: float
+    motor_speed: float
+    joint: float
+    joint_speed: float
+    gear_ratio: float
+    gear_torque: float
+    """Of the spring, on the joint [Nm]."""
+
+    @property
+    def deflection(self) -> float:
+        """Of the gear, joint side [rad]."""
+        return self.gear_ratio * self.motor - self.joint
+
+
+class Law:
+    """A law that does nothing: the base of all others."""
+
+    def begin(self, step_s: float) -> None:
+        """Forget what was; steps will be this long."""
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return the torque on the motor and on the joint [Nm]."""
+        del at
+        return 0.0, 0.0
+
+    def sensor(self, motor: float) -> float:
+        """Return what the sensor says more than the motor angle [rad]."""
+        del motor
+        return 0.0
+
+    def command(self, torque: float) -> float:
+        """Return the torque the drive makes of a command [Nm], every step."""
+        return torque
+
+    def reported(self, torque: float) -> float:
+        """Return the command as the drive reports it [Nm]."""
+        return torque
+
+
+@dataclass
+class ExponentialStribeck(Law):
+    """Dry friction that falls with speed as exp(-|v|/vs) (Tustin), sign smoothed by v / (|v| + v0)."""
+
+    dry_nm: float
+    static_nm: float
+    speed_rad_s: float
+    corner_rad_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        v = at.motor_speed
+        size = self.dry_nm + (self.static_nm - self.dry_nm) * exp(-abs(v) / self.speed_rad_s)
+        return -size * v / (abs(v) + self.corner_rad_s), 0.0
+
+
+@dataclass
+class LoadFriction(Law):
+    """Friction that follows the load: a share of the gear torque as the motor feels it."""
+
+    share: float
+    corner_rad_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        v = at.motor_speed
+        load = abs(at.gear_torque * at.gear_ratio)
+        return -self.share * load * v / (abs(v) + self.corner_rad_s), 0.0
+
+
+class MaxwellSlip(Law):
+    """A gear that slips: springs in parallel, each through a slider that gives way."""
+
+    def __init__(self, stiffness: Sequence[float], slip_rad: Sequence[float]) -> None:
+        self.stiffness, self.slip = list(stiffness), list(slip_rad)
+        self.anchor = [0.0] * len(self.slip)
+
+    def begin(self, step_s: float) -> None:
+        """Let all springs go."""
+        del step_s
+        self.anchor = [0.0] * len(self.slip)
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what the slipping springs add to the gear's."""
+        total = 0.0
+        for i, (k, slip) in enumerate(zip(self.stiffness, self.slip, strict=True)):
+            stretch = at.deflection - self.anchor[i]
+            if abs(stretch) > slip:
+                self.anchor[i] = at.deflection - copysign(slip, stretch)
+                stretch = copysign(slip, stretch)
+            total += k * stretch
+        return -at.gear_ratio * total, total
+
+
+@dataclass
+class CubicSpring(Law):
+    """A gear that stiffens with the cube of its deflection."""
+
+    cubic_nm_rad3: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what the cube adds to the gear's torque."""
+        total = self.cubic_nm_rad3 * at.deflection**3
+        return -at.gear_ratio * total, total
+
+
+@dataclass
+class GearWave(Law):
+    """A gear whose angle waves with the motor's, a Fourier series; power is conserved or not."""
+
+    stiffness: float
+    order: float
+    amplitude_rad: float
+    phase: float
+    conserves: bool
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what the wave of the angle adds to the gear's torque."""
+        angle = self.order * at.motor + self.phase
+        wave = self.amplitude_rad * (sin(angle) - sin(self.phase))
+        total = self.stiffness * wave
+        slope = self.order * self.amplitude_rad * cos(angle) if self.conserves else 0.0
+        back = total * at.gear_ratio + slope * (at.gear_torque + total)
+        return -back, total
+
+
+@dataclass
+class MotorWave(Law):
+    """Torque that waves with the motor angle: cogging and the like."""
+
+    orders: Sequence[float]
+    amplitudes_nm: Sequence[float]
+    phases: Sequence[float]
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return the ripple on the motor."""
+        terms = zip(self.orders, self.amplitudes_nm, self.phases, strict=True)
+        return sum(a * sin(n * at.motor + p) for n, a, p in terms), 0.0
+
+
+@dataclass
+class SensorWave(Law):
+    """A resolver whose angle waves over a turn."""
+
+    orders: Sequence[float]
+    amplitudes_rad: Sequence[float]
+    phases: Sequence[float]
+
+    def sensor(self, motor: float) -> float:
+        """Return the error of the angle."""
+        terms = zip(self.orders, self.amplitudes_rad, self.phases, strict=True)
+        return sum(a * sin(n * motor + p) for n, a, p in terms)
+
+
+@dataclass
+class Offset(Law):
+    """A torque that is always there."""
+
+    torque_nm: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return it."""
+        del at
+        return self.torque_nm, 0.0
+
+
+class Delay(Law):
+    """A drive that does everything later."""
+
+    def __init__(self, delay_s: float) -> None:
+        self.delay_s = delay_s
+        self.line: deque[float] = deque()
+
+    def begin(self, step_s: float) -> None:
+        """Empty the line."""
+        self.line = deque(maxlen=max(1, round(self.delay_s / step_s)) + 1)
+
+    def command(self, torque: float) -> float:
+        """Return the command of some steps ago."""
+        self.line.append(torque)
+        return self.line[0]
+
+
+@dataclass
+class Limit(Law):
+    """A drive that gives no more, and reports what it gives."""
+
+    limit_nm: float
+
+    def command(self, torque: float) -> float:
+        """Return the command within the limit."""
+        return min(max(torque, -self.limit_nm), self.limit_nm)
+
+    reported = command
+
+
+@dataclass
+class Deadband(Law):
+    """A drive that makes nothing of small commands."""
+
+    width_nm: float
+
+    def command(self, torque: float) -> float:
+        """Return what is beyond the band."""
+        return copysign(max(abs(torque) - self.width_nm, 0.0), torque)
+
+
+@dataclass
+class Tone(Law):
+    """A torque from outside, at a frequency of its own."""
+
+    amplitude_nm: float
+    frequency_hz: float
+    phase: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return it."""
+        return self.amplitude_nm * sin(2 * pi * self.frequency_hz * at.time_s + self.phase), 0.0
+
+
+@dataclass
+class FrictionStep(Law):
+    """Dry friction that is there from some time on."""
+
+    friction_nm: float
+    corner_rad_s: float
+    from_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        v = at.motor_speed
+        size = self.friction_nm if at.time_s > self.from_s else 0.0
+        return -size * v / (abs(v) + self.corner_rad_s), 0.0
+
+
+@dataclass
+class CubicDamper(Law):
+    """A gear damped by the cube of the speed of its deflection."""
+
+    cubic_nm_s3_rad3: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what the damper adds to the gear's torque."""
+        rate = at.gear_ratio * at.motor_speed - at.joint_speed
+        total = self.cubic_nm_s3_rad3 * rate**3
+        return -at.gear_ratio * total, total

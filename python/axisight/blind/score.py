@@ -1,0 +1,208 @@
+"""Verdicts against truths: how often a cause was named, missed or invented, and how sure it was."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from axisight.blind.sealed import SEAL, seal_of
+from axisight.blind.withheld import KINDS
+from axisight.errors import InputError
+
+# Change of the torque over its noise from which an effect counts as there to be found.
+SEVERE = 3.0
+# Alternatives this likely belong to what a verdict allows.
+_ALTERNATIVE = 0.05
+_BINS = 10
+_NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One verdict beside its truth.
+
+    Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
+    ``parameters``: named value over true value, of what both state.
+    """
+
+    name: str
+    truth: tuple[str, ...]
+    in_library: bool
+    severity: float
+    verdict: str
+    named: tuple[str, ...]
+    probabilities: tuple[float, ...]
+    allowed: frozenset[str]
+    where: frozenset[int]
+    ratios: tuple[float, ...]
+    covered: tuple[bool, ...]
+
+    @property
+    def kind(self) -> str:
+        """``nothing``, ``unknown`` (not in the library), ``single`` or ``pair``."""
+        if not self.truth:
+            return "nothing"
+        if not self.in_library:
+            return "unknown"
+        return "single" if len(self.truth) == 1 else "pair"
+
+    @property
+    def right(self) -> bool:
+        """Whether the verdict says what is true, and nothing else."""
+        if self.kind in ("nothing", "unknown"):
+            wanted = "none" if self.kind == "nothing" else "unknown"
+            return self.verdict == wanted and not self.named
+        return set(self.named) == set(self.truth)
+
+
+@dataclass(frozen=True)
+class Share:
+    """So many of so many, with Wilson's interval at 95 %."""
+
+    hits: int
+    of: int
+
+    def interval(self) -> tuple[float, float]:
+        """Return the interval (Wilson 1927); all of it where nothing was tried."""
+        if self.of == 0:
+            return 0.0, 1.0
+        n, p, z = self.of, self.hits / self.of, _NORMAL_95
+        middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+        half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+        return float(middle - half), float(middle + half)
+
+    def __str__(self) -> str:
+        """Return the share in words of a table."""
+        if self.of == 0:
+            return "-"
+        low, high = self.interval()
+        return f"{self.hits}/{self.of} = {100 * self.hits / self.of:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
+
+
+def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
+    """Return every verdict beside its truth.
+
+    Raises InputError for a truth that is not the one its case was sealed with, and where there is
+    no verdict at all.
+    """
+    out = []
+    for path in sorted(verdicts.glob("*.json")):
+        text = (truths / path.name).read_text("utf-8")
+        seal = (cases / path.stem / SEAL).read_text("utf-8").strip()
+        if seal_of(text) != seal:
+            raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
+        out.append(_judged(path.stem, json.loads(text), json.loads(path.read_text("utf-8"))))
+    if not out:
+        raise InputError(f"{verdicts}: expected verdicts (*.json), got none")
+    return out
+
+
+def _label(entry: dict[str, Any]) -> str:
+    return entry["effect"] if entry["axis"] is None else f"{entry['effect']}@{entry['axis']}"
+
+
+def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
+    causes = verdict["causes"]
+    likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]
+    allowed = {_label(x) for x in (*causes, *likely)}
+    allowed |= {label for group in verdict["equivalent"] for label in group}
+    by_label = {_label(c): c["parameters"] for c in causes}
+    ratios, covered = [], []
+    for effect in truth["effects"]:
+        for key, value in effect["parameters"].items():
+            found = by_label.get(_label(effect), {}).get(key)
+            if found is not None and value:
+                ratios.append(found["value"] / value)
+                low, high = found["ci95"]
+                covered.append(low <= value <= high)
+    return Judged(
+        name=name,
+        truth=tuple(_label(e) for e in truth["effects"]),
+        in_library=all(KINDS[e["effect"]].in_library for e in truth["effects"]),
+        severity=max(truth["severity"]),
+        verdict=verdict["verdict"],
+        named=tuple(_label(c) for c in causes),
+        probabilities=tuple(c["probability"] for c in causes),
+        allowed=frozenset(allowed),
+        where=frozenset(w["axis"] for w in verdict["where"][:1]),
+        ratios=tuple(ratios),
+        covered=tuple(covered),
+    )
+
+
+def calibration_error(judged: Sequence[Judged]) -> float:
+    """Return the expected calibration error of the causes named (Naeini 2015), ten bins; NaN without."""
+    pairs = [
+        (p, label in j.truth)
+        for j in judged
+        for p, label in zip(j.probabilities, j.named, strict=True)
+    ]
+    if not pairs:
+        return float("nan")
+    p, right = (np.array(x, dtype=np.float64) for x in zip(*pairs, strict=True))
+    bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    gaps = [
+        abs(p[bins == b].mean() - right[bins == b].mean()) * np.mean(bins == b) for b in set(bins)
+    ]
+    return float(sum(gaps))
+
+
+def figures(judged: Sequence[Judged]) -> dict[str, Share]:
+    """Return the shares of a benchmark by what they count."""
+
+    def share(among: Sequence[Judged], good: Sequence[bool]) -> Share:
+        return Share(sum(good), len(among))
+
+    severe = [j for j in judged if j.severity >= SEVERE]
+    single = [j for j in severe if j.kind == "single"]
+    pairs = [j for j in severe if j.kind == "pair"]
+    nothing = [j for j in judged if j.kind == "nothing"]
+    unknown = [j for j in severe if j.kind == "unknown"]
+    arms = [j for j in (*single, *unknown) if "@" in j.truth[0]]
+    return {
+        "effect first, severity 3 and more": share(
+            single, [j.named[:1] == j.truth for j in single]
+        ),
+        "axis": share(arms, [_axis_named(j) for j in arms]),
+        "verdict set holds the truth": share(single, [set(j.truth) <= j.allowed for j in single]),
+        "false alarms on nothing withheld": share(nothing, [bool(j.named) for j in nothing]),
+        "out of the library: unknown": share(unknown, [j.right for j in unknown]),
+        "wrong cause explained": share(
+            judged, [j.verdict == "explained" and not set(j.named) <= set(j.truth) for j in judged]
+        ),
+        "pairs: both": share(pairs, [set(j.truth) <= set(j.named) for j in pairs]),
+        "pairs: spurious third": share(pairs, [bool(set(j.named) - set(j.truth)) for j in pairs]),
+        "parameters within 10 %": Share(
+            sum(abs(r - 1) <= 0.1 for j in judged for r in j.ratios),
+            sum(len(j.ratios) for j in judged),
+        ),
+        "intervals hold the true value": Share(
+            sum(sum(j.covered) for j in judged), sum(len(j.covered) for j in judged)
+        ),
+    }
+
+
+def _axis_named(judged: Judged) -> bool:
+    axis = int(judged.truth[0].partition("@")[2])
+    if judged.named:
+        return judged.named[0].partition("@")[2] == str(axis)
+    return axis in judged.where
+
+
+def markdown(judged: Sequence[Judged]) -> str:
+    """Return the figures, and every case that is not right."""
+    lines = ["| figure | measured |", "|---|---|"]
+    lines += [f"| {name} | {share} |" for name, share in figures(judged).items()]
+    lines += [f"| expected calibration error | {calibration_error(judged):.3f} |", ""]
+    lines += ["| case | severity | truth | verdict | named |", "|---|---|---|---|---|"]
+    for j in judged:
+        if not j.right:
+            named = ", ".join(j.named) or "-"
+            truth = ", ".join(j.truth) or "nothing"
+            lines.append(f"| {j.name} | {j.severity:.1f} | {truth} | {j.verdict} | {named} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,242 @@
+"""What is withheld from simulators: effects by name, the ranges they are drawn from, their laws.
+
+Ranges are those of industrial robots of this size: friction of a tenth to a half of the rated torque
+(Armstrong-Helouvry 1991), lost motion of harmonic and cycloidal gears of one arc minute and less,
+transmission errors of half an arc minute, ripple of a few per cent of the rated torque, delays of one
+to three samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from axisight.blind import laws
+from axisight.blind.arm_mjcf import NOTHING, Native
+from axisight.robot import Robot
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One effect as drawn: parameters as the library states them, and what makes it.
+
+    ``axis`` from 1; None for the arm.
+    """
+
+    effect: str
+    axis: int | None
+    parameters: Mapping[str, float]
+    native: Native = NOTHING
+    laws: Sequence[laws.Law] = field(default_factory=tuple)
+
+
+Draw = Callable[[Rng, Robot, int], Drawn]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of effect. ``in_library``: the diagnosis can name it."""
+
+    draw: Draw
+    in_library: bool = True
+
+
+def _sign(rng: Rng) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _between(rng: Rng, low: float, high: float) -> float:
+    """Draw evenly by factors."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _stiffness(robot: Robot, axis: int) -> float:
+    return robot.parameters()[f"{robot.axis_names[axis - 1]}.stiffness"]
+
+
+def _coulomb(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size = _between(rng, 0.2, 0.7)
+    return Drawn("coulomb_friction", axis, {"coulomb_nm": size}, Native(friction_nm=size))
+
+
+def _stribeck(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    dry, speed = _between(rng, 0.25, 0.6), _between(rng, 2.0, 8.0)
+    excess = dry * float(rng.uniform(0.5, 1.3))
+    values = {"coulomb_nm": dry, "excess_nm": excess, "stribeck_speed_rad_s": speed}
+    law = laws.ExponentialStribeck(dry, dry + excess, speed, 0.05)
+    return Drawn("stribeck_friction", axis, values, laws=[law])
+
+
+def _viscous(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    share = _between(rng, 0.4, 1.5)
+    own = robot.parameters()[f"{robot.axis_names[axis - 1]}.viscous_friction"]
+    values = {"viscous_nm_s_rad": share * own}
+    return Drawn("viscous_friction", axis, values, Native(viscous=share))
+
+
+def _load_friction(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _between(rng, 0.03, 0.1)
+    law = laws.LoadFriction(share, 0.05)
+    return Drawn("load_dependent_friction", axis, {"coefficient": share}, laws=[law])
+
+
+def _backlash(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    width = _between(rng, 0.8e-4, 4e-4)
+    return Drawn("backlash", axis, {"half_width_rad": width}, Native(half_width_rad=width))
+
+
+def _cubic(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    cubic = _between(rng, 2e11, 1.5e12)
+    law = laws.CubicSpring(cubic)
+    return Drawn("nonlinear_stiffness", axis, {"cubic_nm_rad3": cubic}, laws=[law])
+
+
+def _softer(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _sign(rng) * _between(rng, 0.08, 0.25)
+    return Drawn("joint_stiffness", axis, {"relative_change": share}, Native(spring=share))
+
+
+def _damping(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _between(rng, 0.5, 2.0)
+    return Drawn("joint_damping", axis, {"relative_change": share}, Native(damper=share))
+
+
+def _hysteresis(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    share, slip = _between(rng, 0.15, 0.4), _between(rng, 1e-4, 4e-4)
+    stiff = share * _stiffness(robot, axis)
+    slips = slip * np.array([0.4, 0.8, 1.2, 1.6])
+    law = laws.MaxwellSlip([stiff / 4] * 4, list(slips))
+    # What slips was part of the spring.
+    native = Native(spring=-share)
+    return Drawn("gear_hysteresis", axis, {"share": share, "deflection_rad": slip}, native, [law])
+
+
+def _transmission(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    size, phase = _between(rng, 0.7e-4, 2e-4), float(rng.uniform(0, 2 * np.pi))
+    conserves = bool(rng.integers(2))
+    law = laws.GearWave(_stiffness(robot, axis), 2.0, size, phase, conserves)
+    return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
+
+
+def _waves(rng: Rng, low: float, high: float) -> tuple[list[float], list[float], list[float]]:
+    count = int(rng.integers(1, 4))
+    orders = sorted(rng.choice([1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 24.0], count, replace=False))
+    sizes = [_between(rng, low, high) for _ in orders]
+    phases = rng.uniform(0, 2 * np.pi, count).tolist()
+    return [float(n) for n in orders], sizes, phases
+
+
+def _terms(waves: tuple[list[float], list[float], list[float]], unit: str) -> dict[str, float]:
+    out: dict[str, float] = {}
+    for i, (order, size, _) in enumerate(zip(*waves, strict=True), 1):
+        out |= {f"order_{i}": order, f"amplitude_{i}_{unit}": size}
+    return out
+
+
+def _torque_ripple(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    waves = _waves(rng, 0.08, 0.3)
+    return Drawn("torque_ripple", axis, _terms(waves, "nm"), laws=[laws.MotorWave(*waves)])
+
+
+def _resolver_ripple(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    waves = _waves(rng, 1.5e-4, 6e-4)
+    return Drawn("resolver_ripple", axis, _terms(waves, "rad"), laws=[laws.SensorWave(*waves)])
+
+
+def _delay(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    delay = 0.25e-3 * float(rng.integers(2, 7))
+    return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
+
+
+def _lag(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    lag = _between(rng, 0.6e-3, 3e-3)
+    return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag}, Native(lag_s=lag))
+
+
+def _constant(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _sign(rng) * _between(rng, 0.03, 0.1)
+    return Drawn("torque_constant", axis, {"relative_error": share}, Native(gear=share))
+
+
+def _offset(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size = _sign(rng) * _between(rng, 0.3, 1.0)
+    return Drawn("torque_offset", axis, {"offset_nm": size}, laws=[laws.Offset(size)])
+
+
+def _inertia(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _between(rng, 0.08, 0.25)
+    return Drawn("motor_inertia", axis, {"relative_change": share}, Native(armature=share))
+
+
+def _payload(rng: Rng, robot: Robot, _axis: int) -> Drawn:
+    mass = _between(rng, 15.0, 60.0)
+    link = next(j.link for j in reversed(robot.joints) if j.link is not None)
+    x, y, z = (float(c + rng.uniform(-0.3, 0.3)) for c in link.com_m)
+    values = {"mass_kg": mass, "x_m": x, "y_m": y, "z_m": z}
+    return Drawn("payload", None, values, Native(tip_kg=mass, tip_m=(x, y, z)))
+
+
+# Of the largest torque of the arm's logs, as the caller knows it.
+_LARGEST_NM = np.array([20.0, 46.0, 40.0])
+
+
+def _limit(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    limit = float(rng.uniform(0.75, 0.9) * _LARGEST_NM[axis - 1])
+    return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[laws.Limit(limit)])
+
+
+def _deadband(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    width = _between(rng, 0.2, 0.6)
+    return Drawn("torque_deadband", axis, {"width_nm": width}, laws=[laws.Deadband(width)])
+
+
+def _tone(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size, frequency = _between(rng, 0.3, 1.0), float(rng.uniform(3.0, 30.0))
+    law = laws.Tone(size, frequency, float(rng.uniform(0, 2 * np.pi)))
+    return Drawn(
+        "outside_tone", axis, {"amplitude_nm": size, "frequency_hz": frequency}, laws=[law]
+    )
+
+
+def _friction_step(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size = _between(rng, 0.4, 0.9)
+    return Drawn(
+        "friction_step", axis, {"friction_nm": size}, laws=[laws.FrictionStep(size, 0.05, 5.0)]
+    )
+
+
+def _cubic_damper(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size = _between(rng, 2e6, 2e7)
+    return Drawn("cubic_damper", axis, {"cubic_nm_s3_rad3": size}, laws=[laws.CubicDamper(size)])
+
+
+KINDS: Mapping[str, Kind] = {
+    "coulomb_friction": Kind(_coulomb),
+    "stribeck_friction": Kind(_stribeck),
+    "viscous_friction": Kind(_viscous),
+    "load_dependent_friction": Kind(_load_friction),
+    "backlash": Kind(_backlash),
+    "nonlinear_stiffness": Kind(_cubic),
+    "joint_stiffness": Kind(_softer),
+    "joint_damping": Kind(_damping),
+    "gear_hysteresis": Kind(_hysteresis),
+    "transmission_error": Kind(_transmission),
+    "torque_ripple": Kind(_torque_ripple),
+    "resolver_ripple": Kind(_resolver_ripple),
+    "input_delay": Kind(_delay),
+    "actuator_bandwidth": Kind(_lag),
+    "torque_constant": Kind(_constant),
+    "torque_offset": Kind(_offset),
+    "motor_inertia": Kind(_inertia),
+    "payload": Kind(_payload),
+    "torque_saturation": Kind(_limit),
+    "torque_deadband": Kind(_deadband, in_library=False),
+    "outside_tone": Kind(_tone, in_library=False),
+    "friction_step": Kind(_friction_step, in_library=False),
+    "cubic_damper": Kind(_cubic_damper, in_library=False),
+}
+"""By name."""

@@ -1,0 +1,73 @@
+"""The commands ``axisight blind make``, ``run`` and ``score``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.blind import judged_cases, markdown, solve_cases
+from axisight.cli.common import OUT, bars, errors
+from axisight.gap import Settings
+from axisight.storage import write_whole
+
+blind_app = typer.Typer(
+    help="The withheld-effect benchmark: cases of another engine, diagnoses, a score.",
+    no_args_is_help=True,
+)
+
+_Workers = Annotated[
+    int | None, typer.Option(min=1, help="Processes here. Default: all processors.")
+]
+
+
+@blind_app.command("make")
+def make_command(
+    cases: Annotated[Path, typer.Argument(help="Folder for the cases.")],
+    truth: Annotated[Path, typer.Option(help="Folder for what is withheld, apart from the cases.")],
+    count: Annotated[int, typer.Option(min=1, help="Number of cases.")] = 24,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first case.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Cases are a function of seed and number.")] = 0,
+    workers: _Workers = None,
+) -> None:
+    """Simulate machines that differ from their simulator, with MuJoCo (extra ``blind``)."""
+    with errors(), bars() as progress:
+        # Only this command needs MuJoCo.
+        from axisight.blind.make import make_cases  # noqa: PLC0415
+
+        numbers = range(first, first + count)
+        make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress)
+    OUT.print(f"{count} cases: {cases}; what is withheld: {truth}", soft_wrap=True)
+
+
+@blind_app.command("run")
+def run_command(
+    cases: Annotated[Path, typer.Argument(help="Folder of cases.")],
+    out: Annotated[Path, typer.Option(help="Folder for the verdicts; those there already stay.")],
+    workers: _Workers = None,
+) -> None:
+    """Diagnose every case of a folder that has no verdict yet."""
+    with errors("stopped; finished verdicts stay, run again to go on"), bars() as progress:
+        failed = solve_cases(cases, out, Settings(), workers or os.cpu_count() or 1, progress)
+    for name, reason in failed.items():
+        OUT.print(f"{name}: {reason}", markup=False, soft_wrap=True)
+    OUT.print(f"verdicts: {out}", soft_wrap=True)
+    if failed:
+        raise typer.Exit(1)
+
+
+@blind_app.command("score")
+def score_command(
+    cases: Annotated[Path, typer.Argument(help="Folder of cases.")],
+    truth: Annotated[Path, typer.Option(help="Folder of what was withheld.")],
+    verdicts: Annotated[Path, typer.Option(help="Folder of verdicts.")],
+    out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
+) -> None:
+    """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
+    with errors():
+        text = markdown(judged_cases(cases, truth, verdicts))
+        if out is not None:
+            write_whole(out, text)
+    OUT.print(text, markup=False, soft_wrap=True)

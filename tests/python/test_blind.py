@@ -1,0 +1,199 @@
+"""The withheld-effect benchmark: another engine, draws, seals, scores."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.stats
+from typer.testing import CliRunner
+
+from axisight import InputError, Robot, load_robot, simulate
+from axisight.blind import Judged, Share, calibration_error, figures, judged_cases
+from axisight.blind.drawing import draw, machine_of, references, scattered
+from axisight.blind.engine import Machine, run
+from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
+from axisight.blind.make import make_cases
+from axisight.blind.sealed import SEAL
+from axisight.blind.withheld import KINDS
+from axisight.cli import app
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("irb6600_like").with_effects([])
+
+
+def short(robot: Robot, seconds: float = 1.0) -> np.ndarray:
+    """A second of a multisine on all axes, (n, n_axes)."""
+    _, reference = references(np.random.default_rng(3), robot)["multisine_fresh"]
+    return reference[: round(seconds / robot.sample_time_s)]
+
+
+def test_without_effects_the_other_engine_agrees_with_ours(robot: Robot):
+    machine = scattered(np.random.default_rng(1), robot)
+    reference = short(robot)
+    torque, angle = run(Machine(machine), reference, np.zeros_like(reference))
+    ours = simulate(machine, reference)
+    # It stood four seconds before; its slowest mode has a tenth of that as its time constant.
+    spread = np.std(ours["torque_cmd_nm"].values, axis=0)
+    assert (np.abs(torque - ours["torque_cmd_nm"].values).max(axis=0) / spread < 1e-3).all()
+    moved = angle - angle[0] - (ours["position_rad"].values - ours["position_rad"].values[0])
+    assert np.abs(moved).max() < 1e-4
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_changes_the_torque(name: str, robot: Robot):
+    reference = 1.5 * short(robot, 0.5)
+    quiet = np.zeros_like(reference)
+    drawn = KINDS[name].draw(np.random.default_rng(5), robot, 2)
+    bare = run(Machine(robot), reference, quiet)[0]
+    # A limit bites where the torque is large; friction that comes late, comes at five seconds.
+    expected = name not in ("torque_saturation", "friction_step")
+    changed = run(machine_of(robot, [drawn]), reference, quiet)[0]
+    assert (np.abs(changed - bare).max() > 0.01) == expected
+
+
+def test_a_case_is_a_function_of_seed_and_number(robot: Robot):
+    a, b, c = draw(1, 7, robot), draw(1, 7, robot), draw(1, 9, robot)
+    assert [(e.effect, e.axis, e.parameters) for e in a.effects] == [
+        (e.effect, e.axis, e.parameters) for e in b.effects
+    ]
+    assert a.machine.robot.parameters() == b.machine.robot.parameters()
+    assert a.machine.robot.parameters() != c.machine.robot.parameters()
+    for name, (role, reference) in a.references.items():
+        assert b.references[name][0] == role
+        np.testing.assert_array_equal(b.references[name][1], reference)
+    assert draw(1, 8, robot).effects == ()
+    pair = draw(1, 13, robot).effects
+    assert len({e.axis for e in pair}) == len(pair)
+
+
+def at(motor_speed: float = 0.0, deflection: float = 0.0) -> Axis:
+    return Axis(0.0, deflection / 0.004, motor_speed, 0.0, 0.0, 0.004, 0.0)
+
+
+def test_friction_takes_energy():
+    law = ExponentialStribeck(0.4, 0.7, 3.0, 0.05)
+    for speed in (-20.0, -0.1, 0.0, 0.3, 8.0):
+        motor, joint = law.torque(at(motor_speed=speed))
+        assert motor * speed <= 0
+        assert joint == 0.0
+    # Far above the speed over which it falls it is dry friction.
+    assert law.torque(at(motor_speed=500.0))[0] == pytest.approx(-0.4, rel=1e-3)
+
+
+def test_springs_that_slip_close_a_loop_of_the_size_of_what_they_lose():
+    law = MaxwellSlip([3e5], [1e-4])
+    law.begin(1e-4)
+    swing = 4e-4 * np.sin(np.linspace(0, 4 * np.pi, 40_001))
+    torque = np.array([law.torque(at(deflection=float(d)))[1] for d in swing])
+    # Second turn: slider force times the path on which it slips, 4 (amplitude - slip).
+    second = slice(20_000, None)
+    work = np.trapezoid(torque[second], swing[second])
+    assert work == pytest.approx(3e5 * 1e-4 * 4 * (4e-4 - 1e-4), rel=1e-3)
+
+
+def test_a_delay_is_as_long_as_it_says():
+    law = Delay(1e-3)
+    law.begin(2.5e-4)
+    out = [law.command(float(k)) for k in range(8)]
+    # Steps of a quarter of a millisecond: four of them.
+    assert out[4:] == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_a_law_does_nothing_unless_told():
+    law = Law()
+    law.begin(1e-3)
+    assert law.torque(at(1.0)) == (0.0, 0.0)
+    assert (law.sensor(1.0), law.command(2.0), law.reported(3.0)) == (0.0, 2.0, 3.0)
+
+
+# Scores.
+
+
+def judged(
+    truth: tuple[str, ...], named: tuple[str, ...], verdict: str = "explained", **more: object
+) -> Judged:
+    values: Mapping[str, object] = {
+        "name": "case",
+        "truth": truth,
+        "in_library": True,
+        "severity": 10.0,
+        "verdict": verdict,
+        "named": named,
+        "probabilities": (0.9,) * len(named),
+        "allowed": frozenset(named),
+        "where": frozenset(),
+        "ratios": (),
+        "covered": (),
+    }
+    return Judged(**{**values, **more})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("hits", "of"), [(0, 10), (7, 9), (300, 300)])
+def test_intervals_are_wilsons(hits: int, of: int):
+    wanted = scipy.stats.binomtest(hits, of).proportion_ci(method="wilson")
+    assert Share(hits, of).interval() == pytest.approx((wanted.low, wanted.high), abs=1e-4)
+
+
+def test_figures_count_what_they_say():
+    cases = [
+        judged(("backlash@1",), ("backlash@1",)),
+        judged(("backlash@1",), ("coulomb_friction@1",)),
+        judged(("backlash@2",), (), "unknown", where=frozenset({2})),
+        judged(("backlash@3",), (), "none", severity=0.5),
+        judged((), (), "none", severity=0.0),
+        judged((), ("payload",), "explained", severity=0.0),
+        judged(("outside_tone@1",), (), "unknown", in_library=False),
+        judged(("backlash@1", "payload"), ("payload", "backlash@1")),
+        judged(("backlash@1", "payload"), ("payload", "torque_offset@1")),
+    ]
+    shares = {name: (s.hits, s.of) for name, s in figures(cases).items()}
+    assert shares["effect first, severity 3 and more"] == (1, 3)
+    assert shares["axis"] == (3, 4)
+    assert shares["false alarms on nothing withheld"] == (1, 2)
+    assert shares["out of the library: unknown"] == (1, 1)
+    assert shares["wrong cause explained"] == (3, 9)
+    assert shares["pairs: both"] == (1, 2)
+    assert shares["pairs: spurious third"] == (1, 2)
+    assert [c.right for c in cases] == [True, False, False, False, True, False, True, True, False]
+    # Seven causes named at 0.9, four of them true.
+    assert calibration_error(cases) == pytest.approx(0.9 - 4 / 7)
+
+
+def test_from_machine_to_score(tmp_path: Path, robot: Robot):
+    cases, truth, out = tmp_path / "cases", tmp_path / "truth", tmp_path / "out"
+    shell = CliRunner()
+    made = shell.invoke(
+        app, ["blind", "make", str(cases), "--truth", str(truth), "--count", "1", "--workers", "1"]
+    )
+    assert made.exit_code == 0, made.output
+    (case,) = cases.iterdir()
+    assert not list(case.rglob("*truth*.json"))
+    before = (case / "logs" / "moves.parquet").read_bytes()
+    # What is there stays, and would come out the same.
+    make_cases(cases, truth, [0], 0, 1, lambda *_: None)
+    (case / SEAL).unlink()
+    make_cases(cases, truth, [0], 0, 1, lambda *_: None)
+    assert (case / "logs" / "moves.parquet").read_bytes() == before
+    solved = shell.invoke(app, ["blind", "run", str(cases), "--out", str(out), "--workers", "1"])
+    assert solved.exit_code == 0, solved.output
+    (found,) = judged_cases(cases, truth, out)
+    assert (found.kind, found.verdict, found.right) == ("nothing", "none", True)
+    table = tmp_path / "score.md"
+    arguments = ["--truth", str(truth), "--verdicts", str(out), "--out", str(table)]
+    scored = shell.invoke(app, ["blind", "score", str(cases), *arguments])
+    assert scored.exit_code == 0, scored.output
+    assert "| false alarms on nothing withheld | 0/1 = 0 %" in table.read_text("utf-8")
+    # A truth that was changed later is no truth.
+    path = truth / f"{case.name}.json"
+    path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), "seed": 5}), "utf-8")
+    with pytest.raises(InputError, match="sealed"):
+        judged_cases(cases, truth, out)
+
+
+def test_truths_stay_apart_from_cases(tmp_path: Path):
+    with pytest.raises(InputError, match="truth: expected another folder"):
+        make_cases(tmp_path, tmp_path, [0], 0, 1, lambda *_: None)
