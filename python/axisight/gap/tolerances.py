@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.settings import Settings
 from axisight.robot import Robot
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
+
+# Robot files state values to as many digits.
+_SAME = 1e-6
 
 
 def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
@@ -46,23 +49,22 @@ def identified_tolerances(robot_file: Path | str, model_error: float) -> dict[st
     """Return relative tolerances by name from the identification beside a robot file.
 
     Standard errors know of noise and not of the errors of formulas: ``model_error``, the relative
-    error of a perfect simulator, is added in squares. Empty where there is no identification, or for
-    a preset. Raises InputError where the robot file was changed after it.
+    error of a perfect simulator, is added in squares. They belong to the values that were
+    identified: one that was changed in the file since is left out. Empty where there is no
+    identification, or for a preset. Raises InputError for one that cannot be read.
     """
     path = sidecar_path(robot_file)
     if not path.is_file():
         return {}
-    try:
-        found = load_identified(path)
-    except InputError as error:
-        raise InputError(
-            f"{error}; a diagnosis takes its tolerances from there: to go on without, move it away"
-        ) from None
+    found = load_identified(path, check=False)
     if found.robot is None:
         return {}
     stated = robot_parameters(found.robot)
     out = {}
-    for name, deviation in zip(found.names, found.standard_errors, strict=True):
-        if stated.get(name) and np.isfinite(deviation):
-            out[name] = float(np.hypot(deviation / abs(stated[name]), model_error))
+    for name, value, deviation in zip(
+        found.names, found.values, found.standard_errors, strict=True
+    ):
+        same = math.isclose(stated.get(name, np.nan), value, rel_tol=_SAME)
+        if same and value != 0 and np.isfinite(deviation):
+            out[name] = float(np.hypot(deviation / abs(value), model_error))
     return out
