@@ -34,7 +34,7 @@ fn the_dead_zone_is_a_shifted_line_outside_its_edge_and_nothing_inside() {
 /// Torques of a gear that slips, `a k D z`, along a way of its deflection in small steps (midpoint
 /// rule: the error of the way is the square of a step over D, 1e-6).
 fn slipping(share: f64, deflection: f64, stiffness: f64, way: &[f64]) -> Vec<f64> {
-    let kernel = build("gear_hysteresis", &[share, deflection]).expect("in the table");
+    let kernel = build("gear_hysteresis", &[share, deflection, 0.0]).expect("in the table");
     let (mut z, mut rate) = ([0.0], [0.0]);
     let mut torques = Vec::new();
     for step in way.windows(2) {
@@ -83,6 +83,26 @@ fn a_gear_that_slips_follows_the_bouc_wen_model() {
         .collect();
     let end = *slipping(a, d, k, &back).last().expect("steps");
     assert!((end - (top - a * k * 0.5 * d)).abs() < 1e-5 * full);
+}
+
+#[test]
+fn a_slipping_spring_that_the_stiffness_includes_shows_in_large_motions_only() {
+    let (a, d, k) = (0.3, 2e-4, 1e5);
+    let kernel = build("gear_hysteresis", &[a, d, 1.0]).expect("in the table");
+    let torque = |loaded: f64, z: f64| {
+        kernel.gear_torque(&Spring {
+            loaded,
+            rate: 0.0,
+            stiffness: k,
+            internal: &[z],
+        })
+    };
+    // Stuck, z follows the deflection: nothing is different from the gear's own spring.
+    assert!(torque(1e-6, 1e-6 / d).abs() < 1e-12 * k);
+    // Slipping, the gear is softer by the share, about a force that stays.
+    let slope = (torque(5e-3, 1.0) - torque(4e-3, 1.0)) / 1e-3;
+    assert!((slope + a * k).abs() < 1e-9 * k);
+    assert!((torque(0.0, 1.0) - a * k * d).abs() < 1e-12 * k);
 }
 
 #[test]

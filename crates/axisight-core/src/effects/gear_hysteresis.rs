@@ -5,8 +5,8 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "gear_hysteresis",
-    summary: "a loop of torque over deflection: stiffer than its spring until it slips",
-    equation: "tau_g = k delta + a k D z,  z' = (delta' - (|delta'| z + delta' |z|) / 2) / D",
+    summary: "a loop of torque over deflection: a spring beside the gear's slips, or part of it",
+    equation: "tau_g = k (1 - b a) delta + a k D z,  z' = (delta' - (|delta'| z + delta' |z|) / 2) / D",
     source: "Bouc-Wen model: Wen (1976), J. Eng. Mech. Div. 102(2), with A = n = 1, beta = gamma = 1/2; beside the spring as in Dhaouadi, Ghorbel, Gandhi (2003), IEEE Trans. Ind. Electron. 50(6)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -39,18 +39,30 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1.0,
             typical: 3e-4,
         },
+        // Of a stiffness measured with small motions all, of one measured with large ones nothing.
+        ParameterInfo {
+            name: "included",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.0,
+            lower: -0.5,
+            upper: 1.5,
+            typical: 0.5,
+        },
     ],
 };
 
 struct Hysteresis<S> {
     share: S,
     deflection: S,
+    included: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
     Box::new(Hysteresis {
         share: p[0],
         deflection: p[1],
+        included: p[2],
     })
 }
 
@@ -62,7 +74,8 @@ impl<S: Scalar> Kernel<S> for Hysteresis<S> {
     fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
         // It starts relaxed, whatever the load at rest.
         let slipping = spring.internal.first().map_or_else(S::zero, |z| *z);
-        self.share * spring.stiffness * self.deflection * slipping
+        let taken = self.included * spring.loaded;
+        self.share * spring.stiffness * (self.deflection * slipping - taken)
     }
 
     fn gear_rates(&self, spring: &Spring<'_, S>, rates: &mut [S]) {
