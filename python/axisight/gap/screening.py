@@ -161,17 +161,17 @@ class Screen:
         return option.at({name: value}), self.model.total - least
 
 
-def thinned(fitter: ModelFitter, model: Evidence, above: Array, layout: Layout) -> Screen:
-    """Return the screen of a model on the logs that have most to explain.
+def thinned(bench: Bench, above: Array, layout: Layout) -> Screen:
+    """Return the screen of a model on the logs of a bench that have most to explain.
 
     ``above`` (n_blocks,): loss above the floor.
     """
     logs = loudest_logs(above, layout)
     kept = np.isin(layout.log, logs)
     if kept.all():
-        return Screen(Bench(fitter, model))
+        return Screen(bench)
     scale = float(above.sum() / max(above[kept].sum(), 1e-300))
-    return Screen(Bench(fitter.part(logs), model.part(logs)), max(scale, 1.0))
+    return Screen(Bench(bench.fitter.part(logs), bench.model.part(logs)), max(scale, 1.0))
 
 
 def loudest_logs(above: Array, layout: Layout) -> list[int]:

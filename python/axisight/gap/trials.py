@@ -98,7 +98,7 @@ class Trials:
             return self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
 
     def _screened(self, options: Sequence[FreeEffect], number: int) -> list[Start]:
-        screen = thinned(self.fitter, self.model, self.current - self.floor, self.layout)
+        screen = thinned(self.bench, self.current - self.floor, self.layout)
         if any(option.starts and len(option.free) == 1 for option in options):
             screen.bench.begin_nominal()
         label = f"screening candidates, round {number}"

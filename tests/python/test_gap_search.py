@@ -1,0 +1,92 @@
+"""The search: what waits for the next round, what is withdrawn in the end."""
+
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.gap import search
+from axisight.gap.layout import Layout
+from axisight.gap.model import FreeEffect
+from axisight.gap.screening import Start
+from axisight.gap.trials import Trials
+
+
+def free(label: str) -> FreeEffect:
+    name, _, axis = label.partition("@")
+    return FreeEffect(Effect(name, int(axis) if axis else None), ())
+
+
+class Round(Trials):
+    """A round on two axes with one block each, whose fits have known losses by label."""
+
+    def __init__(self, losses: dict[str, tuple[float, float]]) -> None:
+        one = np.ones(2, dtype=np.int64)
+        self.layout = Layout(np.array([0, 1]), one, one, one)
+        self.current, self.floor = np.array([10.0, 2.0]), np.array([1.0, 1.0])
+        self.losses, self.waiting, self.asked = losses, [], []
+        self.progress = lambda *_: None
+
+    def _fitted(self, start: Start):
+        label = start.option.effect.label
+        self.asked.append(label)
+        return SimpleNamespace(label=label, held_out=np.array(self.losses[label]))
+
+    def fit(self, promises: dict[str, float]) -> list[str]:
+        """Fit candidates with these promises; return the labels of those fitted."""
+        starts = [Start(free(label), {}, gain) for label, gain in promises.items()]
+        with ThreadPoolExecutor(1) as pool:
+            return [t.label for t in self._fitted_by_place(pool, starts, "fitting")]
+
+
+PROMISES = {"torque_offset@2": 0.8, "backlash@1": 8.0, "payload": 1.0}
+
+
+def test_what_one_elsewhere_explains_waits():
+    # Play on axis 1 takes three fifths of what is left on axis 2.
+    round_ = Round({"backlash@1": (2.0, 1.4), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
+    assert set(round_.fit(PROMISES)) == {"backlash@1", "payload"}
+    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@2"]
+
+
+def test_what_nothing_elsewhere_explains_is_fitted():
+    round_ = Round({"backlash@1": (2.0, 1.9), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
+    assert set(round_.fit(PROMISES)) == set(PROMISES)
+    assert round_.waiting == []
+    # The most promising place comes first, the arm's own effects with it.
+    assert round_.asked[-1] == "torque_offset@2"
+
+
+@pytest.mark.parametrize(
+    ("probability", "left_in_the_end", "kept"),
+    [
+        # Something unknown is likelier, and most of what it was to explain is still there.
+        (0.04, 0.19, ["backlash@2"]),
+        # Others have explained the rest since.
+        (0.04, 0.02, ["torque_constant@1", "backlash@2"]),
+        # Nothing is likelier.
+        (0.95, 0.19, ["torque_constant@1", "backlash@2"]),
+    ],
+)
+def test_a_cause_less_likely_than_something_unknown_needs_the_rest_explained(
+    monkeypatch: pytest.MonkeyPatch, probability: float, left_in_the_end: float, kept: list[str]
+):
+    def entered(label: str, axis: int, p: float, unknown: float):
+        ranked = SimpleNamespace(trial=SimpleNamespace(label=label), probability=p)
+        return ranked, SimpleNamespace(axis=axis, p_unknown=unknown)
+
+    accepted = (
+        entered("torque_constant@1", 0, probability, 0.9 if probability < 0.5 else 0.02),
+        entered("backlash@2", 1, 0.99, 0.0),
+    )
+    model = SimpleNamespace(free=[free("torque_constant@1"), free("backlash@2")])
+    state = SimpleNamespace(
+        model=model,
+        rounds=[search.Round((), accepted, np.array([0.25, 5.0]))],
+        left=lambda: np.array([left_in_the_end, 4.0]),
+    )
+    monkeypatch.setattr(search, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
+    search._withdraw_doubtful(None, state, Settings())  # type: ignore[arg-type]
+    assert [f.effect.label for f in state.model.free] == kept
