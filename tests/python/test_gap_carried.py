@@ -75,6 +75,17 @@ def test_causes_that_leave_the_gap_are_withdrawn(after: float, words: str):
     assert all(a.verdict == "unknown" and a.causes == () for a in found.axes)
 
 
+def test_causes_that_leave_more_than_the_refit_alone_are_withdrawn():
+    # Re-fitted the simulator stands at the floor; the causes hide behind the gap before.
+    floor = stages(0.05, 0.05)
+    alone = replace(stages(0.9, 0.06), refitted=floor.refitted)
+    found = judged(named(), alone)
+    assert found.verdict == "unknown"
+    assert "re-fitted within its tolerances leaves" in (found.withdrawn or "")
+    # As much as the re-fit, to a twentieth of the noise: they may be what the re-fit stands for.
+    assert judged(named(), replace(stages(0.9, 0.0505), refitted=floor.refitted)) == named()
+
+
 def test_a_simulator_bent_out_of_shape_explains_nothing():
     good = stages(0.5, 0.06)
     assert judged(named(), good, bent=0.2).verdict == "explained"

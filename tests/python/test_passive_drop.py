@@ -114,7 +114,7 @@ def by_pinocchio(text: str) -> Array:
 
 def by_mujoco(text: str, substeps: int = 16) -> Array:
     """Fourth-order Runge-Kutta with an error of 3e-7 at one sub-step, 16^4 times less here."""
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `bench`")
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `blind`")
     import mujoco_model  # noqa: PLC0415
 
     model = mujoco.MjModel.from_xml_string(mujoco_model.build(text, "RK4", 5e-4 / substeps))

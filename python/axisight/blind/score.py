@@ -74,7 +74,7 @@ class Share:
         n, p, z = self.of, self.hits / self.of, _NORMAL_95
         middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
         half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        return float(middle - half), float(middle + half)
+        return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
 
     def __str__(self) -> str:
         """Return the share in words of a table."""

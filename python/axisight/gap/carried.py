@@ -92,6 +92,12 @@ def _squares(stage: Stage) -> Array:
 
 def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings) -> str | None:
     """Say so where the causes remove too little of the gap."""
+    if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
+        return (
+            f"What explains the estimation logs does not carry over to the validation logs: there the "
+            f"simulator re-fitted within its tolerances leaves {percent(gap.refitted)} of the torque, with it "
+            f"{percent(gap.after)}."
+        )
     explainable = gap.before**2 - gap.floor**2
     share = (gap.before**2 - gap.after**2) / explainable if explainable > 0 else 0.0
     if share >= _ENOUGH:
