@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
+from functools import partial
 from importlib import resources
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,13 @@ from numpy.typing import NDArray
 
 from axisight.blind.drawing import Draw, draw, machine_of
 from axisight.blind.engine import run
+from axisight.blind.processes import Progress, shared_out
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.storage import write_bytes, write_whole
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 _PRESET = "irb6600_like"
 
@@ -42,12 +41,8 @@ def make_cases(
     """
     if cases.resolve() == truths.resolve():
         raise InputError("truth: expected another folder than that of the cases")
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = [pool.submit(_make, cases, truths, seed, number) for number in numbers]
-        for done, job in enumerate(as_completed(jobs)):
-            progress("simulating machines", done, len(jobs))
-            job.result()
-    progress("simulating machines", len(numbers), len(numbers))
+    make = partial(_make, cases, truths, seed)
+    shared_out(make, numbers, workers, "simulating machines", progress)
 
 
 def _make(cases: Path, truths: Path, seed: int, number: int) -> None:

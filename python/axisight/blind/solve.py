@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
+from axisight.blind.processes import Progress, shared_out
 from axisight.errors import AxisightError
 from axisight.gap import Settings, diagnose
 from axisight.storage import write_whole
-
-Progress = Callable[[str, int, int], None]
 
 
 def solve_cases(
@@ -28,16 +25,10 @@ def solve_cases(
         if not (verdicts / f"{path.name}.json").is_file()
     ]
     each = replace(settings, threads=max(1, settings.threads // workers))
-    failed: dict[str, str] = {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = {pool.submit(_solve, path, verdicts, each): path.name for path in todo}
-        for done, job in enumerate(as_completed(jobs)):
-            progress("diagnosing cases", done, len(todo))
-            reason = job.result()
-            if reason is not None:
-                failed[jobs[job]] = reason
-    progress("diagnosing cases", len(todo), len(todo))
-    return failed
+    solve = partial(_solve, verdicts=verdicts, settings=each)
+    reasons = shared_out(solve, todo, workers, "diagnosing cases", progress)
+    named = ((path.name, reason) for path, reason in zip(todo, reasons, strict=True))
+    return {name: reason for name, reason in named if reason is not None}
 
 
 def _solve(case: Path, verdicts: Path, settings: Settings) -> str | None:
@@ -47,9 +38,9 @@ def _solve(case: Path, verdicts: Path, settings: Settings) -> str | None:
     except AxisightError as error:
         return str(error)
     path = verdicts / f"{case.name}.json"
-    partial = path.with_suffix(".partial")
-    partial.parent.mkdir(parents=True, exist_ok=True)
-    found.save_verdict(partial)
-    write_whole(path, partial.read_text("utf-8"))
-    partial.unlink()
+    begun = path.with_suffix(".partial")
+    begun.parent.mkdir(parents=True, exist_ok=True)
+    found.save_verdict(begun)
+    write_whole(path, begun.read_text("utf-8"))
+    begun.unlink()
     return None
