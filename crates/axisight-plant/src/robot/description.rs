@@ -98,6 +98,7 @@ pub enum Controller {
 impl Controller {
     /// The same controller for a loop `factor` times as fast: damping torque with the factor,
     /// stiffness torque with its square.
+    #[must_use]
     pub fn at_speed(&self, factor: f64) -> Self {
         let scaled = |gains: &[f64], by: f64| gains.iter().map(|g| g * by).collect();
         match self {
