@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.blind.case_files import moves
 from axisight.blind.engine import Machine
 from axisight.blind.withheld import KINDS, Drawn
 from axisight.robot import Robot
@@ -120,9 +121,9 @@ def references(rng: np.random.Generator, robot: Robot) -> dict[str, tuple[str, A
         out[f"multisine_axis{axis + 1}"] = ("estimation", _multisine(rng, time, loud))
     out["multisine_half"] = ("estimation", _multisine(rng, time, np.full(axes, 4.0), 0.5))
     out["triangle"] = ("estimation", _triangle(time, 0.55 * np.abs(top)))
-    out["moves"] = ("estimation", _moves(time, top))
+    out["moves"] = ("estimation", moves(time, _SECONDS, top))
     out["multisine_fresh"] = ("validation", _multisine(rng, time, np.full(axes, 4.0), 0.7))
-    out["moves_fresh"] = ("validation", _moves(time, fresh))
+    out["moves_fresh"] = ("validation", moves(time, _SECONDS, fresh))
     return out
 
 
@@ -142,14 +143,3 @@ def _triangle(time: Array, top: Array) -> Array:
     phase = (time / 5.0 + 0.25) % 1.0
     wave = 4 * np.abs(phase - 0.5) - 1
     return np.asarray(-wave[:, None] * top)
-
-
-def _moves(time: Array, top: Array) -> Array:
-    """Return moves out and back with pauses."""
-    phase = time / _SECONDS
-
-    def bump(s: Array) -> Array:
-        return np.where((s > 0) & (s < 1), np.sin(np.pi * np.clip(s, 0, 1)) ** 2, 0.0)
-
-    shape = bump((phase - 0.05) / 0.35) - bump((phase - 0.55) / 0.35)
-    return np.asarray(shape[:, None] * top)

@@ -5,23 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from functools import partial
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 
+from axisight.blind.case_files import CaseFolder
 from axisight.blind.drawing import Draw, draw, machine_of
 from axisight.blind.engine import run
 from axisight.blind.processes import Progress, shared_out
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
-from axisight.storage import write_bytes, write_whole
-
-Array = NDArray[np.float64]
+from axisight.storage import write_whole
 
 _PRESET = "irb6600_like"
 
@@ -54,30 +50,16 @@ def _make(cases: Path, truths: Path, seed: int, number: int) -> None:
 
 def _write(folder: Path, truth: Path, drawn: Draw, seed: int, robot: Robot) -> None:
     rng = np.random.default_rng([seed, drawn.number, 1])
-    toml = ['schema = "axisight.case/1"', f'name = "{folder.name}"', 'robot = "robot.toml"', ""]
+    case = CaseFolder(folder, folder.name)
     for name, (role, reference) in drawn.references.items():
         noise = robot.position_noise_std * rng.standard_normal(reference.shape)
-        torque, angle = run(drawn.machine, reference, noise)
-        path = folder / "logs" / f"{name}.parquet"
-        write_bytes(path, _table(robot.sample_time_s, reference, torque, angle))
-        toml += ["[[log]]", f'file = "logs/{name}.parquet"', f'role = "{role}"', ""]
-    preset = resources.files("axisight.robot.presets") / f"{_PRESET}.toml"
-    write_whole(folder / "robot.toml", preset.read_text("utf-8"))
-    write_whole(folder / "case.toml", "\n".join(toml))
+        time_s = np.arange(len(reference), dtype=np.float64) * robot.sample_time_s
+        case.add(name, role, time_s, reference, *run(drawn.machine, reference, noise))
+    case.finish(_PRESET)
     text = json.dumps(_truth(drawn, seed), indent=1)
     write_whole(truth, text)
     # Last: a case with its seal is whole.
     write_whole(folder / SEAL, seal_of(text) + "\n")
-
-
-def _table(sample_time_s: float, reference: Array, torque: Array, angle: Array) -> bytes:
-    data = {"time_s": np.arange(len(reference)) * sample_time_s}
-    for i in range(reference.shape[1]):
-        data[f"velocity_ref_{i + 1}"] = reference[:, i]
-        data[f"torque_cmd_{i + 1}"] = torque[:, i]
-        data[f"position_{i + 1}"] = angle[:, i]
-    out: bytes = pd.DataFrame(data).to_parquet(index=False)
-    return out
 
 
 def _truth(drawn: Draw, seed: int) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from axisight.blind.sealed import SEAL, seal_of
 from axisight.blind.withheld import KINDS
@@ -19,7 +20,6 @@ SEVERE = 3.0
 # Alternatives this likely belong to what a verdict allows.
 _ALTERNATIVE = 0.05
 _BINS = 10
-_NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Judged:
     """One verdict beside its truth.
 
     Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
-    ``parameters``: named value over true value, of what both state.
+    ``where``: the axis on which the gap mainly lies. ``ratios``: named value over true value of the
+    parameters that both state; ``covered``: whether their intervals hold the true value.
     """
 
     name: str
@@ -71,10 +72,8 @@ class Share:
         """Return the interval (Wilson 1927); all of it where nothing was tried."""
         if self.of == 0:
             return 0.0, 1.0
-        n, p, z = self.of, self.hits / self.of, _NORMAL_95
-        middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
-        half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
+        found = scipy.stats.binomtest(self.hits, self.of).proportion_ci(method="wilson")
+        return float(found.low), float(found.high)
 
     def __str__(self) -> str:
         """Return the share in words of a table."""

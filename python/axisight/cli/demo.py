@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from axisight.blind.case_files import CaseFolder, moves
 from axisight.effects import Effect
 from axisight.effects.stated import DEMONSTRATION
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
-from axisight.storage import write_bytes, write_whole
 
 Array = NDArray[np.float64]
 
@@ -32,28 +30,22 @@ def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = DEMONSTRATI
     machine = _scattered(nominal, seed)
     rng = np.random.default_rng([seed, 2])
     n = int(_SECONDS / nominal.sample_time_s)
+    time_s = np.arange(n, dtype=np.float64) * nominal.sample_time_s
     runs = {
         "multisine": ("estimation", _multisine(n, nominal, rng, 9.0)),
         "multisine_half": ("estimation", _multisine(n, nominal, rng, 4.5)),
-        "moves": ("estimation", _moves(n, nominal, np.array([50.0, 40.0, -45.0]))),
+        "moves": ("estimation", moves(time_s, _SECONDS, np.array([50.0, 40.0, -45.0]))),
         "multisine_fresh": ("validation", _multisine(n, nominal, rng, 7.0)),
-        "moves_fresh": ("validation", _moves(n, nominal, np.array([-40.0, 30.0, 50.0]))),
+        "moves_fresh": ("validation", moves(time_s, _SECONDS, np.array([-40.0, 30.0, 50.0]))),
     }
-    toml = ['schema = "axisight.case/1"', 'name = "demo"', 'robot = "robot.toml"', ""]
+    case = CaseFolder(folder, "demo")
     for run, (name, (role, reference)) in enumerate(runs.items()):
         out = simulate(machine, reference, effects=[effect], noise_seed=seed, run=run)
         if out.attrs["status"] != "completed":
             raise InputError(f"demo: the simulated machine is unstable with {effect.label}")
-        data = {"time_s": out["time"].values}
-        for i in range(nominal.n_axes):
-            data[f"velocity_ref_{i + 1}"] = reference[:, i]
-            data[f"torque_cmd_{i + 1}"] = out["torque_cmd_nm"].values[:, i]
-            data[f"position_{i + 1}"] = out["position_rad"].values[:, i]
-        write_bytes(folder / "logs" / f"{name}.parquet", pd.DataFrame(data).to_parquet(index=False))
-        toml += ["[[log]]", f'file = "logs/{name}.parquet"', f'role = "{role}"', ""]
-    preset = resources.files("axisight.robot.presets") / "irb6600_like.toml"
-    write_whole(folder / "robot.toml", preset.read_text("utf-8"))
-    write_whole(folder / "case.toml", "\n".join(toml))
+        torque, angle = out["torque_cmd_nm"].values, out["position_rad"].values
+        case.add(name, role, out["time"].values, reference, torque, angle)
+    case.finish("irb6600_like")
     return folder
 
 
@@ -88,16 +80,3 @@ def _multisine(n: int, robot: Robot, rng: np.random.Generator, peak_rad_s: float
         ramp = np.minimum(time / 0.1, 1.0)
         out[:, i] = ramp * peak_rad_s * (0.7 * wave / np.abs(wave).max() + square)
     return out
-
-
-def _moves(n: int, robot: Robot, top_rad_s: Array) -> Array:
-    """Return point-to-point moves out and back, with pauses, (n, n_axes) [rad/s]."""
-    phase: Array = np.arange(n, dtype=np.float64) * robot.sample_time_s / _SECONDS
-    shape = _bump((phase - 0.05) / 0.35) - _bump((phase - 0.55) / 0.35)
-    return np.asarray(shape[:, None] * top_rad_s)
-
-
-def _bump(s: Array) -> Array:
-    """Return a smooth bump from 0 to 1 and back over 0 < s < 1."""
-    inside = (s > 0) & (s < 1)
-    return np.asarray(np.where(inside, np.sin(np.pi * np.clip(s, 0, 1)) ** 2, 0.0))

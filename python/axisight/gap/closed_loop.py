@@ -29,8 +29,8 @@ Complex = NDArray[np.complex128]
 
 # Speed of the loop that keeps a simulator on a log, relative to the machine's own. Any loop will do
 # where all is linear: weights undo its response. But with lost motion or stiction in the model a
-# tight one chatters: widths of a play two thousandths apart differ by a third in loss, where a
-# loop of a third of the speed leaves one smooth valley. Slower still, the simulator strays from
+# tight one chatters: widths of a play two thousandths apart differ by a third in loss, which in
+# a loop of a third of the speed is all but smooth. Slower still, the simulator strays from
 # the log by more than waves of a ripple are long.
 TRACKING_SPEED = 1 / 3
 
