@@ -20,7 +20,8 @@ import numpy as np
 from real_arms import MACHINES, Machine
 
 from axisight import Diagnosis, Robot, Settings, diagnose
-from axisight.gap.inverse import motion, predicted_torque
+from axisight.gap.inverse import predicted_torque
+from axisight.gap.motion import motion
 from axisight.gap.torques import AS_GIVEN
 
 # Below this share of the torque's standard deviation on its axis an effect is not worth finding.

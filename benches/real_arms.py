@@ -40,7 +40,13 @@ class Machine:
         return self.complete.with_effects([]).with_parameters(dict.fromkeys(viscous, 0.0))
 
 
-def _log(name: str, rate_hz: float, position: np.ndarray, torque: np.ndarray) -> Log:
+def _log(
+    name: str,
+    rate_hz: float,
+    position: np.ndarray,
+    torque: np.ndarray,
+    velocity: np.ndarray | None = None,
+) -> Log:
     return Log(
         name=name,
         source=Path(name),
@@ -49,6 +55,7 @@ def _log(name: str, rate_hz: float, position: np.ndarray, torque: np.ndarray) ->
         velocity_ref_rad_s=None,
         torque_nm=np.ascontiguousarray(torque),
         position_rad=np.ascontiguousarray(position),
+        velocity_rad_s=None if velocity is None else np.ascontiguousarray(velocity),
     )
 
 
@@ -103,8 +110,10 @@ def kr300(data: Path) -> Machine:
         path = data / "kuka_kr300" / run / "data.mat"
         rec = loadmat(path, struct_as_record=False, squeeze_me=True)["rec"]
         # Motor angles are written as those of the joints, in degrees.
-        motor = np.deg2rad(rec.act_pos_mot_deg.T) / ratio
-        logs.append(_log(f"run {run}", 250.0, motor, rec.act_torque_abs_nm.T))
+        motor, speed = (
+            np.deg2rad(x.T) / ratio for x in (rec.act_pos_mot_deg, rec.act_vel_mot_deg_per_s)
+        )
+        logs.append(_log(f"run {run}", 250.0, motor, rec.act_torque_abs_nm.T, speed))
     return Machine("KR300", _identified(file, logs[:2], 8.0), logs[:2], logs[2:])
 
 

@@ -737,7 +737,7 @@ def fit_inverse_dynamics(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array, _Array]],
+    records: Sequence[tuple[_Array, _Array, _Array, _Array, _Array]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -746,8 +746,9 @@ def fit_inverse_dynamics(
 ) -> FitResult:
     """Fit the torque predicted from measured motions, transmissions taken as rigid.
 
-    ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm]) of
-    shape (n_samples, n_axes), motor side, one per log. ``weighting`` has one entry per axis.
+    ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm],
+    certainty [1]) of shape (n_samples, n_axes), motor side, one per log; the certainty, from 0 to 1,
+    is a factor on the error of its sample. ``weighting`` has one entry per axis.
     ``warm`` holds Jacobian columns from an earlier fit, as for `fit_simulation`.
     ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
     """
@@ -794,7 +795,7 @@ def evaluate_inverse_dynamics(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array, _Array]],
+    records: Sequence[tuple[_Array, _Array, _Array, _Array, _Array]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,

@@ -94,6 +94,7 @@ def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 
         axis=np.zeros(len(starts), dtype=np.int64),
         start=starts,
         size=np.full(len(starts), block),
+        samples=np.full(len(starts), float(block)),
         prior_matrix=np.zeros((p, p)),
         prior_gradient=np.zeros(p),
         residual=residual,

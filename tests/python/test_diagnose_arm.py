@@ -6,13 +6,17 @@ import pytest
 
 from axisight import Settings, diagnose
 from axisight.gap import verdict_schema
-from axisight.gap.cutoff import chosen_cutoff_hz, highest_cutoff_hz
-from axisight.gap.inverse import motion, predicted_torque
+from axisight.gap.cutoff import chosen_filtering, highest_cutoff_hz
+from axisight.gap.inverse import predicted_torque
 from axisight.gap.torques import AS_GIVEN
 from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
 
 ROBOT = arm()
 QUICK = Settings(bootstrap=50)
+
+
+def rigid_torque(at):
+    return predicted_torque(ROBOT, AS_GIVEN, at)
 
 
 def diagnosis(coulomb=COULOMB_NM, viscous=VISCOUS, seconds=20.0):
@@ -96,7 +100,7 @@ def test_the_cutoff_follows_the_noise_of_the_position():
         log = log_of(ROBOT, 0, seconds=20.0)
         rng = np.random.default_rng(1)
         log.position_rad[:] += noise_rad * rng.normal(size=log.position_rad.shape)
-        return chosen_cutoff_hz([log], motion, lambda m: predicted_torque(ROBOT, AS_GIVEN, m))
+        return chosen_filtering([log], rigid_torque).cutoff_hz
 
     quiet, loud = cutoff(0.0), cutoff(1e-3)
     assert loud < 0.5 * quiet <= 0.5 * highest_cutoff_hz(0.01)

@@ -81,11 +81,11 @@ def test_torque_of_a_motion_is_predicted(robot):
     arguments = (robot.core, [], [])
     flat = Weighting.flat(1).core()
     torque = _core.evaluate_inverse_dynamics(
-        *arguments, [(*moved, still)], flat, FitOptions()
+        *arguments, [(*moved, still, still + 1)], flat, FitOptions()
     ).residual
     # What is predicted, measured: nothing is left.
     exact = _core.evaluate_inverse_dynamics(
-        *arguments, [(*moved, torque[:, None])], flat, FitOptions()
+        *arguments, [(*moved, torque[:, None], still + 1)], flat, FitOptions()
     )
     assert np.abs(torque).max() > 1e-3
     np.testing.assert_allclose(exact.residual, 0.0, atol=1e-12 * np.abs(torque).max())

@@ -337,8 +337,9 @@ pub fn courses(
     Ok(Courses { runs })
 }
 
-/// A motion as (position, velocity, acceleration, torque), each `(n, n_axes)`, motor side.
+/// A motion as (position, velocity, acceleration, torque, certainty), each `(n, n_axes)`, motor side.
 type MotionTuple<'py> = (
+    PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
@@ -354,12 +355,13 @@ fn inverse_dynamics(
     block_s: f64,
 ) -> PyResult<InverseDynamics> {
     let n_axes = robot.n_axes();
-    let record = |(q, v, a, t): &MotionTuple<'_>| {
+    let record = |(q, v, a, t, c): &MotionTuple<'_>| {
         Ok(MotionRecord {
             position: rows(q, "position", n_axes)?,
             velocity: rows(v, "velocity", n_axes)?,
             acceleration: rows(a, "acceleration", n_axes)?,
             torque: rows(t, "torque", n_axes)?,
+            certainty: rows(c, "certainty", n_axes)?,
         })
     };
     let problem = InverseDynamics {

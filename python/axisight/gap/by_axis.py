@@ -27,23 +27,28 @@ _CARRIED = 0.25
 def believed_by_axis(found: Search, fitter: ModelFitter, settings: Settings) -> Search:
     """Return the search with the causes of those axes only that they explain well enough.
 
-    Unchanged where they explain the arm, and where errors of axes do not add up.
+    Unchanged where errors of axes do not add up, and where no axis is explained.
     """
-    if not fitter.adds_up or not found.accepted or found.explained() >= settings.explained_share:
+    if not fitter.adds_up or not found.accepted:
         return found
-    excess, removed = found.to_explain(), found.removed()
-    share = removed / np.maximum(excess, 1e-300)
-    well = [
-        f
-        for f, (_, s) in zip(found.model.free, found.accepted, strict=True)
-        if share[s.axis] >= settings.explained_share
-    ]
+    arm = found.explained() >= settings.explained_share
+    share = found.removed() / np.maximum(found.to_explain(), 1e-300)
+    well = [s.axis for _, s in found.accepted if share[s.axis] >= settings.explained_share]
     if not well:
         return found
-    model = found.model
-    if len(well) < len(model.free):
-        model = settled(fitter, well, model)
-    return replace(found, model=model, by_axis=True)
+    return replace(_of_axes(found, fitter, set(well)), by_axis=not arm)
+
+
+def without_axis(found: Search, fitter: ModelFitter, axis: int) -> Search:
+    """Return the search without the causes that stood first on ``axis`` (from 0)."""
+    return _of_axes(found, fitter, {s.axis for _, s in found.accepted} - {axis})
+
+
+def _of_axes(found: Search, fitter: ModelFitter, axes: set[int]) -> Search:
+    kept = [f for f, (_, s) in zip(found.model.free, found.accepted, strict=True) if s.axis in axes]
+    if len(kept) == len(found.model.free):
+        return found
+    return replace(found, model=settled(fitter, kept, found.model))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from axisight import _core
@@ -14,15 +13,17 @@ from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
-from axisight.gap.cutoff import Motion, chosen_cutoff_hz
+from axisight.gap.cutoff import chosen_filtering
+from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
-from axisight.gap.noise import Floor, position_noise_std
+from axisight.gap.motion import Motion
+from axisight.gap.noise import Floor
 from axisight.gap.settings import Settings
+from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View
-from axisight.logs import Log, differentiate, lowpass
+from axisight.logs import Log
 from axisight.robot import Robot
-from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
 
@@ -36,39 +37,58 @@ class InverseView(View):
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         cutoff = settings.cutoff_hz
-        if cutoff is None:
-            cutoff = chosen_cutoff_hz(logs, motion, lambda m: predicted_torque(robot, AS_GIVEN, m))
-        if not 0 < cutoff < 0.5 / robot.sample_time_s:
+        if cutoff is not None and not 0 < cutoff < 0.5 / robot.sample_time_s:
             raise InputError(
                 f"cutoff_hz: expected between 0 and the Nyquist frequency "
                 f"{0.5 / robot.sample_time_s:g} Hz, got {cutoff:g} Hz"
             )
-        floor = inverse_floor(robot, logs, cutoff, settings)
+        self.filtering = chosen_filtering(
+            logs, lambda m: predicted_torque(robot, AS_GIVEN, m), cutoff
+        )
+        self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
+        floor = inverse_floor(logs, self.noise, settings)
+        motions = [self.filtering(log) for log in logs]
         fitter = InverseDynamicsFitter(
             robot,
-            [motion(log, cutoff) for log in logs],
+            motions,
+            certainties(robot, motions, floor.weighting),
             floor.weighting,
             settings.tolerances_of(robot),
-            block_s(logs, cutoff, settings),
+            block_s(logs, self.filtering.cutoff_hz, settings),
         )
-        self.cutoff = cutoff
-        super().__init__("inverse_dynamics", robot, logs, settings, fitter, floor, cutoff)
+        super().__init__(
+            "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
+        )
 
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque."""
-        return motion(log, self.cutoff)[3]
+        return self.filtering(log)[3]
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the predicted torque of every log."""
-        return [predicted_torque(self.robot, variant, motion(x, self.cutoff)) for x in logs]
+        return [predicted_torque(self.robot, variant, self.filtering(x)) for x in logs]
 
     def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return the error that noise of position and torque causes, for every log."""
-        std, seed = self.floor.position_std_rad, self.settings.seed
-        return [
-            inverse_noise(self.robot, log, std, self.cutoff, seed, 2 * run)
-            for run, log in enumerate(logs, start=first_run)
+        return [self.noise.error(log, run) for run, log in enumerate(logs, start=first_run)]
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say how the logs were filtered, and what the floor is made of."""
+        chosen = (
+            "as given" if self.settings.cutoff_hz else "chosen as what predicts data left out best"
+        )
+        out = [
+            f"Motion, torque and their noise are low-passed alike at {self.filtering.cutoff_hz:.3g} Hz, {chosen}."
         ]
+        axes = [str(axis) for axis, used in enumerate(self.filtering.measured, 1) if used]
+        if axes:
+            out.append(
+                f"Velocity and acceleration of axis {', '.join(axes)} come from the measured velocity, "
+                f"which predicts data left out better than the position does."
+            )
+        if self.noise.repeated:
+            out.append("The floor is what repeats of one motion differ by.")
+        return tuple(out)
 
 
 # Stretches of time that a gain is compared over need that many blocks, all logs together.
@@ -83,13 +103,15 @@ def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
     return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
 
 
-def motion(log: Log, cutoff_hz: float) -> Motion:
-    """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike."""
-    velocity, acceleration = differentiate(log.position_rad, log.sample_time_s, cutoff_hz)
-    smooth = lowpass(log.position_rad, log.sample_time_s, cutoff_hz)
-    torque = lowpass(log.torque_nm, log.sample_time_s, cutoff_hz)
-    out = tuple(np.ascontiguousarray(x) for x in (smooth, velocity, acceleration, torque))
-    return out[0], out[1], out[2], out[3]
+def certainties(robot: Robot, motions: Sequence[Motion], weighting: Weighting) -> list[Array]:
+    """Return how far torques can be predicted in every sample: dry friction leaves some open."""
+
+    def rigid(at: Motion) -> Array:
+        return predicted_torque(robot.with_effects([]), AS_GIVEN, at)
+
+    left_open = open_torque_nm(motions, dry_friction_nm(motions, rigid))
+    error_nm = 1 / (weighting.weight[:, 0] * np.sqrt(weighting.decimation))
+    return [certainty(x, error_nm) for x in left_open]
 
 
 class InverseDynamicsFitter(ModelFitter):
@@ -101,15 +123,26 @@ class InverseDynamicsFitter(ModelFitter):
         self,
         robot: Robot,
         motions: Sequence[Motion],
+        certainty: Sequence[Array],
         weighting: Weighting,
         tolerances: Mapping[str, float],
         block_s: float,
     ) -> None:
         super().__init__(robot, weighting, tolerances, block_s)
-        self.motions = list(motions)
+        self.records = [(*m, c) for m, c in zip(motions, certainty, strict=True)]
 
     def _keep(self, logs: Sequence[int]) -> None:
-        self.motions = [self.motions[i] for i in logs]
+        self.records = [self.records[i] for i in logs]
+
+    def counted(self) -> Array:
+        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        step = self.weighting.decimation
+        parts: list[Array] = []
+        for *_, factor in self.records:
+            # As `Weighting` decimates: each residual stands for so many samples.
+            kept = factor[: len(factor) // step * step]
+            parts += list((kept**2).reshape(-1, step, kept.shape[1]).mean(axis=1).T)
+        return np.concatenate(parts)
 
     def takes_part(self, name: str) -> bool:
         """Springs and their damping do not show in a rigid prediction."""
@@ -138,7 +171,7 @@ class InverseDynamicsFitter(ModelFitter):
             self.robot.core,
             core_effects(effects),
             self._specs(parameters, effects),
-            self.motions,
+            self.records,
             self.weighting.core(),
             options,
             warm=warm,
@@ -158,7 +191,7 @@ class InverseDynamicsFitter(ModelFitter):
             self.robot.core,
             core_effects(effects),
             self._specs(parameters, effects),
-            self.motions,
+            self.records,
             self.weighting.core(),
             options,
             warm=warm,
@@ -173,7 +206,7 @@ def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
         changed.core,
         core_effects(variant.effects),
         [],
-        [at],
+        [(*at, np.ones_like(at[3]))],
         Weighting.flat(robot.n_axes).core(),
         FitOptions(),
     )
@@ -182,52 +215,22 @@ def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     return np.asarray(residual + at[3])
 
 
-def inverse_floor(robot: Robot, logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> Floor:
-    """Return the floor of a predicted torque: position noise through the inertia, and torque noise."""
-    std = position_noise_std(list(logs))
+def inverse_floor(logs: Sequence[Log], noise: InverseNoise, settings: Settings) -> Floor:
+    """Return the floor of a predicted torque: its noise, and the errors of formulas."""
     log = logs[0]
     rate = 1.0 / log.sample_time_s
-    noise = inverse_noise(robot, log, std, cutoff_hz, settings.seed)
     variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
-    noise_variance = np.var(noise, axis=0)
+    noise_variance = np.var(noise.error(log, 0), axis=0)
     total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
-    decimation = max(1, int(rate / (2 * cutoff_hz)))
+    decimation = max(1, int(rate / (2 * noise.filtering.cutoff_hz)))
     weighting = Weighting(
         np.zeros(1), 1 / np.sqrt(total)[:, None] / np.sqrt(decimation), decimation
     )
     flat = np.ones((len(variance), 1))
     return Floor(
-        std, np.zeros(1), noise_variance[:, None] * flat, weighting, noise_variance / total
+        noise.position_std_rad,
+        np.zeros(1),
+        noise_variance[:, None] * flat,
+        weighting,
+        noise_variance / total,
     )
-
-
-def inverse_noise(
-    robot: Robot, log: Log, std_rad: Array, cutoff_hz: float, seed: int, run: int = 0
-) -> Array:
-    """Return the error (n, n_axes) [Nm] that sensor noise alone causes in a predicted torque."""
-    noise = white_noise(seed, run, log.n_samples, robot.n_axes) * std_rad
-    _, acceleration = differentiate(noise, log.sample_time_s, cutoff_hz)
-    torque = white_noise(seed, run + 1, log.n_samples, robot.n_axes) * _torque_noise_std(log)
-    return np.asarray(
-        acceleration * _inertia(robot) - lowpass(torque, log.sample_time_s, cutoff_hz)
-    )
-
-
-def _inertia(robot: Robot) -> Array:
-    """Return the inertia felt by each motor at the operating point (n_axes,) [kg m^2]."""
-    q = robot.equilibrium()["joint_angle_rad"].values
-    joints = robot.axis_joints
-    ratio = robot.gear_ratio
-    arm = np.diag(robot.inertia_matrix(q))[joints] * ratio**2
-    own = robot.parameters()
-    motors = [own[f"{robot.joint_names[j]}.motor_inertia"] for j in joints]
-    return np.asarray(arm + np.array(motors))
-
-
-def _torque_noise_std(log: Log) -> Array:
-    rate = 1.0 / log.sample_time_s
-    f, density = scipy.signal.welch(
-        log.torque_nm, rate, nperseg=min(2048, log.n_samples // 2), axis=0
-    )
-    top = (f > 0.4 * rate) & (f < 0.49 * rate)
-    return np.asarray(np.sqrt(np.mean(density[top], axis=0) * rate / 2))

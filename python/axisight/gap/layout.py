@@ -21,6 +21,8 @@ _STRETCHES = 16
 class Layout:
     """Where the blocks of a problem lie: ``axis`` from 0, ``stretch``, ``log``, each (n_blocks,).
 
+    ``counted`` (n_blocks,): what the residuals of a block count for in all.
+
     A stretch is a piece of time of one log, all axes: what happens then on one axis and on
     another is not independent.
     """
@@ -28,7 +30,7 @@ class Layout:
     axis: NDArray[np.int64]
     stretch: NDArray[np.int64]
     log: NDArray[np.int64]
-    size: NDArray[np.int64]
+    counted: Array
 
     @property
     def n_axes(self) -> int:
@@ -40,8 +42,8 @@ class Layout:
         return np.asarray(np.bincount(self.axis, values, minlength=self.n_axes), np.float64)
 
     def samples(self) -> Array:
-        """Return the number of residuals on each axis (n_axes,)."""
-        return self.by_axis(self.size.astype(np.float64))
+        """Return what the residuals of each axis count for (n_axes,): their number where all are one."""
+        return self.by_axis(self.counted)
 
     def significance(self, before: Array, after: Array, axis: int | None = None) -> float:
         """Return how sure a fall of loss by block is, in standard deviations of a normal.
@@ -63,21 +65,34 @@ class Layout:
 
 
 def layout_of(evidence: Evidence) -> Layout:
-    """Return where the blocks of a model's evidence lie."""
+    """Return where the blocks of a model's evidence lie.
+
+    The stretches of a log count for as much each: one in which every axis stands would say nothing,
+    and nothing is no scatter.
+    """
     stretch = np.zeros(len(evidence.log), dtype=np.int64)
     logs = np.unique(evidence.log)
     wanted = max(4, -(-_STRETCHES // len(logs)))
     first = 0
     for log in logs:
-        counts = []
+        by_axis = []
         for axis in np.unique(evidence.axis[evidence.log == log]):
             rows = np.flatnonzero((evidence.log == log) & (evidence.axis == axis))
-            rows = rows[np.argsort(evidence.start[rows], kind="stable")]
-            count = min(wanted, len(rows))
-            stretch[rows] = first + count * np.arange(len(rows)) // len(rows)
-            counts.append(count)
-        first += max(counts)
-    return Layout(evidence.axis, stretch, evidence.log, evidence.size)
+            by_axis.append(rows[np.argsort(evidence.start[rows], kind="stable")])
+        # Blocks of all axes lie at the same times.
+        counted = np.sum([evidence.samples[rows] for rows in by_axis], axis=0)
+        numbers = _even_parts(counted, min(wanted, len(counted)))
+        for rows in by_axis:
+            stretch[rows] = first + numbers
+        first += int(numbers.max()) + 1
+    return Layout(evidence.axis, stretch, evidence.log, evidence.samples)
+
+
+def _even_parts(counted: Array, count: int) -> NDArray[np.int64]:
+    """Return which of ``count`` parts each block (n,) lies in, parts that count for as much."""
+    total = np.cumsum(counted)
+    middle = (total - 0.5 * counted) / max(float(total[-1]), 1e-300)
+    return np.minimum((count * middle).astype(np.int64), count - 1)
 
 
 def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:

@@ -106,7 +106,8 @@ class Evidence(Linearized):
 
     ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
     fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
-    ``size`` (n_blocks,) of the blocks. ``renewed``: the sensitivities are the model's own,
+    ``size`` (n_blocks,) of the blocks, ``samples`` (n_blocks,) what their residuals count for in
+    all: fewer where some are weighed down. ``renewed``: the sensitivities are the model's own,
     none is another's; ``fresh``: they were renewed at every step.
     """
 
@@ -121,6 +122,7 @@ class Evidence(Linearized):
     axis: NDArray[np.int64]
     start: NDArray[np.int64]
     size: NDArray[np.int64]
+    samples: Array
     residual: Array
     columns: dict[tuple[str | None, str], _core.Column]
     fresh: bool = False
@@ -139,6 +141,7 @@ class Evidence(Linearized):
             axis=self.axis[kept],
             start=np.cumsum(size) - size,
             size=size,
+            samples=self.samples[kept],
             residual=np.concatenate([self.residual[a:b] for a, b in rows]),
             columns={key: column.part(rows) for key, column in self.columns.items()},
         )
@@ -230,6 +233,10 @@ class ModelFitter(ABC):
         other._keep(logs)
         return other
 
+    def counted(self) -> Array | None:
+        """Return what every residual counts for (n_residuals,), from 0 to 1; None where all are one."""
+        return None
+
     @abstractmethod
     def _keep(self, logs: Sequence[int]) -> None:
         """Keep only some of the logs, by their numbers."""
@@ -283,7 +290,9 @@ class ModelFitter(ABC):
         options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         renewed = not lazy and near is None
-        return replace(_evidence(result, setup, list(free), renewed=renewed), fresh=fresh)
+        counted = self.counted()
+        found = _evidence(result, setup, list(free), renewed=renewed, counted=counted)
+        return replace(found, fresh=fresh)
 
     def evaluate(
         self,
@@ -403,7 +412,9 @@ class ModelFitter(ABC):
 
 def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: str) -> Parameter:
     parameter = effect_parameter(effects, i, name)
-    lower, upper = free.bounds.get(name, (parameter.lower, parameter.upper))
+    # Beyond the bounds of the effect itself there is no model.
+    least, most = free.bounds.get(name, (parameter.lower, parameter.upper))
+    lower, upper = max(least, parameter.lower), min(most, parameter.upper)
     initial = min(max(parameter.initial, lower), upper)
     return replace(
         parameter, initial=initial, lower=lower, upper=upper, prior=free.priors.get(name)
@@ -444,7 +455,12 @@ def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) ->
 
 
 def _evidence(
-    result: _core.FitResult, setup: _Setup, free: Sequence[FreeEffect], *, renewed: bool
+    result: _core.FitResult,
+    setup: _Setup,
+    free: Sequence[FreeEffect],
+    *,
+    renewed: bool,
+    counted: Array | None,
 ) -> Evidence:
     at = _linearized(result, setup)
     values: list[dict[str, float]] = [dict(f.effect.parameters or {}) for f in free]
@@ -474,9 +490,18 @@ def _evidence(
         axis=blocks[:, 1],
         start=blocks[:, 2],
         size=blocks[:, 3],
+        samples=_samples(blocks[:, 2], blocks[:, 3], counted),
         residual=result.residual,
         columns={
             (None if place is None else fitted[place].label, name): columns[i]
             for i, (place, name) in enumerate(at.parameters)
         },
     )
+
+
+def _samples(start: NDArray[np.int64], size: NDArray[np.int64], counted: Array | None) -> Array:
+    """Return what the residuals of every block count for in all (n_blocks,)."""
+    if counted is None:
+        return size.astype(np.float64)
+    total = np.concatenate([[0.0], np.cumsum(counted)])
+    return np.asarray(total[start + size] - total[start])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
-from axisight.gap.by_axis import OwnAxes, believed_by_axis
+from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
@@ -90,10 +91,9 @@ def diagnose(
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     limits = missing(view.limits, machine)
-    conclusion = conclude(found, chosen, stands_out=_stands_out(error_logs), limits=limits)
-    out = _assemble(
-        name or found_name, machine, view, held_logs, found, error_logs, conclusion, chosen, noted
-    )
+    said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), limits=limits)
+    seen = _seen(view, held_logs, found, said, chosen)
+    out = _assemble(name or found_name, machine, view, held_logs, seen, error_logs, chosen, noted)
     progress("measuring the gap", 1, 1)
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
@@ -217,23 +217,58 @@ def _reach(
     )
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """What the estimation logs say, and what it does on the validation logs."""
+
+    found: Search
+    conclusion: Conclusion
+    reach: Reach
+    own: OwnAxes | None
+
+
+def _seen(
+    view: View,
+    held_logs: Sequence[Log],
+    found: Search,
+    said: Callable[[Search], Conclusion],
+    settings: Settings,
+) -> _Seen:
+    """Measure on the validation logs what the search found.
+
+    Where axes are judged alone, one whose causes do not carry over takes nothing from the others:
+    it loses its own.
+    """
+    lost: list[str] = []
+    while True:
+        conclusion = said(found)
+        reach = _reach(view, held_logs, found, conclusion.effects, settings)
+        own = _axes_alone(view, conclusion, reach)
+        axis = None if own is None else own.not_carried()
+        if own is None or axis is None or len(own.axes) < 2:
+            return _Seen(found, conclusion.with_checks(lost), reach, own)
+        lost.append(
+            f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
+            f"logs: it is not among the causes."
+        )
+        found = without_axis(found, view.fitter, axis)
+
+
 def _assemble(
     name: str,
     robot: Robot,
     view: View,
     held_logs: Sequence[Log],
-    found: Search,
+    seen: _Seen,
     error_logs: Sequence[ErrorLog],
-    conclusion: Conclusion,
     settings: Settings,
     noted: tuple[Finding, ...],
 ) -> Diagnosis:
+    found, conclusion, reach, own = seen.found, seen.conclusion, seen.reach, seen.own
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
-    reach = _reach(view, held_logs, found, conclusion.effects, settings)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
-    own = _axes_alone(view, conclusion, reach)
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
     edge = parameters_at_edge(found.model, nominal, tolerances)
     # Where errors add up, masses that a few seconds hardly tell go to the edge by themselves.
@@ -259,7 +294,7 @@ def _assemble(
         regime_maps=regimes,
         overlays=reach.overlays,
         refit={k: _relative(fitted, k, nominal[k]) for k in fitted.robot_values},
-        checks=(*conclusion.checks, *_filtered(view)),
+        checks=(*conclusion.checks, *view.remarks()),
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
@@ -313,16 +348,6 @@ def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | N
         return None
     axes = sorted({c.axis - 1 for c in conclusion.causes if c.axis is not None})
     return OwnAxes(axes, reach.stages.given, reach.stages.after, reach.change)
-
-
-def _filtered(view: View) -> tuple[str, ...]:
-    """Say what low-pass stands on both sides of the comparison."""
-    if view.cutoff_hz is None:
-        return ()
-    chosen = "as given" if view.settings.cutoff_hz else "chosen as what predicts data left out best"
-    return (
-        f"Motion, torque and their noise are low-passed alike at {view.cutoff_hz:.3g} Hz, {chosen}.",
-    )
 
 
 def _relative(model: Evidence, name: str, nominal: float) -> Interval:

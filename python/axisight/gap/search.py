@@ -101,7 +101,7 @@ def search(
     progress("re-fitting the simulator", 0, 1)
     baseline = fitter.fit([], refreshes=2)
     progress("re-fitting the simulator", 1, 1)
-    floor = expected[baseline.axis] * baseline.size
+    floor = expected[baseline.axis] * baseline.samples
     out = Search(baseline, baseline, floor, layout_of(baseline))
     refused: set[str] = set()
     for number in range(1, _MOST_ROUNDS + 1):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,10 @@ class Conclusion:
     """The causes as they are added to the simulator."""
     withdrawn: str | None = None
     """Why the validation logs contradict what the estimation logs say."""
+
+    def with_checks(self, more: Sequence[str]) -> Conclusion:
+        """Return the same with further checks."""
+        return replace(self, checks=(*self.checks, *more))
 
 
 # A limit that the controller's own law shows could still be one of the supply, not of the drive.
@@ -207,7 +211,7 @@ def _named(
 def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, ...]:
     tried = sum(len({r.trial.label for s in x.standings for r in s.ranked}) for x in found.rounds)
     before = held_out_loss(found.baseline)
-    size = float(found.baseline.size.sum())
+    size = float(found.baseline.samples.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
     out = [
         f"{tried} fits of candidate effects compared over {len(found.rounds)} rounds on data left out of each fit.",

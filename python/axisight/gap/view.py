@@ -72,6 +72,10 @@ class View(ABC):
         del effect, axis
         return np.ones(len(frequency_hz), dtype=np.complex128)
 
+    def remarks(self) -> tuple[str, ...]:
+        """Say what was done to the logs."""
+        return ()
+
     @abstractmethod
     def measured(self, log: Log) -> Array:
         """Return the torque errors are taken from (n, n_axes) [Nm]."""

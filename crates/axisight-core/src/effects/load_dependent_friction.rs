@@ -37,7 +37,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             role: Role::Shape,
             neutral: 0.1,
             lower: 1e-5,
-            upper: 2.0,
+            upper: 50.0,
             typical: 0.1,
         },
     ],

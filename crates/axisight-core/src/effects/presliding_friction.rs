@@ -46,7 +46,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             role: Role::Shape,
             neutral: 3.0,
             lower: 1e-4,
-            upper: 60.0,
+            upper: 500.0,
             typical: 3.0,
         },
         ParameterInfo {

@@ -46,7 +46,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             role: Role::Shape,
             neutral: 3.0,
             lower: 1e-4,
-            upper: 60.0,
+            upper: 500.0,
             typical: 3.0,
         },
         ParameterInfo {
@@ -55,7 +55,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             role: Role::Shape,
             neutral: 0.1,
             lower: 1e-5,
-            upper: 2.0,
+            upper: 50.0,
             typical: 0.1,
         },
     ],

@@ -29,6 +29,8 @@ pub struct MotionRecord {
     pub acceleration: Vec<f64>,
     /// Motor torque [Nm].
     pub torque: Vec<f64>,
+    /// Factor on the error of each sample, from 0 to 1: how far a torque can be predicted there.
+    pub certainty: Vec<f64>,
 }
 
 /// An inverse-dynamics problem.
@@ -63,6 +65,7 @@ impl InverseDynamics {
                 ("velocity", &r.velocity),
                 ("acceleration", &r.acceleration),
                 ("torque", &r.torque),
+                ("certainty", &r.certainty),
             ] {
                 if x.len() != n || n == 0 || n % n_axes != 0 {
                     let expected = format!("{n} numbers, {n_axes} axes");
@@ -130,6 +133,14 @@ impl InverseDynamics {
         for (axis, model) in series[0].iter_mut().enumerate() {
             for (k, y) in model.iter_mut().enumerate() {
                 *y -= record.torque[k * n_axes + axis];
+            }
+        }
+        for quantity in &mut series {
+            for (axis, values) in quantity.iter_mut().enumerate() {
+                let factors = record.certainty[axis..].iter().step_by(n_axes);
+                for (x, factor) in values.iter_mut().zip(factors) {
+                    *x *= factor;
+                }
             }
         }
         let n_samples = record.torque.len() / n_axes;

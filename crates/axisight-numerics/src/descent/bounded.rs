@@ -108,15 +108,17 @@ impl Limits {
 /// Damped Gauss-Newton steps of a problem within its limits.
 ///
 /// Marquardt (1963) with his scaling by the diagonal, which makes the units of the parameters
-/// irrelevant; steps are projected on the bounds, and found anew without the parameters on a
-/// bound that they would push outwards: Kanzow, Yamashita, Fukushima (2004).
+/// irrelevant; steps are projected on the bounds, as by Kanzow, Yamashita, Fukushima (2004). A
+/// parameter that a step takes beyond a bound goes to the bound, and the step of the others is found
+/// anew: what they were to make up for does not happen.
 pub struct Bounded<'a, P: LeastSquares> {
     problem: &'a mut P,
     limits: &'a Limits,
     theta: Vec<f64>,
     next: Vec<f64>,
     change: Vec<f64>,
-    held: Vec<bool>,
+    /// Moves of parameters that go to a bound, or stay on it.
+    held: Vec<Option<f64>>,
     trial: Option<P::Trial>,
 }
 
@@ -130,7 +132,7 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
             next: theta.clone(),
             theta,
             change: vec![0.0; n],
-            held: vec![false; n],
+            held: vec![None; n],
             trial: None,
         }
     }
@@ -140,8 +142,8 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
         self.theta
     }
 
-    /// Cut `step` to what the limits allow; whether a parameter on a bound is pushed outwards
-    /// that was not held before.
+    /// Cut `step` to what the limits allow; whether a parameter is pushed over a bound that was not
+    /// held before.
     fn cut(&mut self, step: &DVector<f64>) -> bool {
         let limits = self.limits;
         let shortening = limits.shortening(step);
@@ -151,9 +153,9 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
             let wanted = limits.reached(i, *from, shortening * step[i]);
             self.next[i] = wanted.clamp(lower, upper);
             self.change[i] = self.next[i] - from;
-            let outward = (wanted < lower && *from <= lower) || (wanted > upper && *from >= upper);
-            if outward && !self.held[i] {
-                self.held[i] = true;
+            let beyond = wanted < lower || wanted > upper;
+            if beyond && self.held[i].is_none() {
+                self.held[i] = Some(self.change[i]);
                 hit = true;
             }
         }
@@ -169,7 +171,7 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
     }
 
     fn step(&mut self, damping: f64) -> Result<Option<Step>, P::Error> {
-        self.held.fill(false);
+        self.held.fill(None);
         // Every round holds one more.
         loop {
             let Some(step) = damped(self.problem.normal(), damping, &self.held) else {
@@ -212,9 +214,9 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
     }
 }
 
-/// `-(A + damping diag A)^-1 g`, nothing for held parameters and those without influence;
-/// `None` where that has no solution.
-fn damped(normal: &Normal, damping: f64, held: &[bool]) -> Option<DVector<f64>> {
+/// `-(A + damping diag A)^-1 g`, given the moves of held parameters, nothing for those without
+/// influence; `None` where that has no solution.
+fn damped(normal: &Normal, damping: f64, held: &[Option<f64>]) -> Option<DVector<f64>> {
     let n = held.len();
     // Scaled to unit diagonal, the matrix loses no digits to units.
     let size = |i: usize| {
@@ -223,9 +225,10 @@ fn damped(normal: &Normal, damping: f64, held: &[bool]) -> Option<DVector<f64>> 
     };
     let sizes = DVector::from_fn(n, |i, _| size(i));
     let mut a = DMatrix::from_fn(n, n, |i, j| normal.matrix[(i, j)] / (sizes[i] * sizes[j]));
-    let mut g = normal.gradient.component_div(&sizes);
+    let moves = DVector::from_fn(n, |i, _| held[i].unwrap_or(0.0) * sizes[i]);
+    let mut g = normal.gradient.component_div(&sizes) + &a * &moves;
     for i in 0..n {
-        if held[i] || normal.matrix[(i, i)] <= 0.0 {
+        if held[i].is_some() || normal.matrix[(i, i)] <= 0.0 {
             a.row_mut(i).fill(0.0);
             a.column_mut(i).fill(0.0);
             g[i] = 0.0;
@@ -234,7 +237,8 @@ fn damped(normal: &Normal, damping: f64, held: &[bool]) -> Option<DVector<f64>> 
         a[(i, i)] += damping;
     }
     let mut step = a.cholesky()?.solve(&g);
-    step.component_div_assign(&sizes);
     step.neg_mut();
+    step += moves;
+    step.component_div_assign(&sizes);
     step.iter().all(|x| x.is_finite()).then_some(step)
 }

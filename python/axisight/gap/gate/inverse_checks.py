@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.cutoff import Motion, highest_cutoff_hz
+from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.faults import Finding, GateSeverity, refused
 from axisight.gap.gate.mistakes import Mistake, gravity_turned, predict, undone
 from axisight.gap.gate.passive import check_passive
 from axisight.gap.gate.scales import scale_name
 from axisight.gap.gate.small_errors import check_small_errors
 from axisight.gap.gate.torque_fit import TorqueFit, torque_fit
-from axisight.gap.inverse import motion
+from axisight.gap.motion import Motion, motion
 from axisight.logs import Log
 from axisight.robot import Robot
 

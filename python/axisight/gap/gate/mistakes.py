@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.cutoff import Motion
 from axisight.gap.gate.torque_fit import TorqueFit, torque_fit
 from axisight.gap.inverse import predicted_torque
+from axisight.gap.motion import Motion
 from axisight.gap.torques import AS_GIVEN
 from axisight.robot import Robot
 

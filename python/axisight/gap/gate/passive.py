@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.cutoff import Motion
 from axisight.gap.faults import Finding
 from axisight.gap.gate.mistakes import predict
+from axisight.gap.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.cutoff import Motion
 from axisight.gap.faults import Finding, GateSeverity
 from axisight.gap.gate.mistakes import predict
 from axisight.gap.gate.torque_fit import nuisance
+from axisight.gap.motion import Motion
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]

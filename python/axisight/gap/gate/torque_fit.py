@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.cutoff import Motion
+from axisight.gap.motion import Motion
 
 Array = NDArray[np.float64]
 
