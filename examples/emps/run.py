@@ -16,7 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import axisight
-from axisight.gap.inverse import motion, predicted_torque
+from axisight.gap.inverse import predicted_torque
+from axisight.gap.motion import motion
 from axisight.gap.torques import AS_GIVEN, Variant
 
 HERE = Path(__file__).resolve().parent

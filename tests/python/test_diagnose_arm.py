@@ -111,3 +111,15 @@ def test_the_cutoff_follows_the_noise_of_the_position():
 def test_the_cutoff_in_use_is_said(everywhere):
     used = everywhere.provenance["cutoff_hz"]
     assert any(f"{used:.3g} Hz" in check for check in everywhere.checks)
+
+
+def test_an_axis_whose_cause_does_not_carry_over_takes_nothing_from_the_others():
+    levels = np.array(COULOMB_NM)
+    both = levels * np.isin(np.arange(6), (1, 4))
+    logs = [log_of(ROBOT, seed, both, np.zeros(6), 20.0) for seed in range(2)]
+    # On the validation log axis 5 runs freely.
+    other = log_of(ROBOT, 2, levels * (np.arange(6) == 1), np.zeros(6), 20.0)
+    found = diagnose(robot=ROBOT, estimation=logs, validation=[other], settings=QUICK)
+    assert [(c.effect, c.axis) for c in found.causes] == [("coulomb_friction", 2)]
+    assert any("axis 5" in check and "does not carry over" in check for check in found.checks)
+    assert found.axes[1].verdict == "explained" and found.axes[4].verdict == "unknown"

@@ -161,7 +161,9 @@ def test_differences_within_formula_error_do_not_decide():
 
 def test_an_axis_is_ranked_by_its_own_loss():
     # Two axes; the first candidate explains the quiet one, the second the loud one.
-    layout = Layout(np.repeat([0, 1], 20), np.tile(np.arange(20) // 2, 2), ONE_LOG, np.full(40, 10))
+    layout = Layout(
+        np.repeat([0, 1], 20), np.tile(np.arange(20) // 2, 2), ONE_LOG, np.full(40, 10.0)
+    )
     current = np.where(layout.axis == 0, 3.0, 101.0)
     quiet = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 1.0, 101.0))
     loud = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 3.0, 1.0), axis=2)
@@ -178,6 +180,7 @@ def blocks(n_logs: int, n_axes: int, n_times: int) -> Evidence:
     n = len(log)
     empty = linear_evidence(np.zeros((20, 1)), np.zeros(20), np.zeros(20, int))
     where = {"log": log, "axis": axis, "start": 100 * np.arange(n), "size": np.full(n, 100)}
+    where["samples"] = np.full(n, 100.0)
     return Evidence(**(empty.__dict__ | where))
 
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from axisight import Effect
 from axisight.fitting import Weighting
-from axisight.gap.inverse import InverseDynamicsFitter, block_s, motion
+from axisight.gap.inverse import InverseDynamicsFitter, block_s
 from axisight.gap.model import FreeEffect
+from axisight.gap.motion import motion
 from axisight.gap.settings import Settings
 from rigid_arm import arm, log_of
 
@@ -15,7 +16,7 @@ ROBOT = arm()
 def test_every_block_has_a_derivative_however_small_the_motor():
     weighting = Weighting(np.zeros(1), np.full((6, 1), 1e6))
     at = motion(log_of(ROBOT, 0, seconds=10.0), 10.0)
-    fitter = InverseDynamicsFitter(ROBOT, [at], weighting, {}, 1.0)
+    fitter = InverseDynamicsFitter(ROBOT, [at], [np.ones_like(at[3])], weighting, {}, 1.0)
     option = FreeEffect(
         Effect("viscous_friction", 2, {"viscous_nm_s_rad": 0.0}), ("viscous_nm_s_rad",)
     )

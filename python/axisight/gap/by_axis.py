@@ -40,8 +40,12 @@ def believed_by_axis(found: Search, fitter: ModelFitter, settings: Settings) -> 
 
 
 def without_axis(found: Search, fitter: ModelFitter, axis: int) -> Search:
-    """Return the search without the causes that stood first on ``axis`` (from 0)."""
-    return _of_axes(found, fitter, {s.axis for _, s in found.accepted} - {axis})
+    """Return the search without the causes that stood first on ``axis`` (from 0).
+
+    The others explain their axes; whether they explain the arm does not matter any more.
+    """
+    left = {s.axis for _, s in found.accepted} - {axis}
+    return replace(_of_axes(found, fitter, left), by_axis=True)
 
 
 def _of_axes(found: Search, fitter: ModelFitter, axes: set[int]) -> Search:

@@ -190,15 +190,21 @@ class Trials:
         return trials
 
     def _worth_refining(self, trials: Sequence[Trial], done: set[str]) -> list[Trial]:
-        """Return the leaders that explain anything but not nearly everything, not done yet."""
+        """Return the leaders that explain anything, not done yet.
+
+        One that explains nearly everything, and has no rival, is good as it is. An effect is judged on its own axis: how it fares on others says little of what it would be
+        with the simulator's sensitivities its own.
+        """
         out = []
         for standing in self.standings(trials):
             leader = standing.best
-            if leader.score > _GOOD_ENOUGH or leader.gain < self.settings.smallest_gain:
+            clear = leader.score > _GOOD_ENOUGH and len(standing.inseparable()) == 1
+            if clear or leader.gain < self.settings.smallest_gain:
                 continue
             for r in standing.ranked[:_REFINED]:
-                near = r.score > 0.02 and r.score > 0.3 * leader.score
-                if near and r.trial.label not in done and r.trial not in out:
+                here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
+                near = r.score > max(0.5 * self.settings.smallest_score, 0.3 * leader.score)
+                if here and near and r.trial.label not in done and r.trial not in out:
                     out.append(r.trial)
         return out
 

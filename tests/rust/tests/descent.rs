@@ -417,3 +417,26 @@ fn advice_is_for_searches_that_did_not_arrive() {
     let names: Vec<&str> = advised.map(|s| s.name()).collect();
     assert_eq!(names, ["max_iterations", "stalled"]);
 }
+
+/// A valley that leads far beyond a bound: the constrained minimum is one step away, where what
+/// makes up for the parameter on the bound is found anew. Cut to the bound, the step of both is uphill.
+#[test]
+fn step_beyond_a_bound_is_found_anew_on_it() {
+    let rows = |t: &[f64]| {
+        let (x, y) = (t[0], t[1]);
+        let residual = vec![x + y - 10.0, 0.1 * (y - 100.0)];
+        Some((residual, vec![vec![1.0, 1.0], vec![0.0, 0.1]]))
+    };
+    let limits = Limits {
+        upper: vec![f64::INFINITY, 2.0],
+        ..wide(2)
+    };
+    for rules in &RULES {
+        let start = [8.2, 1.8];
+        let mut model = Model::new(rows, &start);
+        let (outcome, theta) = run(&mut model, &limits, rules, &start);
+        assert!((theta[0] - 8.0).abs() < 1e-4, "{theta:?}");
+        assert_eq!(theta[1], 2.0);
+        assert!(outcome.iterations <= 4, "{outcome:?}");
+    }
+}

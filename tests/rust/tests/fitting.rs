@@ -460,6 +460,7 @@ fn motion(robot: &RobotDescription, seed: u64, sigma: f64) -> MotionRecord {
         velocity: vec![],
         acceleration: vec![],
         torque: vec![],
+        certainty: vec![1.0; SAMPLES],
     };
     for k in 0..SAMPLES {
         let t = k as f64 * robot.sample_time;
@@ -523,4 +524,36 @@ fn inverse_dynamics_finds_mass_centre_and_friction() {
         }
         assert!(largest(&fit.residual) < if noise > 0.0 { 6.0 } else { 1e-3 });
     }
+}
+
+/// Samples of no certainty may be any torque; those of half count a quarter of a square each.
+#[test]
+fn uncertain_samples_count_for_less() {
+    let robot = robot(ARM);
+    let mut record = motion(&robot, 1, 0.0);
+    for k in 0..SAMPLES {
+        if k % 3 == 0 {
+            record.torque[k] += 5.0;
+            record.certainty[k] = 0.0;
+        }
+    }
+    let mut problem = InverseDynamics {
+        records: vec![record],
+        robot: robot.clone(),
+        effects: friction(TRUTH[3]),
+        parameters: vec![free(Target::Robot(Parameter::Mass(0)), 40.0, 1.0)],
+        weighting: vec![flat(1.0)],
+        block_s: 0.1,
+    };
+    let found = fit(&problem, &problem.parameters, FitOptions::default(), &[]).expect("fit");
+    let whole = found.loss;
+    problem.parameters[0].initial = 60.0;
+    let start = Linearization::new(&problem, &problem.parameters, Loss::Squared, &[]).expect("model");
+    problem.records[0].certainty.iter_mut().for_each(|c| *c *= 0.5);
+    let half = Linearization::new(&problem, &problem.parameters, Loss::Squared, &[]).expect("model");
+    assert!((half.loss - 0.25 * start.loss).abs() < 1e-9 * start.loss);
+    let slope = |at: &Linearization| at.columns[0].to_vec();
+    let (a, b) = (slope(&start), slope(&half));
+    assert!(a.iter().zip(&b).all(|(x, y)| (0.5 * x - y).abs() < 1e-12 + 1e-9 * x.abs()));
+    assert!(whole <= start.loss * (1.0 + 1e-9));
 }
