@@ -33,9 +33,13 @@ _HOPELESS = 0.3
 _LOOKED_AT = 3
 # Share of what is left on an axis that one fitted elsewhere explains: what is tried there waits.
 _MOST = 0.5
-# Leaders of an axis that are refined, unless the first already explains nearly everything.
+# Leaders of an axis that are refined, and what share of the first one's score the others need: a fit
+# with sensitivities of its own does not make more of the rest.
 _REFINED = 2
+_CLOSE = 0.6
+# One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
+_ALONE = 0.5
 # Steps of the fit of a candidate; leaders go on from there.
 _STEPS = 8
 # Share of a gain that another candidate may have on the same axis and not count as felt.
@@ -190,20 +194,19 @@ class Trials:
         return trials
 
     def _worth_refining(self, trials: Sequence[Trial], done: set[str]) -> list[Trial]:
-        """Return the leaders that explain anything, not done yet.
+        """Return the leaders that explain anything, not done yet, where it is not clear which leads.
 
-        One that explains nearly everything, and has no rival, is good as it is. An effect is judged on its own axis: how it fares on others says little of what it would be
+        An effect is judged on its own axis: how it fares on others says little of what it would be
         with the simulator's sensitivities its own.
         """
         out = []
         for standing in self.standings(trials):
             leader = standing.best
-            clear = leader.score > _GOOD_ENOUGH and len(standing.inseparable()) == 1
-            if clear or leader.gain < self.settings.smallest_gain:
+            if _clear(standing) or leader.gain < self.settings.smallest_gain:
                 continue
             for r in standing.ranked[:_REFINED]:
                 here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
-                near = r.score > max(0.5 * self.settings.smallest_score, 0.3 * leader.score)
+                near = r.score > max(0.5 * self.settings.smallest_score, _CLOSE * leader.score)
                 if here and near and r.trial.label not in done and r.trial not in out:
                     out.append(r.trial)
         return out
@@ -246,6 +249,15 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
+
+
+def _clear(standing: Standing) -> bool:
+    """Whether the first leads whatever a better fit makes of it."""
+    leader = standing.best
+    if len(standing.inseparable()) > 1 or standing.p_unknown > leader.probability:
+        return False
+    alone = all(r.score < _CLOSE * leader.score for r in standing.ranked[1:])
+    return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:
