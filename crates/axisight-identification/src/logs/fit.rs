@@ -304,6 +304,12 @@ impl<'a, P: Problem> Search<'a, P> {
             let g = DVector::from_column_slice(&gram.gradient);
             scatter += &g * g.transpose();
         }
+        // What a prior says is as uncertain as it says.
+        for (slot, i) in self.free.iter().enumerate() {
+            if let Some((_, std)) = self.parameters[*i].prior {
+                scatter[(slot, slot)] += std.powi(-2);
+            }
+        }
         let sandwich = &covariance * scatter * &covariance;
         Fit {
             status,
