@@ -15,6 +15,7 @@ from axisight.blind.drawing import draw, machine_of, references, scattered
 from axisight.blind.engine import Machine, run
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.make import make_cases
+from axisight.blind.score import comparable, sizes
 from axisight.blind.sealed import SEAL
 from axisight.blind.withheld import KINDS
 from axisight.cli import app
@@ -163,6 +164,18 @@ def test_figures_count_what_they_say():
     assert [c.right for c in cases] == [True, False, False, False, True, False, True, True, False]
     # Seven causes named at 0.9, four of them true.
     assert calibration_error(cases) == pytest.approx(0.9 - 4 / 7)
+
+
+def test_waves_are_compared_by_their_order():
+    true = {"order_1": 2.0, "amplitude_1_nm": 0.5, "order_2": 6.0, "amplitude_2_nm": 0.1}
+    found = {
+        "order_1": {"value": 6.0, "ci95": [6.0, 6.0]},
+        "cosine_1_nm": {"value": 0.06, "ci95": [0.05, 0.07]},
+        "sine_1_nm": {"value": -0.08, "ci95": [-0.09, -0.07]},
+    }
+    assert sizes(true) == {"amplitude of order 2": 0.5, "amplitude of order 6": 0.1}
+    value, low, high = comparable(found)["amplitude of order 6"]
+    assert (value, low, high) == pytest.approx((0.1, 0.09, 0.11))
 
 
 def test_from_machine_to_score(tmp_path: Path, robot: Robot):

@@ -53,6 +53,8 @@ def test_scatter_alone_is_none():
         # As many simulators have it: torque passes the gear at the nominal ratio.
         Effect("transmission_error", 1, {"cosine_rad": 3e-4, "sine_rad": 1e-4, "returned": 0.0}),
         Effect("gear_hysteresis", 1, {"share": 0.3, "deflection_rad": 3e-4}),
+        Effect("torque_deadband", 1, {"width_nm": 0.4}),
+        Effect("extra_mode", 1, {"inertia_kg_m2": 100.0, "frequency_hz": 14.0, "damping": 0.04}),
     ],
     ids=lambda e: e.name,
 )

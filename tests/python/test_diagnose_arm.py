@@ -4,12 +4,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from axisight import Settings, diagnose
+from axisight import Robot, Settings, diagnose
 from axisight.gap import verdict_schema
 from axisight.gap.cutoff import chosen_filtering, highest_cutoff_hz
 from axisight.gap.inverse import predicted_torque
 from axisight.gap.torques import AS_GIVEN
-from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
+from rigid_arm import COULOMB_NM, VISCOUS, arm, arm_toml, log_of
 
 ROBOT = arm()
 QUICK = Settings(bootstrap=50)
@@ -123,3 +123,21 @@ def test_an_axis_whose_cause_does_not_carry_over_takes_nothing_from_the_others()
     assert [(c.effect, c.axis) for c in found.causes] == [("coulomb_friction", 2)]
     assert any("axis 5" in check and "does not carry over" in check for check in found.checks)
     assert found.axes[1].verdict == "explained" and found.axes[4].verdict == "unknown"
+
+
+def test_a_tilted_base_is_one_cause_of_the_arm():
+    a, b = 0.03, -0.02
+    x, y, z = ROBOT.gravity_m_s2
+    assert (x, y) == (0.0, 0.0)
+    # Gravity as the tilted base sees it: R_y(-b) R_x(-a) g.
+    leaning = (z * np.array([-np.sin(b) * np.cos(a), np.sin(a), np.cos(b) * np.cos(a)])).tolist()
+    machine = Robot.from_toml(
+        arm_toml().replace("gravity = [0.0, 0.0, -9.81]", f"gravity = {leaning}")
+    )
+    assert machine.gravity_m_s2[1] != 0.0
+    logs = [log_of(machine, seed, np.zeros(6), np.zeros(6), 20.0) for seed in range(3)]
+    found = diagnose(robot=ROBOT, estimation=logs[:2], validation=logs[2:], settings=QUICK)
+    assert [(c.effect, c.axis) for c in found.causes] == [("base_tilt", None)]
+    values = found.causes[0].parameters
+    assert values["about_x_rad"].value == pytest.approx(a, rel=0.05)
+    assert values["about_y_rad"].value == pytest.approx(b, rel=0.05)

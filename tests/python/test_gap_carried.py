@@ -86,6 +86,12 @@ def test_causes_that_leave_more_than_the_refit_alone_are_withdrawn():
     assert judged(named(), replace(stages(0.9, 0.0505), refitted=floor.refitted)) == named()
 
 
+def test_a_small_gap_that_goes_to_the_floor_is_carried_over():
+    # A fifth above the noise; what is left of it is within the scatter of the floor.
+    assert judged(named(), stages(before=0.06, after=0.0511)).verdict == "explained"
+    assert judged(named(), stages(before=0.06, after=0.055)).verdict == "unknown"
+
+
 def test_a_simulator_bent_out_of_shape_explains_nothing():
     good = stages(0.5, 0.06)
     assert judged(named(), good, bent=0.2).verdict == "explained"

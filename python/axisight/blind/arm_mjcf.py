@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from axisight.robot import Robot
 from axisight.robot.description import Joint
 
+STEPS_PER_SAMPLE = 2
+"""Of the engine's integrator."""
+
 
 @dataclass(frozen=True)
 class Native:

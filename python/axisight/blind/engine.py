@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.blind.arm_mjcf import NOTHING, Native, mjcf
+from axisight.blind.arm_mjcf import NOTHING, STEPS_PER_SAMPLE, Native, mjcf
 from axisight.blind.laws import Axis, Law
 from axisight.errors import InputError, MissingExtraError
 from axisight.robot import Robot
@@ -22,7 +22,6 @@ except ImportError as error:
 
 Array = NDArray[np.float64]
 
-_STEPS_PER_SAMPLE = 2
 # At rest before a log begins, held by the controller.
 _SETTLING_S = 4.0
 
@@ -59,7 +58,7 @@ class _Loop:
             raise InputError(f"controller: expected pi_velocity, got {robot.controller_kind}")
         self.n = robot.n_axes
         self.sample_s = robot.sample_time_s
-        self.step_s = self.sample_s / _STEPS_PER_SAMPLE
+        self.step_s = self.sample_s / STEPS_PER_SAMPLE
         text = mjcf(robot, machine.native, machine.tip, self.step_s)
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
@@ -117,7 +116,7 @@ class _Loop:
 
     def _step(self, command: Array) -> None:
         data = self.data
-        for _ in range(_STEPS_PER_SAMPLE):
+        for _ in range(STEPS_PER_SAMPLE):
             data.ctrl[:] = command
             data.qfrc_applied[:] = 0.0
             for axis, law in self.laws:

@@ -115,10 +115,16 @@ class CubicSpring(Law):
     """A gear that stiffens with the cube of its deflection."""
 
     cubic_nm_rad3: float
+    half_step_s: float = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
+        self.half_step_s = 0.5 * step_s
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what the cube adds to the gear's torque."""
-        total = self.cubic_nm_rad3 * at.deflection**3
+        """Return what the cube adds to the gear's torque in the middle of the step."""
+        rate = at.gear_ratio * at.motor_speed - at.joint_speed
+        total = self.cubic_nm_rad3 * (at.deflection + self.half_step_s * rate) ** 3
         return -at.gear_ratio * total, total
 
 

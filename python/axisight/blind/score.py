@@ -105,6 +105,33 @@ def _label(entry: dict[str, Any]) -> str:
     return entry["effect"] if entry["axis"] is None else f"{entry['effect']}@{entry['axis']}"
 
 
+def sizes(true: dict[str, float]) -> dict[str, float]:
+    """Return what is compared of a truth: parameters, and amplitudes by the order of their wave."""
+    out = {k: v for k, v in true.items() if not k.startswith(("order", "amplitude"))}
+    for key, order in true.items():
+        if key.startswith("order"):
+            size = next(v for k, v in true.items() if k.startswith("amplitude" + key[5:] + "_"))
+            out[f"amplitude of order {order:g}"] = size
+    return out
+
+
+def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
+    """Return value and interval of what was found, cosine and sine of an order as its amplitude."""
+    out = {k: (v["value"], *v["ci95"]) for k, v in found.items()}
+    for key, order in found.items():
+        if not key.startswith("order"):
+            continue
+        waves = [
+            v for k, v in found.items() if k.startswith((f"cosine{key[5:]}_", f"sine{key[5:]}_"))
+        ]
+        if len(waves) != 2:
+            continue
+        size = float(np.hypot(*(w["value"] for w in waves)))
+        half = max(w["ci95"][1] - w["value"] for w in waves)
+        out[f"amplitude of order {order['value']:g}"] = (size, size - half, size + half)
+    return out
+
+
 def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
     causes = verdict["causes"]
     likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]
@@ -113,11 +140,11 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
     by_label = {_label(c): c["parameters"] for c in causes}
     ratios, covered = [], []
     for effect in truth["effects"]:
-        for key, value in effect["parameters"].items():
-            found = by_label.get(_label(effect), {}).get(key)
-            if found is not None and value:
-                ratios.append(found["value"] / value)
-                low, high = found["ci95"]
+        found = comparable(by_label.get(_label(effect), {}))
+        for key, value in sizes(effect["parameters"]).items():
+            if key in found and value:
+                here, low, high = found[key]
+                ratios.append(here / value)
                 covered.append(low <= value <= high)
     return Judged(
         name=name,

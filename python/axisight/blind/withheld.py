@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from axisight.blind import laws
-from axisight.blind.arm_mjcf import NOTHING, Native
+from axisight.blind.arm_mjcf import NOTHING, STEPS_PER_SAMPLE, Native
 from axisight.robot import Robot
 
 Rng = np.random.Generator
@@ -66,7 +66,8 @@ def _coulomb(rng: Rng, _robot: Robot, axis: int) -> Drawn:
 def _stribeck(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     dry, speed = _between(rng, 0.25, 0.6), _between(rng, 2.0, 8.0)
     excess = dry * float(rng.uniform(0.5, 1.3))
-    values = {"coulomb_nm": dry, "excess_nm": excess, "stribeck_speed_rad_s": speed}
+    # The excess falls exponentially, in the library like a bell: the two state it in other numbers.
+    values = {"coulomb_nm": dry, "exponential_excess_nm": excess, "decay_speed_rad_s": speed}
     law = laws.ExponentialStribeck(dry, dry + excess, speed, 0.05)
     return Drawn("stribeck_friction", axis, values, laws=[law])
 
@@ -152,9 +153,11 @@ def _delay(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
 
 
-def _lag(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+def _lag(rng: Rng, robot: Robot, axis: int) -> Drawn:
     lag = _between(rng, 0.6e-3, 3e-3)
-    return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag}, Native(lag_s=lag))
+    # The engine holds an activation over its step: torque is late by half of it, too.
+    held = 0.5 * robot.sample_time_s / STEPS_PER_SAMPLE
+    return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag + held}, Native(lag_s=lag))
 
 
 def _constant(rng: Rng, _robot: Robot, axis: int) -> Drawn:

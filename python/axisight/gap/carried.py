@@ -98,6 +98,9 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
             f"simulator re-fitted within its tolerances leaves {percent(gap.refitted)} of the torque, with it "
             f"{percent(gap.after)}."
         )
+    # Where little stands above the noise, what is left of it is the noise of the floor.
+    if gap.after**2 - gap.floor**2 <= settings.smallest_gain * gap.floor**2:
+        return None
     explainable = gap.before**2 - gap.floor**2
     share = (gap.before**2 - gap.after**2) / explainable if explainable > 0 else 0.0
     if share >= _ENOUGH:

@@ -237,6 +237,42 @@ def _balancer(trial: Trial) -> FreeEffect | None:
     return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
 
 
+# Over less of a turn of the joint a wave is as good as a constant and a slope.
+_LEAST_TURN_RAD = 1.5
+
+
+def _uneven(trial: Trial) -> FreeEffect | None:
+    """Begin as a law, once a turn of the joint, where it turns far enough to tell."""
+    order = abs(float(trial.robot.gear_ratio[trial.index]))
+    positions = np.concatenate([log.position_rad[:, trial.index] for log in trial.logs])
+    turns = not trial.robot.axis_is_prismatic[trial.index]
+    if not turns or order * np.ptp(positions) < _LEAST_TURN_RAD:
+        return None
+    begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
+    values = {**(begin.effect.parameters or {}), "order": order}
+    free = tuple(name for name in begin.free if name != "order")
+    return replace(begin, effect=trial.effect(values), free=free)
+
+
+# From the slowest swing that ten seconds show to those that gears have themselves; a swing is found
+# from as far away as its resonance is wide.
+_SWINGS_HZ = tuple(float(f) for f in np.geomspace(3.0, 40.0, 12))
+_WIDTH = 0.1
+
+
+def _swing(trial: Trial) -> FreeEffect:
+    """Begin at several frequencies, where there is much to explain."""
+    begin = _neutral(trial)
+    worth_it = _axis_share(trial.at, trial.index) > _SMALL_SHARE
+    starts = tuple({"frequency_hz": f} for f in _SWINGS_HZ) if worth_it else ()
+    return replace(
+        begin.at({"damping": _WIDTH}),
+        priors={"damping": (_WIDTH, _WIDTH)},
+        bounds={"frequency_hz": (0.5 * _SWINGS_HZ[0], 2 * _SWINGS_HZ[-1])},
+        starts=starts,
+    )
+
+
 STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "viscous_friction": _neutral,
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
@@ -262,5 +298,9 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "transmission_error": _gear_waves,
     "torque_saturation": _limit,
     "gear_hysteresis": _slip,
+    "torque_deadband": _neutral,
+    "base_tilt": _neutral,
+    "position_dependent_friction": _uneven,
+    "extra_mode": _swing,
 }
 """By effect."""

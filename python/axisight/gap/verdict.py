@@ -11,6 +11,7 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.stated import TORQUE_LIMIT
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
+from axisight.gap.intervals import intervals
 from axisight.gap.limits import TorqueLimit
 from axisight.gap.model import Evidence
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
@@ -188,14 +189,12 @@ def _named(
     effect = model.effects[position]
     values = effect.parameters or {}
     info = effect_info(effect.name)
-    intervals = {}
-    for name in model.free[position].free:
-        spread = 1.96 * model.std.get((position, name), 0.0)
-        intervals[name] = Interval(values[name], values[name] - spread, values[name] + spread)
+    std = {name: s for (place, name), s in model.std.items() if place == position}
+    found = intervals(effect, model.free[position].free, std)
     for p in info.parameters:
         # Orders of a ripple are chosen, not fitted.
         if p.name.startswith("order_") and values.get(p.name):
-            intervals[p.name] = Interval(values[p.name], values[p.name], values[p.name])
+            found[p.name] = Interval(values[p.name], values[p.name], values[p.name])
     units = {p.name: p.unit for p in info.parameters}
     # Whether anything explains the axis is judged with all causes in; among candidates, what is a
     # cause beside it is no rival.
@@ -205,7 +204,7 @@ def _named(
     kin = [r for r in rivals if r.family == info.family and r.trial.candidate.effect.axis == place]
     alone = ranked.probability / whole
     family = min(max(sum(r.probability for r in kin) / whole, alone), 1.0)
-    return NamedCause(effect.name, effect.axis, alone, intervals, units, info.family, family)
+    return NamedCause(effect.name, effect.axis, alone, found, units, info.family, family)
 
 
 def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ use axisight_core::effects::formulas::{
     dead_zone, dead_zone_inverse, harmonic, harmonic_slope, smoothed_sign, spring_torque,
     stribeck_level,
 };
-use axisight_core::effects::{Spring, build};
+use axisight_core::effects::{Joint, Motor, Spring, build};
 use axisight_core::plant::assemble;
 use axisight_core::robot::Parameter;
 use axisight_core::robot::{EffectSetting, Place};
@@ -179,6 +179,92 @@ fn values_are_those_of_the_equations() {
         );
     }
     assert_eq!(stribeck_level(0.5, 0.25, 3.0, 0.0), 0.75);
+}
+
+#[test]
+fn a_deadband_takes_its_width_off_every_torque() {
+    let kernel = build::<f64>("torque_deadband", &[0.5]).expect("in the table");
+    for (commanded, delivered) in [
+        (2.0, 1.5),
+        (0.5, 0.0),
+        (0.3, 0.0),
+        (-0.2, 0.0),
+        (-3.0, -2.5),
+    ] {
+        assert_eq!(kernel.command(commanded), delivered, "{commanded}");
+    }
+}
+
+#[test]
+fn friction_of_a_place_is_a_wave_over_the_angle() {
+    let p = [0.5, -0.2, 0.01, 0.1];
+    let kernel = build::<f64>("position_dependent_friction", &p).expect("in the table");
+    for (angle, speed) in [(0.0, 3.0), (40.0, 0.05), (-130.0, -0.02), (300.0, -20.0)] {
+        let motor = Motor {
+            angle,
+            speed,
+            command: 0.0,
+            load: 0.0,
+            internal: &[],
+        };
+        let level = 0.5 * f64::cos(0.01 * angle) - 0.2 * f64::sin(0.01 * angle);
+        let want = -level * f64::tanh(speed / 0.1);
+        assert!((kernel.motor_torque(&motor) - want).abs() < 1e-14);
+    }
+}
+
+/// Closed form: a joint moved by sin(W t) feels a mass on a spring and damper with the response
+/// J W^2 (w^2 + 2 i z w W) / (w^2 - W^2 + 2 i z w W).
+#[test]
+fn what_swings_on_a_joint_has_the_response_of_a_mass_on_a_spring() {
+    let (inertia, frequency, damping) = (3.0, 12.0, 0.1);
+    let kernel = build::<f64>("extra_mode", &[inertia, frequency, damping]).expect("in the table");
+    let own = std::f64::consts::TAU * frequency;
+    for forced in [0.3 * own, own, 2.5 * own] {
+        let joint = |t: f64, internal: &[f64]| {
+            let speed = forced * (forced * t).cos();
+            let at = Joint {
+                angle: (forced * t).sin(),
+                speed,
+                internal,
+            };
+            let mut rates = [0.0; 2];
+            kernel.joint_rates(&at, &mut rates);
+            (kernel.joint_torque(&at), rates)
+        };
+        // Two seconds take the swing from rest to its end: e^(-z w t) is 3e-7.
+        let (step, mut x) = (1e-5, [0.0; 2]);
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        let periods = (forced * 0.5 / std::f64::consts::TAU).floor();
+        let (begin, end) = (2.0, 2.0 + periods * std::f64::consts::TAU / forced);
+        let count = (end / step).round() as usize;
+        for k in 0..count {
+            let t = k as f64 * step;
+            let (torque, rates) = joint(t, &x);
+            if t >= begin {
+                sine += torque * (forced * t).sin() * step;
+                cosine += torque * (forced * t).cos() * step;
+            }
+            let middle = [x[0] + 0.5 * step * rates[0], x[1] + 0.5 * step * rates[1]];
+            let (_, rates) = joint(t + 0.5 * step, &middle);
+            x = [x[0] + step * rates[0], x[1] + step * rates[1]];
+        }
+        let half = 0.5 * (end - begin);
+        let damper = 2.0 * damping * own * forced;
+        let (real, imaginary) = (own * own - forced * forced, damper);
+        let size = inertia * forced * forced / (real * real + imaginary * imaginary);
+        let want = [
+            size * (own * own * real + damper * damper),
+            size * (damper * real - own * own * imaginary),
+        ];
+        let largest = want[0].abs().max(want[1].abs());
+        for (got, want) in [sine / half, cosine / half].iter().zip(want) {
+            assert!(
+                (got - want).abs() < 2e-3 * largest,
+                "{forced}: {got} {want}"
+            );
+        }
+    }
 }
 
 const SAMPLE_TIME: f64 = 5e-4;

@@ -326,6 +326,31 @@ fn gravity_of_a_tilted_base() {
     assert_eq!(got.command, want.command);
 }
 
+/// The robot turned by the angles of the tilt, seen from itself: gravity turned back.
+#[test]
+fn a_tilted_base_is_gravity_from_elsewhere() {
+    let robot = robot(PRESET);
+    let (a, b): (f64, f64) = (0.05, -0.03);
+    let down = robot.gravity[2];
+    assert_eq!(robot.gravity[..2], [0.0, 0.0]);
+    // R_y(-b) R_x(-a) of a vector that points down.
+    let gravity = [
+        -b.sin() * a.cos() * down,
+        a.sin() * down,
+        b.cos() * a.cos() * down,
+    ];
+    let tilt = effect("base_tilt", None, &[a, b]);
+    let tilted = RobotDescription {
+        gravity,
+        ..robot.clone()
+    };
+    let (got, want) = (
+        run(&plant(&robot, &[tilt]), &robot, RK4),
+        run(&plant(&tilted, &[]), &tilted, RK4),
+    );
+    assert!(relative(&got.command, &want.command) < 1e-12);
+}
+
 /// Torques that hold: effects of the arm and between axes belong to the equilibrium.
 #[test]
 fn rest_is_rest_with_effects_at_every_point() {

@@ -69,6 +69,10 @@ effect_table!(
     transmission_error,
     torque_saturation,
     gear_hysteresis,
+    torque_deadband,
+    base_tilt,
+    position_dependent_friction,
+    extra_mode,
 );
 
 /// Description of effect `name`.

@@ -1,0 +1,58 @@
+//! Tilt of the base: gravity does not point where the simulator has it.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn angle(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "rad",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1.6,
+        upper: 1.6,
+        typical: 0.02,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "base_tilt",
+    summary: "the base stands tilted: gravity comes from another direction",
+    equation: "g' = R_y(-b) R_x(-a) g",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.1 (gravity in the base frame)",
+    scope: Scope::Arm,
+    acts: Acts::Base,
+    family: Family::Arm,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
+    shown_by: &[Experiment::Poses],
+    parameters: &[angle("about_x_rad"), angle("about_y_rad")],
+};
+
+struct Tilt<S> {
+    about_x: S,
+    about_y: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Tilt {
+        about_x: p[0],
+        about_y: p[1],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Tilt<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        let [x, y, z] = plant.chain.gravity;
+        let (sine, cosine) = self.about_x.sin_cos();
+        let (y, z) = (cosine * y + sine * z, cosine * z - sine * y);
+        let (sine, cosine) = self.about_y.sin_cos();
+        plant.chain.gravity = [cosine * x - sine * z, y, cosine * z + sine * x];
+    }
+}

@@ -1,0 +1,95 @@
+//! A mode that the simulator does not have: something on the joint swings on a spring.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "extra_mode",
+    summary: "something on the joint (a tool, a hose, a structure) swings on a spring",
+    equation: "J (v' = w^2 (q - x) + 2 z w (q' - v)),  x' = v; it pulls the joint back with J v'",
+    source: "Den Hartog (1956), Mechanical Vibrations, section 3.2 (absorber on a mass)",
+    scope: Scope::Axis,
+    acts: Acts::Joint,
+    family: Family::Arm,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::WideBand],
+    parameters: &[
+        ParameterInfo {
+            name: "inertia_kg_m2",
+            unit: "kg m^2 (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1e6,
+            typical: 20.0,
+        },
+        ParameterInfo {
+            name: "frequency_hz",
+            unit: "Hz",
+            role: Role::Shape,
+            neutral: 15.0,
+            lower: 0.5,
+            upper: 200.0,
+            typical: 15.0,
+        },
+        ParameterInfo {
+            name: "damping",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.05,
+            lower: 1e-3,
+            upper: 1.0,
+            typical: 0.05,
+        },
+    ],
+};
+
+struct Mode<S> {
+    inertia: S,
+    rate: S,
+    damping: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Mode {
+        inertia: p[0],
+        rate: p[1] * std::f64::consts::TAU,
+        damping: p[2],
+    })
+}
+
+impl<S: Scalar> Mode<S> {
+    /// Acceleration of what swings: its deflection behind the joint and its speed are the states.
+    fn acceleration(&self, joint: &Joint<'_, S>) -> S {
+        let [behind, speed] = joint.internal else {
+            // At rest it hangs still.
+            return S::zero();
+        };
+        let damper = self.damping * self.rate;
+        self.rate * self.rate * *behind + (damper + damper) * (joint.speed - *speed)
+    }
+}
+
+impl<S: Scalar> Kernel<S> for Mode<S> {
+    fn n_internal(&self) -> usize {
+        2
+    }
+
+    fn joint_torque(&self, joint: &Joint<'_, S>) -> S {
+        -(self.inertia * self.acceleration(joint))
+    }
+
+    fn joint_rates(&self, joint: &Joint<'_, S>, rates: &mut [S]) {
+        if let ([_, speed], [behind, swing]) = (joint.internal, rates) {
+            *behind = joint.speed - *speed;
+            *swing = self.acceleration(joint);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Dry friction that changes with the position of the axis.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn wave(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "Nm",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1e4,
+        upper: 1e4,
+        typical: 0.2,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "position_dependent_friction",
+    summary: "dry friction that is larger in some places of the turn than in others",
+    equation: "tau_f = (c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint",
+    source: "Simoni et al. (2015), IEEE Int. Conf. Robotics and Automation: position-dependent friction of gears; tanh form as coulomb_friction",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &[],
+    parts: &[],
+    usual: &["coulomb_friction"],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::DryFriction],
+    shown_by: &[Experiment::Poses],
+    parameters: &[
+        wave("cosine_nm"),
+        wave("sine_nm"),
+        ParameterInfo {
+            name: "order",
+            unit: "1/motor turn",
+            role: Role::Shape,
+            neutral: 0.01,
+            lower: 1e-4,
+            upper: 100.0,
+            typical: 0.01,
+        },
+        ParameterInfo {
+            name: "smoothing_rad_s",
+            unit: "rad/s",
+            role: Role::Shape,
+            neutral: 0.1,
+            lower: 1e-5,
+            upper: 50.0,
+            typical: 0.1,
+        },
+    ],
+};
+
+struct Uneven<S> {
+    cosine: S,
+    sine: S,
+    order: S,
+    smoothing: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Uneven {
+        cosine: p[0],
+        sine: p[1],
+        order: p[2],
+        smoothing: p[3],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Uneven<S> {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
+        let (sine, cosine) = (self.order * motor.angle).sin_cos();
+        -((self.cosine * cosine + self.sine * sine) * (motor.speed / self.smoothing).tanh())
+    }
+}

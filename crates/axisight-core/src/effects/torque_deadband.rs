@@ -1,0 +1,46 @@
+//! Deadband of the drive.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "torque_deadband",
+    summary: "the drive delivers nothing of small torques, and less of all others",
+    equation: "tau = u - clip(u, -d, d)",
+    source: "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities, section 2.1",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    family: Family::TorquePath,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[Absorber::DryFriction, Absorber::TorqueOffset],
+    shown_by: &[Experiment::Amplitudes],
+    parameters: &[ParameterInfo {
+        name: "width_nm",
+        unit: "Nm",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 1e4,
+        typical: 0.3,
+    }],
+};
+
+struct Deadband<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Deadband(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Deadband<S> {
+    fn command(&self, torque: S) -> S {
+        let none = S::zero();
+        let below = (torque + self.0).if_positive(none, torque + self.0);
+        (torque - self.0).if_positive(torque - self.0, below)
+    }
+}
