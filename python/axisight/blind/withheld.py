@@ -239,7 +239,7 @@ KINDS: Mapping[str, Kind] = {
     "motor_inertia": Kind(_inertia),
     "payload": Kind(_payload),
     "torque_saturation": Kind(_limit),
-    "torque_deadband": Kind(_deadband, in_library=False),
+    "torque_deadband": Kind(_deadband),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),

@@ -103,14 +103,21 @@ class Screen:
 
     def starts(self, group: list[FreeEffect]) -> list[Start]:
         """Return where fits of the candidates would begin, and what they promise."""
-        found: Sequence[Linearized | None] = []
+        found = self._shared(group)
+        best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
+        return [replace(start, gain=self.scale * start.gain) for start in best]
+
+    def _evaluated(self, options: Sequence[FreeEffect]) -> list[Linearized | None]:
+        """Return the model with each of several candidates of one size, as many at a time as go."""
+        return [found for group in self.groups(options) for found in self._shared(group)]
+
+    def _shared(self, group: Sequence[FreeEffect]) -> list[Linearized | None]:
+        """Return the model with each of a group, by one evaluation if they allow it."""
         if len(group) > 1:
             # One that cannot be simulated leaves all to be tried alone.
             with suppress(InputError):
-                found = self.fitter.evaluate_each(group, self.model, self.bench.near)
-        found = found or [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
-        best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
-        return [replace(start, gain=self.scale * start.gain) for start in best]
+                return list(self.fitter.evaluate_each(group, self.model, self.bench.near))
+        return [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
 
     def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
         best = Start(option, self.model.robot_values, -np.inf)
@@ -120,9 +127,9 @@ class Screen:
             # Further starts of one that does nothing as it is: by what a step from there promises.
             # Only sizes: where it has none, its shape shows nothing.
             sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
-            for begin in (option.at(values) for values in option.starts):
-                at = sizes.at(begin.effect.parameters or {})
-                other = self.bench.attempt(self.fitter.evaluate, at, None)
+            begins = [option.at(values) for values in option.starts]
+            others = self._evaluated([sizes.at(b.effect.parameters or {}) for b in begins])
+            for begin, other in zip(begins, others, strict=True):
                 gain = -np.inf if other is None else linear_gain(other)
                 if gain > best.gain:
                     best = replace(best, option=begin, gain=gain)
