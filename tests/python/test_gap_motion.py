@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from axisight import Settings, diagnose
+from axisight.errors import InputError
 from axisight.gap.cutoff import chosen_filtering
-from axisight.gap.inverse import predicted_torque
+from axisight.gap.inverse import InverseView, predicted_torque
 from axisight.gap.inverse_noise import InverseNoise
+from axisight.gap.modes import view_of
 from axisight.gap.motion import Filtering, motion
 from axisight.gap.repeats import repeated_std_nm
 from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
@@ -57,6 +59,17 @@ def test_an_axis_without_a_velocity_keeps_its_position():
     for k in (1, 2):
         error = [np.std((x[k] - exact[k])[inner, 0]) for x in (at, plain)]
         assert error[0] < 0.5 * error[1]
+
+
+def test_logs_are_treated_alike_though_one_has_no_velocity():
+    logs = [with_velocity(coarse(log_of(ROBOT, k, seconds=20.0)), k) for k in range(2)]
+    bare = coarse(log_of(ROBOT, 2, seconds=20.0))
+    both = view_of(ROBOT, logs[:1], logs[1:], Settings())
+    assert isinstance(both, InverseView) and both.filtering.measured[0]
+    alone = view_of(ROBOT, logs[:1], [bare], Settings())
+    assert isinstance(alone, InverseView) and not any(alone.filtering.measured)
+    with pytest.raises(InputError, match="motion 2: expected a measured velocity"):
+        motion(bare, 5.0, (True,) * 6)
 
 
 def test_dry_friction_is_found_on_every_axis():

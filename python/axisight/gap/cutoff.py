@@ -11,6 +11,7 @@ from axisight.gap.motion import Filtering, Motion, has_velocity
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # Below the first resonance of most machines, above the spectrum of their motions.
 _HIGHEST_HZ = 60.0
@@ -18,7 +19,7 @@ _LOWEST_HZ = 2.0
 # A log has at least this many samples in a period of the cutoff.
 _OVERSAMPLING = 5.0
 # Corner of the sign of the speed, as a share of the largest speed.
-CORNER = 0.01
+_CORNER = 0.01
 # A measured velocity has to leave less by this share than one differentiated from the position.
 _CLEARLY = 0.02
 
@@ -32,6 +33,8 @@ def chosen_filtering(
     logs: Sequence[Log],
     predict: Callable[[Motion], Array],
     cutoff_hz: float | None = None,
+    *,
+    measured: Mask | None = None,
 ) -> Filtering:
     """Return the filtering whose motion predicts torque best on data left out.
 
@@ -39,23 +42,28 @@ def chosen_filtering(
     logged* is regressed on the predicted one, the speed, its sign and an offset, on one half of
     each log, and predicted on the other: what a low cutoff takes from the motion and what a high
     one leaves of the noise both count. Cutoffs are tried in half octaves, unless ``cutoff_hz`` is
-    given; with the best of them, the measured velocity of the axes that have one.
+    given; with the best of them, the measured velocity of the axes that have one: ``measured``
+    (n_axes,), by default those of these logs.
     """
     highest = highest_cutoff_hz(logs[0].sample_time_s)
     count = int(2 * np.log2(highest / _LOWEST_HZ)) + 1
     grid = highest * 2.0 ** (-np.arange(max(count, 1)) / 2)
     best = cutoff_hz
     if best is None:
-        errors = [held_out_error(logs, Filtering(float(f)), predict).sum() for f in grid]
+        # Relative changes count: an axis that nothing predicts does not choose for the others.
+        errors = [
+            np.log(np.maximum(held_out_error(logs, Filtering(float(f)), predict), 1e-300)).sum()
+            for f in grid
+        ]
         best = float(grid[int(np.argmin(errors))])
-    available = has_velocity(logs)
+    available = has_velocity(logs) if measured is None else measured
     if not available.any():
         return Filtering(best)
-    given, measured = (
+    position, velocity = (
         held_out_error(logs, Filtering(best, tuple(axes)), predict)
         for axes in (np.zeros_like(available), available)
     )
-    better = available & (measured < (1 - _CLEARLY) * given)
+    better = available & (velocity < (1 - _CLEARLY) * position)
     return Filtering(best, tuple(bool(x) for x in better))
 
 
@@ -87,5 +95,5 @@ def columns(rigid: Array, speed: Array) -> Array:
 
 def direction(speed: Array) -> Array:
     """Return the sign of a speed (n,), rounded off below a hundredth of the largest."""
-    corner = CORNER * max(float(np.abs(speed).max()), 1e-12)
+    corner = _CORNER * max(float(np.abs(speed).max()), 1e-12)
     return np.asarray(speed / np.sqrt(speed**2 + corner**2))

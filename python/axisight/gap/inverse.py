@@ -16,7 +16,7 @@ from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import chosen_filtering
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
-from axisight.gap.motion import Motion
+from axisight.gap.motion import Motion, has_velocity
 from axisight.gap.noise import Floor
 from axisight.gap.settings import Settings
 from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
@@ -35,7 +35,9 @@ _STEP = 1e-3
 class InverseView(View):
     """Torque predicted from the measured motion."""
 
-    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+    def __init__(
+        self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
+    ) -> None:
         cutoff = settings.cutoff_hz
         if cutoff is not None and not 0 < cutoff < 0.5 / robot.sample_time_s:
             raise InputError(
@@ -43,7 +45,11 @@ class InverseView(View):
                 f"{0.5 / robot.sample_time_s:g} Hz, got {cutoff:g} Hz"
             )
         self.filtering = chosen_filtering(
-            logs, lambda m: predicted_torque(robot, AS_GIVEN, m), cutoff
+            logs,
+            lambda m: predicted_torque(robot, AS_GIVEN, m),
+            cutoff,
+            # All logs are treated alike, those held out too.
+            measured=has_velocity([*logs, *held_out]),
         )
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
         floor = inverse_floor(logs, self.noise, settings)

@@ -17,6 +17,6 @@ def view_of(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], settings: Settings
 ) -> View:
     """Return closed loop if robot and all logs have what it takes, else inverse dynamics."""
-    closed = is_closed_loop(robot, [*estimation, *validation])
-    mode = ClosedLoopView if closed else InverseView
-    return mode(robot, list(estimation), settings)
+    if is_closed_loop(robot, [*estimation, *validation]):
+        return ClosedLoopView(robot, list(estimation), settings)
+    return InverseView(robot, list(estimation), settings, validation)

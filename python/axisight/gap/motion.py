@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.errors import InputError
 from axisight.logs import Log, differentiate, lowpass
 
 Array = NDArray[np.float64]
@@ -35,11 +36,13 @@ def motion(log: Log, cutoff_hz: float, measured: Sequence[bool] = ()) -> Motion:
     """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike.
 
     ``measured``: the axes whose velocity is the measured one, low-passed, and whose acceleration
-    is its derivative.
+    is its derivative. Raises InputError where the log has none.
     """
     velocity, acceleration = differentiate(log.position_rad, log.sample_time_s, cutoff_hz)
     axes = np.flatnonzero(measured)
-    if axes.size and log.velocity_rad_s is not None:
+    if axes.size:
+        if log.velocity_rad_s is None:
+            raise InputError(f"{log.name}: expected a measured velocity, got none")
         speed = lowpass(log.velocity_rad_s[:, axes], log.sample_time_s, cutoff_hz)
         velocity[:, axes] = speed
         acceleration[:, axes] = np.gradient(speed, log.sample_time_s, axis=0, edge_order=2)
