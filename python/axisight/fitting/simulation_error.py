@@ -101,7 +101,7 @@ class Fitted:
     ``max_iterations`` or ``stalled``; ``warnings`` say in words what to mind (status, parameters on a
     bound, poor conditioning). ``values``, ``std`` and the matrices run over
     ``names``, the free parameters; ``std`` is from the sandwich covariance of
-    data blocks, which stays valid when the model is incomplete.
+    data blocks and priors, which stays valid when the model is incomplete.
     """
 
     names: tuple[str, ...]

@@ -1,7 +1,7 @@
 //! Coulomb friction.
 
 use super::formulas::smoothed_sign;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -31,15 +31,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1e4,
             typical: 0.5,
         },
-        ParameterInfo {
-            name: "smoothing_rad_s",
-            unit: "rad/s",
-            role: Role::Shape,
-            neutral: 0.1,
-            lower: 1e-5,
-            upper: 50.0,
-            typical: 0.1,
-        },
+        SMOOTHING,
     ],
 };
 

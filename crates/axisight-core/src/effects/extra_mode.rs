@@ -6,8 +6,8 @@ use axisight_scalar::Scalar;
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "extra_mode",
     summary: "something on the joint (a tool, a hose, a structure) swings on a spring",
-    equation: "J (v' = w^2 (q - x) + 2 z w (q' - v)),  x' = v; it pulls the joint back with J v'",
-    source: "Den Hartog (1956), Mechanical Vibrations, section 3.2 (absorber on a mass)",
+    equation: "x' = v,  v' = w^2 (q - x) + 2 z w (q' - v),  tau = -J v' on the joint",
+    source: "Den Hartog (1956), Mechanical Vibrations, section 3.3 (damped vibration absorber)",
     scope: Scope::Axis,
     acts: Acts::Joint,
     family: Family::Arm,
@@ -66,7 +66,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Mode<S> {
-    /// Acceleration of what swings: its deflection behind the joint and its speed are the states.
+    /// Acceleration of what swings; how far it is behind the joint and its speed are the states.
     fn acceleration(&self, joint: &Joint<'_, S>) -> S {
         let [behind, speed] = joint.internal else {
             // At rest it hangs still.

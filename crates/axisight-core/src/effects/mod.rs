@@ -16,6 +16,28 @@ pub use axisight_plant::formulas;
 
 use axisight_scalar::Scalar;
 
+/// Speed of the motor below which a dry friction is rounded off.
+const SMOOTHING: ParameterInfo = ParameterInfo {
+    name: "smoothing_rad_s",
+    unit: "rad/s",
+    role: Role::Shape,
+    neutral: 0.1,
+    lower: 1e-5,
+    upper: 50.0,
+    typical: 0.1,
+};
+
+/// Speed of the motor over which a dry friction falls from standstill.
+const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
+    name: "stribeck_speed_rad_s",
+    unit: "rad/s",
+    role: Role::Shape,
+    neutral: 3.0,
+    lower: 1e-4,
+    upper: 500.0,
+    typical: 3.0,
+};
+
 macro_rules! effect_table {
     ($($module:ident),* $(,)?) => {
         $(mod $module;)*

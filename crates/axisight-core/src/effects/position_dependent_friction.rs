@@ -1,6 +1,6 @@
 //! Dry friction that changes with the position of the axis.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -19,7 +19,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     name: "position_dependent_friction",
     summary: "dry friction that is larger in some places of the turn than in others",
     equation: "tau_f = (c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint",
-    source: "Simoni et al. (2015), IEEE Int. Conf. Robotics and Automation: position-dependent friction of gears; tanh form as coulomb_friction",
+    source: "Armstrong-Helouvry (1991), Control of Machines with Friction (joints of a PUMA 560 over their position); tanh form as coulomb_friction",
     scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
@@ -44,15 +44,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 100.0,
             typical: 0.01,
         },
-        ParameterInfo {
-            name: "smoothing_rad_s",
-            unit: "rad/s",
-            role: Role::Shape,
-            neutral: 0.1,
-            lower: 1e-5,
-            upper: 50.0,
-            typical: 0.1,
-        },
+        SMOOTHING,
     ],
 };
 

@@ -1,7 +1,7 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
 use super::formulas::stribeck_level;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, STRIBECK_SPEED, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -40,15 +40,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 10.0,
             typical: 1.5,
         },
-        ParameterInfo {
-            name: "stribeck_speed_rad_s",
-            unit: "rad/s",
-            role: Role::Shape,
-            neutral: 3.0,
-            lower: 1e-4,
-            upper: 500.0,
-            typical: 3.0,
-        },
+        STRIBECK_SPEED,
         ParameterInfo {
             name: "presliding_rad",
             unit: "rad (motor side)",

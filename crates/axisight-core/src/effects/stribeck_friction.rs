@@ -1,7 +1,7 @@
 //! Stribeck friction: Coulomb friction with an excess at low speed.
 
 use super::formulas::{smoothed_sign, stribeck_level};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -40,24 +40,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1e4,
             typical: 0.3,
         },
-        ParameterInfo {
-            name: "stribeck_speed_rad_s",
-            unit: "rad/s",
-            role: Role::Shape,
-            neutral: 3.0,
-            lower: 1e-4,
-            upper: 500.0,
-            typical: 3.0,
-        },
-        ParameterInfo {
-            name: "smoothing_rad_s",
-            unit: "rad/s",
-            role: Role::Shape,
-            neutral: 0.1,
-            lower: 1e-5,
-            upper: 50.0,
-            typical: 0.1,
-        },
+        STRIBECK_SPEED,
+        SMOOTHING,
     ],
 };
 

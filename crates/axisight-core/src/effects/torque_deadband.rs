@@ -7,7 +7,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_deadband",
     summary: "the drive delivers nothing of small torques, and less of all others",
     equation: "tau = u - clip(u, -d, d)",
-    source: "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities, section 2.1",
+    source: "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities, chapter 2 (dead zones)",
     scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::TorquePath,

@@ -84,7 +84,7 @@ pub struct Fit {
     pub free: Vec<usize>,
     /// Inverse of the normal matrix (prior included), row-major: covariance for unit white noise.
     pub covariance: Vec<f64>,
-    /// Covariance from the scatter of block gradients, valid when the residuals are
+    /// Covariance from the scatter of block gradients and that of priors, valid when the residuals are
     /// correlated or the model is incomplete; row-major.
     pub sandwich: Vec<f64>,
     /// Condition number of the normal matrix scaled to unit diagonal.
