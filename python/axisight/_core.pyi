@@ -95,7 +95,9 @@ class EffectInfo(TypedDict):
     equation: str
     source: str
     scope: Literal["axis", "axes", "arm"]
-    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "base", "sensor"]
+    acts: Literal[
+        "torque_path", "motor", "transmission", "joint", "arm", "base", "sensor", "controller"
+    ]
     family: str
     contains: list[str]
     parts: list[str]

@@ -25,7 +25,7 @@ def test_a_limit_is_found_with_its_level_and_how_often_it_was_met():
     logs = cut(limited(PLAN))
     (found,) = torque_limits(bare_axis(), logs)
     assert found.axis == 1
-    assert found.limit_nm.value == pytest.approx(LIMIT, rel=1e-12)
+    assert found.values["limit_nm"].value == pytest.approx(LIMIT, rel=1e-12)
     at_top = sum(int((np.abs(x.torque_nm) == LIMIT).sum()) for x in logs)
     # Single samples at the limit are not counted.
     assert 0.9 * at_top < found.samples <= at_top

@@ -85,5 +85,11 @@ RIGID_BODY_QUANTITIES = {
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 """What flat tops of a logged torque are, and its parameter."""
 
+OTHER_GAINS = ("controller_gain", ("relative_proportional", "relative_integral"))
+"""What a controller with other gains is, and its parameters: of the proportional, of the integral gain."""
+
+SPEED_FILTER = ("velocity_filter", "time_constant_s")
+"""What a filter on the controller's speed is, and its parameter."""
+
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""

@@ -50,7 +50,9 @@ class EffectInfo:
     equation: str
     source: str
     scope: Literal["axis", "axes", "arm"]
-    acts: Literal["torque_path", "motor", "transmission", "joint", "arm", "base", "sensor"]
+    acts: Literal[
+        "torque_path", "motor", "transmission", "joint", "arm", "base", "sensor", "controller"
+    ]
     family: Literal[
         "friction",
         "transmission",
@@ -60,6 +62,7 @@ class EffectInfo:
         "load",
         "arm",
         "sensor",
+        "controller",
     ]
     contains: tuple[str, ...]
     parts: tuple[str, ...]

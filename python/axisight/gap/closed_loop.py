@@ -13,9 +13,10 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.feedback import loop_responses
-from axisight.gap.limits import reported, torque_limits
+from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
+from axisight.gap.own_controller import other_controllers
 from axisight.gap.settings import Settings
 from axisight.gap.torques import Variant
 from axisight.gap.view import View
@@ -49,8 +50,10 @@ class ClosedLoopView(View):
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         self.tracking = robot.with_controller_speed(TRACKING_SPEED)
-        floor = tracking_floor(self.tracking, robot, logs, settings)
         limits = torque_limits(robot, logs)
+        others = other_controllers(robot, logs)
+        self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
+        floor = tracking_floor(self.tracking, self._noisy, logs, settings)
         # A torque reported after the limit is what the motor got: it needs no limit once more.
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
@@ -61,6 +64,8 @@ class ClosedLoopView(View):
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
         self.limits = limits
+        self.shown = (*missing(limits, robot), *others)
+        self.not_offered = frozenset(after)
         self._loops: dict[tuple[int, float], tuple[Complex, Complex]] = {}
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
@@ -94,7 +99,7 @@ class ClosedLoopView(View):
     def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
         return noise_torques(
-            self.robot,
+            self._noisy,
             logs,
             self.floor.position_std_rad,
             self.settings.seed,

@@ -22,12 +22,20 @@ def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) 
 
     Before any limit. Linear: shares of references and of positions may be given apart.
     """
+    proportional, integral = gain_shares(robot, speed, angle, axis)
+    return np.asarray(proportional + integral)
+
+
+def gain_shares(
+    robot: Robot, speed: Array, angle: Array, axis: int | None = None
+) -> tuple[Array, Array]:
+    """Return what the proportional and the integral gain make of the errors, as in `feedback`."""
     gains = {k: v if axis is None else v[axis] for k, v in robot.controller_gains.items()}
     kp, ki = gains["kp"], gains.get("ki", 0.0)
     if "kv" not in gains:
-        return np.asarray(kp * speed + ki * angle)
+        return np.asarray(kp * speed), np.asarray(ki * angle)
     error = speed + gains["kv"] * angle
-    return np.asarray(kp * error + ki * before(error) * robot.sample_time_s)
+    return np.asarray(kp * error), np.asarray(ki * before(error) * robot.sample_time_s)
 
 
 def controller_response(robot: Robot, frequency_hz: Array) -> Complex:

@@ -10,7 +10,6 @@ cut it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from axisight.effects import Effect
 from axisight.effects.stated import TORQUE_LIMIT
 from axisight.gap.feedback import before, feedback
 from axisight.gap.result import Interval
+from axisight.gap.shown import ShownCause
 from axisight.logs import Log
 from axisight.logs.frozen import runs
 from axisight.robot import Robot
@@ -36,42 +36,25 @@ _BEYOND = 0.95
 _LAW_HOLDS = 0.99
 
 
-@dataclass(frozen=True)
-class TorqueLimit:
-    """A limit of one axis (from 1) [Nm]; ``samples`` stood at it, of ``of`` in these logs.
-
-    ``explained``: share of what the torque is off the command that the limit takes away [1].
-    """
-
-    axis: int
-    limit_nm: Interval
-    samples: int
-    of: int
-    explained: float
-
-    @property
-    def effect(self) -> Effect:
-        """The limit as an effect."""
-        name, parameter = TORQUE_LIMIT
-        return Effect(name, self.axis, {parameter: self.limit_nm.value})
-
-
-def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[TorqueLimit, ...]:
+def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
     """Return the limits that logs with velocity references show, axis by axis."""
     commands = [_command(robot, log) for log in logs]
     found = (_limit(i, logs, commands) for i in range(robot.n_axes))
     return tuple(x for x in found if x is not None)
 
 
-def missing(limits: Sequence[TorqueLimit], robot: Robot) -> tuple[TorqueLimit, ...]:
+def missing(limits: Sequence[ShownCause], robot: Robot) -> tuple[ShownCause, ...]:
     """Return the limits that a simulator does not have."""
     own = {e.axis: e.values()[0] for e in robot.effects if e.name == TORQUE_LIMIT[0]}
-    return tuple(
-        x for x in limits if abs(own.get(x.axis, np.inf) / x.limit_nm.value - 1) > _SAME_LEVEL
-    )
+
+    def differs(found: ShownCause) -> bool:
+        level = found.values[TORQUE_LIMIT[1]].value
+        return bool(abs(own.get(found.axis, np.inf) / level - 1) > _SAME_LEVEL)
+
+    return tuple(x for x in limits if differs(x))
 
 
-def reported(torque: Array, limits: Sequence[TorqueLimit], effects: Iterable[Effect]) -> Array:
+def reported(torque: Array, limits: Sequence[ShownCause], effects: Iterable[Effect]) -> Array:
     """Return commanded torques (n, n_axes) [Nm] as drives that show ``limits`` report them.
 
     Cut at the limits among ``effects``, those of the simulator.
@@ -94,7 +77,7 @@ def _command(robot: Robot, log: Log) -> Array:
     return feedback(robot, reference - speed, before(reference) * time - position)
 
 
-def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> TorqueLimit | None:
+def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> ShownCause | None:
     torques = [log.torque_nm[:, axis] for log in logs]
     highest = max(float(np.abs(u).max()) for u in torques)
     tops = [_flat(np.abs(u), highest) for u in torques]
@@ -122,7 +105,14 @@ def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> TorqueL
     levels = np.abs(measured[at_top])
     low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975])
     interval = Interval(float(middle), float(low), float(high))
-    return TorqueLimit(axis + 1, interval, int(at_top.sum()), len(at_top), explained)
+    says = (
+        f"Axis {axis + 1}: {100 * at_top.mean():.3g} % of the logged torque stands at "
+        f"{interval.value:.4g} Nm where the controller's law asks for more; cut there, the law gives "
+        f"{100 * explained:.4g} % of what it misses otherwise."
+    )
+    name, parameter = TORQUE_LIMIT
+    samples = int(at_top.sum())
+    return ShownCause(name, axis + 1, {parameter: interval}, samples, explained, says)
 
 
 def _flat(size: Array, level: float) -> NDArray[np.bool_]:

@@ -285,8 +285,9 @@ class ModelFitter(ABC):
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
         setup = self._setup(free, start, robot_values, held, lazy=lazy, fresh=fresh)
-        # What is to be compared with others is fitted to less than the formulas agree.
-        tolerance = _TRIAL_TOLERANCE if lazy else _TOLERANCE
+        # What is to be compared with others is fitted to less than the formulas agree; so is what
+        # others are to be compared with.
+        tolerance = _TRIAL_TOLERANCE if lazy or not free else _TOLERANCE
         options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         renewed = not lazy and near is None

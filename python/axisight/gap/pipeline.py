@@ -22,7 +22,6 @@ from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
-from axisight.gap.limits import missing
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
 from axisight.gap.remainder import parameters_at_edge, refit_worse, remainder_of
@@ -90,8 +89,7 @@ def diagnose(
     found = believed_by_axis(found, view.fitter, chosen)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
-    limits = missing(view.limits, machine)
-    said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), limits=limits)
+    said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
     seen = _seen(view, held_logs, found, said, chosen)
     out = _assemble(name or found_name, machine, view, held_logs, seen, error_logs, chosen, noted)
     progress("measuring the gap", 1, 1)

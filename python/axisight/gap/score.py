@@ -62,14 +62,28 @@ def predictable(evidence: Evidence) -> NDArray[np.bool_]:
     return np.asarray(np.einsum("bii->b", evidence.matrix) > 0)
 
 
-def predicted_loss(evidence: Evidence, blocks: NDArray[np.bool_], step: Array) -> Array:
+def predicted_loss(evidence: Linearized, blocks: NDArray[np.bool_], step: Array) -> Array:
     """Return the loss of some blocks after a parameter step, to second order."""
     loss = evidence.loss[blocks] + 2 * evidence.gradient[blocks] @ step
     return np.asarray(loss + np.einsum("bij,i,j->b", evidence.matrix[blocks], step, step))
 
 
 def linear_gain(evidence: Linearized) -> float:
-    """Return how much loss one undamped step from here promises.
+    """Return how much loss one undamped step from here promises, priors included."""
+    matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
+    gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
+    step = linear_step(evidence)
+    return float(-step @ (2 * gradient + matrix @ step))
+
+
+def linear_falls(evidence: Linearized) -> Array:
+    """Return how much loss of each block (n_blocks,) one undamped step from here takes away."""
+    every = np.ones(len(evidence.loss), dtype=bool)
+    return np.asarray(evidence.loss - predicted_loss(evidence, every, linear_step(evidence)))
+
+
+def linear_step(evidence: Linearized) -> Array:
+    """Return the step (n_parameters,) to the least of a parabola.
 
     The simulator's own parameters go no further than their bounds, as in a fit: what would take
     them beyond is an effect.
@@ -89,7 +103,7 @@ def linear_gain(evidence: Linearized) -> float:
             break
         step[beyond] = np.clip(step, least, most)[beyond]
         free &= ~beyond
-    return float(-step @ (2 * gradient + matrix @ step))
+    return step
 
 
 def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Array:

@@ -16,7 +16,7 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
-from axisight.gap.score import linear_gain
+from axisight.gap.score import linear_falls, linear_gain
 
 Array = NDArray[np.float64]
 A = TypeVar("A")
@@ -37,11 +37,15 @@ def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]
 
 @dataclass(frozen=True)
 class Start:
-    """Where the fit of a candidate begins, and the gain it promises."""
+    """Where the fit of a candidate begins, and the gain it promises.
+
+    ``falls`` (n_axes,): by axis, of one that acts on the whole arm.
+    """
 
     option: FreeEffect
     robot_values: Mapping[str, float]
     gain: float
+    falls: Array | None = None
 
 
 class Bench:
@@ -105,7 +109,11 @@ class Screen:
         """Return where fits of the candidates would begin, and what they promise."""
         found = self._shared(group)
         best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
-        return [replace(start, gain=self.scale * start.gain) for start in best]
+        return [self._scaled(start) for start in best]
+
+    def _scaled(self, start: Start) -> Start:
+        falls = None if start.falls is None else self.scale * start.falls
+        return replace(start, gain=self.scale * start.gain, falls=falls)
 
     def _evaluated(self, options: Sequence[FreeEffect]) -> list[Linearized | None]:
         """Return the model with each of several candidates of one size, as many at a time as go."""
@@ -123,6 +131,9 @@ class Screen:
         best = Start(option, self.model.robot_values, -np.inf)
         if evidence is not None:
             best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
+            if option.effect.axis is None:
+                fall = self.model.loss - evidence.loss + linear_falls(evidence)
+                best = replace(best, falls=np.bincount(self.model.axis, fall).astype(np.float64))
         if len(option.free) > 1:
             # Further starts of one that does nothing as it is: by what a step from there promises.
             # Only sizes: where it has none, its shape shows nothing.

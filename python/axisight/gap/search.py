@@ -47,7 +47,7 @@ class Search:
     ``baseline``: the simulator re-fitted without effects; ``model``: with the
     accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
     blocks lie; ``skipped``: candidates that failed, with the reason;
-    ``by_axis``: the effects explain their axes, not the arm.
+    ``adds_up``: errors add up axis by axis; ``by_axis``: the effects explain their axes, not the arm.
     """
 
     baseline: Evidence
@@ -56,6 +56,7 @@ class Search:
     layout: Layout
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    adds_up: bool = False
     by_axis: bool = False
 
     @property
@@ -80,6 +81,18 @@ class Search:
         fall = held_out_loss(self.baseline) - held_out_loss(self.model)
         return self.layout.by_axis(np.where(used, fall, 0.0))
 
+    def least_falls(self, settings: Settings) -> Array:
+        """Return the fall of the loss of each axis (n_axes,) below which nothing there is a cause.
+
+        In a loop, where errors do not add up axis by axis, what a cause on one axis takes away
+        leaves the error of its formula on every other.
+        """
+        formulas = 0.0 if self.adds_up else settings.model_error**2 * float(self.removed().sum())
+        return np.maximum(
+            settings.smallest_gain * self.layout.samples() + formulas,
+            settings.smallest_share * self.to_explain(),
+        )
+
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
         total = float(self.to_explain().sum())
@@ -99,13 +112,14 @@ def search(
     ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
     """
     progress("re-fitting the simulator", 0, 1)
-    baseline = fitter.fit([], refreshes=2)
+    baseline = fitter.fit([], refreshes=1)
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.samples
-    out = Search(baseline, baseline, floor, layout_of(baseline))
+    out = Search(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
     refused: set[str] = set()
     for number in range(1, _MOST_ROUNDS + 1):
-        round_ = Trials(fitter, out.model, floor, out.layout, settings, progress)
+        least = out.least_falls(settings)
+        round_ = Trials(fitter, out.model, floor, out.layout, least, settings, progress)
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
@@ -229,15 +243,14 @@ def _is_cause(
     significance is held against the level that keeps the false alarms of all of them together at
     ``settings.false_alarms`` (Bonferroni).
     """
-    first = float(state.layout.by_axis(held_out_loss(state.baseline) - state.floor)[standing.axis])
     needed = max(
         settings.significance,
         float(scipy.stats.norm.isf(settings.false_alarms / max(2 * tried, 1))),
     )
-    share = best.gain * float(state.layout.samples()[standing.axis]) / max(first, 1e-12)
-    real = best.significance > needed and best.gain > settings.smallest_gain
-    worth = best.score > settings.smallest_score and share > settings.smallest_share
-    return real and worth and standing.best.probability > standing.p_none
+    fall = best.gain * float(state.layout.samples()[standing.axis])
+    large = fall > float(state.least_falls(settings)[standing.axis])
+    worth = large and best.score > settings.smallest_score
+    return best.significance > needed and worth and standing.best.probability > standing.p_none
 
 
 def _take_in(
@@ -363,5 +376,5 @@ def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> boo
 
 
 def _settled(state: Search, settings: Settings) -> bool:
-    """Whether what is left on every axis is within formula error or close to the floor."""
-    return bool(np.all(state.left() / state.layout.samples() < settings.smallest_gain))
+    """Whether what is left on every axis is less than any cause would take away."""
+    return bool(np.all(state.left() < state.least_falls(settings)))

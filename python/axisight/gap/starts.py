@@ -273,6 +273,10 @@ def _swing(trial: Trial) -> FreeEffect:
     )
 
 
+def _shown_by_logs(_trial: Trial) -> None:
+    """Offer nothing: what the controller does is algebra of the logs, no fit of a machine."""
+
+
 STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "viscous_friction": _neutral,
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
@@ -302,5 +306,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "base_tilt": _neutral,
     "position_dependent_friction": _uneven,
     "extra_mode": _swing,
+    "controller_gain": _shown_by_logs,
+    "velocity_filter": _shown_by_logs,
 }
 """By effect."""

@@ -24,7 +24,7 @@ Progress = Callable[[str, int, int], None]
 A = TypeVar("A")
 B = TypeVar("B")
 
-# Candidates of a place fitted in full: the best of the screen, and all that come near them.
+# Candidates of an axis fitted in full: the best of the screen, and all that come near them.
 _FITTED = 4
 _NEAR = 0.3
 # A linear step promises less than a fit may gain; this much less of what is worth naming.
@@ -71,7 +71,10 @@ def settled(
 
 
 class Trials:
-    """Candidates on top of one model. Failures are kept in ``skipped`` with their reason."""
+    """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
+
+    ``least`` (n_axes,): fall of the loss below which nothing is a cause.
+    """
 
     def __init__(
         self,
@@ -79,11 +82,13 @@ class Trials:
         model: Evidence,
         floor: Array,
         layout: Layout,
+        least: Array,
         settings: Settings,
         progress: Progress,
     ) -> None:
         self.fitter, self.model, self.floor = fitter, model, floor
-        self.layout, self.settings, self.progress = layout, settings, progress
+        self.layout, self.least = layout, least
+        self.settings, self.progress = settings, progress
         self.current = held_out_loss(model)
         self.bench = Bench(fitter, model)
         self.waiting: list[Start] = []
@@ -202,7 +207,8 @@ class Trials:
         out = []
         for standing in self.standings(trials):
             leader = standing.best
-            if _clear(standing) or leader.gain < self.settings.smallest_gain:
+            gain = leader.gain * self.layout.samples()[standing.axis]
+            if _clear(standing) or gain < self.least[standing.axis]:
                 continue
             for r in standing.ranked[:_REFINED]:
                 here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
@@ -223,21 +229,22 @@ class Trials:
     def _promising(self, starts: Sequence[Start]) -> list[Start]:
         """Return the candidates to fit: at every place the best, where anything is to be gained."""
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
-        worth = np.maximum(
-            self.settings.smallest_gain * self.layout.samples(), self.settings.smallest_score * left
-        )
-        places = sorted({s.option.effect.axis or 0 for s in starts})
+        worth = np.maximum(self.least, self.settings.smallest_score * left)
         ranked = sorted(starts, key=lambda s: -s.gain)
         keep: list[Start] = []
-        for place in places:
-            mine = [s for s in ranked if (s.option.effect.axis or 0) == place]
-            least = _HOPELESS * (worth[place - 1] if place else worth.min())
-            near = _NEAR * mine[0].gain
+        best = np.zeros(self.layout.n_axes)
+        for axis in range(self.layout.n_axes):
+            mine = [s for s in ranked if s.option.effect.axis == axis + 1]
+            best[axis] = mine[0].gain if mine else 0.0
             keep += [
                 s
                 for k, s in enumerate(mine)
-                if s.gain > least and (k < _FITTED or (k < 2 * _FITTED and s.gain > near))
+                if s.gain > _HOPELESS * worth[axis]
+                and (k < _FITTED or (k < 2 * _FITTED and s.gain > _NEAR * best[axis]))
             ]
+        # An effect of the whole arm has to come near what those of one axis promise there.
+        least = np.maximum(_HOPELESS * worth, _NEAR * best)
+        keep += [s for s in ranked if s.falls is not None and np.any(s.falls > least)]
         # Where nothing is worth a cause, the best of all still say what was looked at.
         return keep or ranked[:_LOOKED_AT]
 

@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import TORQUE_LIMIT
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
 from axisight.gap.intervals import intervals
-from axisight.gap.limits import TorqueLimit
 from axisight.gap.model import Evidence
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
+from axisight.gap.shown import ShownCause
 
 
 @dataclass(frozen=True)
@@ -57,17 +56,18 @@ class Conclusion:
         return replace(self, checks=(*self.checks, *more))
 
 
-# A limit that the controller's own law shows could still be one of the supply, not of the drive.
+# What the controller's own law shows could still be something else that looks alike: a limit of the
+# supply, not of the drive.
 _SHOWN = 0.99
 
 
 def conclude(
-    found: Search, settings: Settings, *, stands_out: bool, limits: Sequence[TorqueLimit] = ()
+    found: Search, settings: Settings, *, stands_out: bool, shown: Sequence[ShownCause] = ()
 ) -> Conclusion:
     """Draw the verdict from a finished search.
 
     ``stands_out``: whether the plain torque error of the re-fitted simulator lies
-    above the noise; without, what no effect explains is taken for noise. ``limits``: causes that
+    above the noise; without, what no effect explains is taken for noise. ``shown``: causes that
     the logs show by themselves; they come first.
     """
     accepted = found.accepted
@@ -77,13 +77,13 @@ def conclude(
     ranking = () if strongest is None else tuple(_candidate(r) for r in strongest.ranked)
     p_none = 1.0 if strongest is None else strongest.p_none
     p_unknown = 0.0 if strongest is None else strongest.p_unknown
-    if limits and not accepted:
-        ranking = (_candidate_shown(limits[0]),)
+    if shown and not accepted:
+        ranking = (_candidate_shown(shown[0]),)
         p_none, p_unknown = 0.0, 1.0 - _SHOWN
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
     gap = stands_out and _significant(found, settings)
-    if not accepted and not limits:
+    if not accepted and not shown:
         verdict: VerdictKind = "unknown" if gap else "none"
     elif explained < settings.explained_share and (accepted or gap):
         verdict = "unknown"
@@ -91,7 +91,7 @@ def conclude(
         verdict = "undecidable" if open_groups else "explained"
     believed = verdict in ("explained", "undecidable") or found.by_axis
     searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
-    causes = (*map(_shown, limits), *searched) if believed else ()
+    causes = (*map(_shown, shown), *searched) if believed else ()
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
@@ -106,24 +106,15 @@ def conclude(
         p_none=p_none,
         p_unknown=p_unknown,
         axes=_axes(found, settings, causes, gap=gap),
-        checks=(*map(_limit_check, limits), *_checks(found, settings, explained)),
-        effects=(*(x.effect for x in limits), *found.model.effects) if believed else (),
+        checks=(*(x.says for x in shown), *_checks(found, settings, explained)),
+        effects=(*(x.effect for x in shown), *found.model.effects) if believed else (),
     )
 
 
-def _shown(limit: TorqueLimit) -> NamedCause:
-    info = effect_info(limit.effect.name)
+def _shown(cause: ShownCause) -> NamedCause:
+    info = effect_info(cause.name)
     units = {p.name: p.unit for p in info.parameters}
-    value = {TORQUE_LIMIT[1]: limit.limit_nm}
-    return NamedCause(info.name, limit.axis, _SHOWN, value, units, info.family, _SHOWN)
-
-
-def _limit_check(limit: TorqueLimit) -> str:
-    return (
-        f"Axis {limit.axis}: {100 * limit.samples / limit.of:.3g} % of the logged torque stands at "
-        f"{limit.limit_nm.value:.4g} Nm where the controller's law asks for more; cut there, the law gives "
-        f"{100 * limit.explained:.4g} % of what it misses otherwise."
-    )
+    return NamedCause(info.name, cause.axis, _SHOWN, dict(cause.values), units, info.family, _SHOWN)
 
 
 def _strongest(found: Search) -> Standing | None:
@@ -164,11 +155,10 @@ def _significant(found: Search, settings: Settings) -> bool:
     return bool(np.any(excess / found.layout.samples() > settings.largest_scatter))
 
 
-def _candidate_shown(limit: TorqueLimit) -> Candidate:
-    name = limit.effect.name
+def _candidate_shown(cause: ShownCause) -> Candidate:
     # So many samples, each a trial of its own, stand where chance would put none.
-    sure = float(np.sqrt(limit.samples))
-    return Candidate(name, limit.axis, _SHOWN, limit.explained, sure, "shown_by_the_logs")
+    sure = float(np.sqrt(cause.samples))
+    return Candidate(cause.name, cause.axis, _SHOWN, cause.explained, sure, "shown_by_the_logs")
 
 
 def _candidate(ranked: Ranked) -> Candidate:

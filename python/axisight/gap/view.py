@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
-from axisight.gap.limits import TorqueLimit
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.result import Mode
 from axisight.gap.settings import Settings
+from axisight.gap.shown import ShownCause
 from axisight.gap.torques import Variant
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -35,8 +35,10 @@ class View(ABC):
     floor: Floor
     cutoff_hz: float | None = None
     """Of the low-pass on both sides; None where there is none."""
-    limits: tuple[TorqueLimit, ...] = ()
-    """Of the torque, as the logs show them by themselves."""
+    shown: tuple[ShownCause, ...] = ()
+    """Causes that the logs show by themselves."""
+    not_offered: frozenset[str] = frozenset()
+    """Labels of effects that the logs settle by themselves: no candidates."""
 
     def candidates(self, model: Evidence) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model."""
@@ -55,8 +57,7 @@ class View(ABC):
             inverse_dynamics=self.mode == "inverse_dynamics",
             threads=self.settings.threads,
         )
-        shown = {limit.effect.label for limit in self.limits}
-        return [f for f in found if f.effect.label not in shown]
+        return [f for f in found if f.effect.label not in self.not_offered]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         weighting = self.fitter.weighting

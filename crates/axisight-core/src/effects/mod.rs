@@ -95,6 +95,8 @@ effect_table!(
     base_tilt,
     position_dependent_friction,
     extra_mode,
+    controller_gain,
+    velocity_filter,
 );
 
 /// Description of effect `name`.

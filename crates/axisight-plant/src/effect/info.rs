@@ -31,6 +31,8 @@ pub enum Acts {
     Base,
     /// Between true and measured motor position.
     Sensor,
+    /// In the controller, from references and measured positions to the command.
+    Controller,
 }
 
 /// What kind of cause an effect is.
@@ -52,6 +54,8 @@ pub enum Family {
     Arm,
     /// Wrong readings.
     Sensor,
+    /// Another controller than the stated one.
+    Controller,
 }
 
 /// How a change is stated.
@@ -135,6 +139,8 @@ pub enum Experiment {
     SlowTurns,
     /// Poses, with and without a known load.
     Poses,
+    /// References and positions logged beside the torque.
+    References,
 }
 
 /// What a parameter does to an effect.

@@ -223,6 +223,15 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Rates of the effect's own states on the arm [1/s].
     fn arm_rates(&self, _arm: &Arm<'_, S>, _rates: &mut [S]) {}
 
+    /// Factors of the controller's proportional and integral gain [1].
+    fn controller_gains(&self) -> Option<[S; 2]> {
+        None
+    }
+    /// Time constant of the filter through which the controller takes the speed [s]; `None` at zero.
+    fn speed_filter(&self) -> Option<S> {
+        None
+    }
+
     /// Error added to the measured motor position [rad].
     fn sensor(&self, _angle: S) -> S {
         S::zero()

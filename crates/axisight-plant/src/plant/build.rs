@@ -232,7 +232,10 @@ fn misplaced(info: &'static EffectInfo, n_axes: usize, place: Place) -> EffectEr
 
 /// What is integrated can have states; the torque path and the sensor work from sample to sample.
 fn check_states(info: &'static EffectInfo, states: usize) -> Result<(), EffectError> {
-    let integrated = !matches!(info.acts, Acts::TorquePath | Acts::Sensor);
+    let integrated = !matches!(
+        info.acts,
+        Acts::TorquePath | Acts::Sensor | Acts::Controller
+    );
     if integrated || states == 0 {
         return Ok(());
     }

@@ -1,6 +1,6 @@
 //! The sampled loop: measure, command, integrate to the next sample.
 
-use super::controller::ControlLoop;
+use super::controller::{ControlLoop, OwnLaw};
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
@@ -157,6 +157,7 @@ pub fn simulate<S: Scalar>(
         run.sample_time,
         &rest.motor_angle,
         &rest.motor_torque,
+        OwnLaw::of(plant, run.sample_time),
     );
     let mut paths: Vec<_> = plant
         .axes

@@ -1,7 +1,40 @@
 //! The sampled controllers of `axisight.robot/1`.
 
+use crate::plant::{Axis, Plant};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
+
+/// What effects change of the controller of one axis.
+#[derive(Debug, Clone, Copy)]
+pub struct OwnLaw<S> {
+    /// Factors of the proportional and the integral gain.
+    gains: [S; 2],
+    /// Share of a new speed in the filtered one; `None` without a filter.
+    filter: Option<S>,
+}
+
+impl<S: Scalar> OwnLaw<S> {
+    /// What the effects on each axis of a plant make of a controller.
+    pub fn of(plant: &Plant<S>, sample_time: f64) -> Vec<Self> {
+        let one = |axis: &Axis<S>| {
+            let mut own = Self {
+                gains: [S::one(); 2],
+                filter: None,
+            };
+            for kernel in &axis.kernels {
+                if let Some([kp, ki]) = kernel.controller_gains() {
+                    own.gains = [own.gains[0] * kp, own.gains[1] * ki];
+                }
+                if let Some(lag) = kernel.speed_filter() {
+                    // Backward difference: without a lag the speed is what it was.
+                    own.filter = Some((lag + sample_time).recip() * sample_time);
+                }
+            }
+            own
+        };
+        plant.axes.iter().map(one).collect()
+    }
+}
 
 /// A controller with its memory; commands are motor torques [Nm].
 pub struct ControlLoop<S> {
@@ -11,13 +44,24 @@ pub struct ControlLoop<S> {
     reference_angle: Vec<S>,
     previous: Option<Vec<S>>,
     integral: Vec<S>,
+    own: Vec<OwnLaw<S>>,
+    filtered: Vec<S>,
     first_lag: Option<Vec<S>>,
 }
 
 impl<S: Scalar> ControlLoop<S> {
-    /// A controller settled at motor angles `angle` with static torques `feed_forward`.
-    pub fn new(kind: &Controller, sample_time: f64, angle: &[S], feed_forward: &[S]) -> Self {
+    /// A controller settled at motor angles `angle` with static torques `feed_forward`; `own` says
+    /// by axis what effects change of it, none where it is empty.
+    pub fn new(
+        kind: &Controller,
+        sample_time: f64,
+        angle: &[S],
+        feed_forward: &[S],
+        own: Vec<OwnLaw<S>>,
+    ) -> Self {
         Self {
+            own,
+            filtered: vec![S::zero(); angle.len()],
             kind: kind.clone(),
             sample_time,
             feed_forward: feed_forward.to_vec(),
@@ -36,9 +80,12 @@ impl<S: Scalar> ControlLoop<S> {
                 Some(previous) => (measured[i] - previous[i]) * rate,
                 None => S::zero(),
             };
+            let speed = self.filter(i, speed);
             let speed_error = reference[i] - speed;
             let angle_error = self.reference_angle[i] - measured[i];
-            out[i] = self.feed_forward[i] + self.feedback(i, speed_error, angle_error);
+            let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
+            let feedback = self.feedback(i, speed_error, angle_error, gains);
+            out[i] = self.feed_forward[i] + feedback;
             self.reference_angle[i] += reference[i] * self.sample_time;
         }
         match &mut self.previous {
@@ -48,7 +95,8 @@ impl<S: Scalar> ControlLoop<S> {
     }
 
     /// Add to `command` the feedback that keeps `measured` on the logged positions
-    /// `logged`, both counted from their first sample.
+    /// `logged`, both counted from their first sample. Effects change nothing of it: it is none of
+    /// the machine.
     pub fn follow(&mut self, measured: &[S], logged: &[S], command: &mut [S]) {
         let rate = 1.0 / self.sample_time;
         // The lag behind the log takes the place of the measured angle of an ordinary loop.
@@ -60,21 +108,36 @@ impl<S: Scalar> ControlLoop<S> {
                 .previous
                 .as_ref()
                 .map_or_else(S::zero, |p| (lag[i] - p[i]) * rate);
-            command[i] += self.feedback(i, -speed, -behind);
+            command[i] += self.feedback(i, -speed, -behind, [S::one(); 2]);
         }
         self.previous = Some(lag);
     }
 
+    /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.
     #[inline(always)]
-    fn feedback(&mut self, i: usize, speed_error: S, angle_error: S) -> S {
+    fn filter(&mut self, i: usize, speed: S) -> S {
+        let Some(share) = self.own.get(i).and_then(|own| own.filter) else {
+            return speed;
+        };
+        let before = self.filtered[i];
+        self.filtered[i] = before + share * (speed - before);
+        self.filtered[i]
+    }
+
+    /// Torque for errors of speed and angle, the proportional and the integral gain times `gains`.
+    #[inline(always)]
+    fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 2]) -> S {
+        let [own_kp, own_ki] = gains;
         match &self.kind {
-            Controller::PiVelocity { kp, ki } => speed_error * kp[i] + angle_error * ki[i],
-            Controller::PVelocity { kp } => speed_error * kp[i],
+            Controller::PiVelocity { kp, ki } => {
+                own_kp * (speed_error * kp[i]) + own_ki * (angle_error * ki[i])
+            }
+            Controller::PVelocity { kp } => own_kp * (speed_error * kp[i]),
             Controller::Cascade { kv, kp, ki } => {
                 let error = speed_error + angle_error * kv[i];
                 let integral = self.integral[i];
                 self.integral[i] += error * self.sample_time;
-                error * kp[i] + integral * ki[i]
+                own_kp * (error * kp[i]) + own_ki * (integral * ki[i])
             }
             Controller::None => S::zero(),
         }

@@ -74,7 +74,7 @@ class ControlLaw:
         self.torque = lowpass(log.torque_nm, time, band)
         self._shares: dict[tuple[str, int, int], Array] = {}
         width = int(_SMEARED_PERIODS / (band * time))
-        self.kept = np.column_stack([_free(x, width) for x in log.torque_nm.T])
+        self.kept = np.column_stack([free_of_limits(x, width) for x in log.torque_nm.T])
 
     def share(self, kind: str, axis: int, source: int) -> Array:
         """Return what channel ``source`` adds to the command of ``axis``, (n,) [Nm], from 0.
@@ -120,8 +120,8 @@ class ControlLaw:
         )
 
 
-def _free(torque: Array, width: int) -> Mask:
-    """Mark samples (n,) farther than ``width`` from where the torque is cut at its extremes."""
+def free_of_limits(torque: Array, width: int) -> Mask:
+    """Return which samples (n,) lie farther than ``width`` from where the torque is cut at its extremes."""
     free = np.ones(len(torque), dtype=bool)
     for extreme in (torque.min(), torque.max()):
         for a, b in runs(torque == extreme):

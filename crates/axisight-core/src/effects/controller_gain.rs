@@ -1,0 +1,51 @@
+//! Gains of the machine's controller that are not the stated ones.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn change(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.95,
+        upper: 10.0,
+        typical: 0.2,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "controller_gain",
+    summary: "the controller has other gains than the stated ones",
+    equation: "k_p' = k_p (1 + e_p),  k_i' = k_i (1 + e_i)",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control)",
+    scope: Scope::Axis,
+    acts: Acts::Controller,
+    family: Family::Controller,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::References],
+    parameters: &[
+        change("relative_proportional"),
+        change("relative_integral"),
+    ],
+};
+
+struct Gains<S>([S; 2]);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Gains([S::one() + p[0], S::one() + p[1]]))
+}
+
+impl<S: Scalar> Kernel<S> for Gains<S> {
+    fn controller_gains(&self) -> Option<[S; 2]> {
+        Some(self.0)
+    }
+}

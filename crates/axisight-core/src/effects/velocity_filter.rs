@@ -1,0 +1,44 @@
+//! A filter through which the controller takes the speed.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "velocity_filter",
+    summary: "the controller takes the measured speed through a low-pass",
+    equation: "w_k = w_(k-1) + T / (T + T_v) (v_k - w_(k-1))",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control; the speed from positions)",
+    scope: Scope::Axis,
+    acts: Acts::Controller,
+    family: Family::Controller,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::References],
+    parameters: &[ParameterInfo {
+        name: "time_constant_s",
+        unit: "s",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 0.1,
+        typical: 2e-3,
+    }],
+};
+
+struct Filter<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Filter(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Filter<S> {
+    fn speed_filter(&self) -> Option<S> {
+        Some(self.0)
+    }
+}

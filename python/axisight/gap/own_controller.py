@@ -1,0 +1,197 @@
+"""What logs say of the controller by themselves: gains and filters that are not the stated ones.
+
+A command is algebra of references and measured positions, whatever the machine. Where that of the
+robot file misses the logged torque and that of another controller does not, the machine has the
+other one. The simulator that is kept on a log does not see it: its feedback is its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.effects.stated import OTHER_GAINS, SPEED_FILTER
+from axisight.gap.feedback import before, gain_shares
+from axisight.gap.gate.control_law import free_of_limits
+from axisight.gap.result import Interval
+from axisight.gap.shown import ShownCause
+from axisight.logs import Log, lowpass
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Compared up to here, or a fifth of the Nyquist frequency: above, drives filter what they report.
+_BAND_HZ = 100.0
+_SHARE_OF_NYQUIST = 0.2
+# Of the torque's variance: less than this off the command is no other controller.
+_NOTHING = 1e-4
+# Share of what the stated controller misses that another one may leave, in every log.
+_LEFT = 0.02
+# Lags of a filter that are looked for [s], and how many before the search is refined.
+_LAGS_S = (1e-4, 0.05)
+_STEPS = 12
+# A gain this near the stated one is that; intervals are at least half as wide: filters are written
+# in several ways, of which a lag knows less.
+_SAME = 0.008
+_FORMULA = 0.004
+_OF_A_LAG = 0.1
+
+
+class _Piece:
+    """Torque of an axis in one log, and what the gains of the file make of references and positions."""
+
+    def __init__(self, robot: Robot, log: Log, axis: int) -> None:
+        reference, time = log.velocity_ref_rad_s, log.sample_time_s
+        assert reference is not None  # closed loop only
+        self._robot, self._axis, self._time = robot, axis, time
+        self._band_hz = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
+        self._reference = reference[:, axis]
+        position = log.position_rad[:, axis] - log.position_rad[0, axis]
+        self._speed = np.diff(position, prepend=position[:1]) / time
+        self._angle = before(self._reference) * time - position
+        torque = np.ascontiguousarray(log.torque_nm[:, axis])
+        self._kept = free_of_limits(torque, int(1.0 / (self._band_hz * time)))
+        self.torque = self._seen(torque)
+
+    def shares(self, lag_s: float = 0.0, late: int = 0) -> Array:
+        """Return what the proportional and the integral gain ask for (n, 2) [Nm].
+
+        ``lag_s``: of a filter on the speed; ``late``: samples by which positions are read late.
+        """
+        keep = lag_s / (lag_s + self._time)
+        speed = np.asarray(scipy.signal.lfilter([1 - keep], [1, -keep], self._speed))
+        error, angle = self._reference - speed, self._angle
+        if late:
+            error = self._reference - _later(speed, late)
+            position = before(self._reference) * self._time - angle
+            angle = angle + position - _later(position, late)
+        both = gain_shares(self._robot, error, angle, self._axis)
+        return np.column_stack([self._seen(x) for x in both])
+
+    def _seen(self, x: Array) -> Array:
+        """Return a torque below the band, where no limit cuts it, without its mean."""
+        low = lowpass(np.ascontiguousarray(x), self._time, self._band_hz)[self._kept]
+        return np.asarray(low - low.mean())
+
+
+def _later(x: Array, samples: int) -> Array:
+    return np.concatenate([np.full(samples, x[0]), x[:-samples]])
+
+
+@dataclass(frozen=True)
+class _Law:
+    """A controller and the squares (n_logs,) that it leaves of the torque in every log.
+
+    ``factors``: of the two gains; ``lag_s``: of the filter.
+    """
+
+    factors: Array
+    lag_s: float
+    left: Array
+
+    @property
+    def total(self) -> float:
+        return float(self.left.sum())
+
+
+def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
+    """Return what is different about the controller, axis by axis, where logs show it."""
+    known = {e.axis for e in robot.effects if e.name in (OTHER_GAINS[0], SPEED_FILTER[0])}
+    axes = [i for i in range(robot.n_axes) if i + 1 not in known]
+    found = (_of_axis(i, [_Piece(robot, log, i) for log in logs]) for i in axes)
+    return tuple(cause for causes in found for cause in causes)
+
+
+def _of_axis(axis: int, pieces: Sequence[_Piece]) -> list[ShownCause]:
+    power = sum(float(p.torque @ p.torque) for p in pieces)
+    stated = _law(pieces, np.ones(2), 0.0)
+    if not power > 0 or not stated.total > _NOTHING * power:
+        return []
+    for law in _others(pieces):
+        if _holds(law, stated, pieces):
+            return _causes(axis, law, stated, pieces)
+    return []
+
+
+def _others(pieces: Sequence[_Piece]) -> Iterator[_Law]:
+    """Yield other controllers than the stated one, the simplest first."""
+    yield _law(pieces, _factors(pieces, 0.0), 0.0)
+    lag = _best_lag(pieces, lambda _lag: np.ones(2))
+    yield _law(pieces, np.ones(2), lag)
+    lag = _best_lag(pieces, lambda lag: _factors(pieces, lag))
+    yield _law(pieces, _factors(pieces, lag), lag)
+
+
+def _law(pieces: Sequence[_Piece], factors: Array, lag_s: float) -> _Law:
+    left = [float(np.sum((p.torque - p.shares(lag_s) @ factors) ** 2)) for p in pieces]
+    return _Law(factors, lag_s, np.array(left))
+
+
+def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
+    """Return the factors of the two gains that leave least; one where a gain does nothing."""
+    shares = np.concatenate([p.shares(lag_s) for p in pieces])
+    torque = np.concatenate([p.torque for p in pieces])
+    size = np.linalg.norm(shares, axis=0)
+    acts = size > 1e-6 * size.max()
+    out = np.ones(2)
+    out[acts] = np.linalg.lstsq(shares[:, acts], torque, rcond=1e-12)[0]
+    return out
+
+
+def _best_lag(pieces: Sequence[_Piece], factors: Callable[[float], Array]) -> float:
+    """Return the lag of a filter [s] that leaves least, the factors of the gains given by it."""
+
+    def left(log_lag: float) -> float:
+        lag = float(np.exp(log_lag))
+        return _law(pieces, factors(lag), lag).total
+
+    grid = np.linspace(np.log(_LAGS_S[0]), np.log(_LAGS_S[1]), _STEPS)
+    at = int(np.argmin([left(x) for x in grid]))
+    between = (grid[max(at - 1, 0)], grid[min(at + 1, _STEPS - 1)])
+    found = scipy.optimize.minimize_scalar(left, bounds=between, method="bounded")
+    return float(np.exp(found.x))
+
+
+def _holds(law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> bool:
+    """Whether a controller gives nearly all that the stated one misses, in every log that shows it.
+
+    A filter resembles positions that are read a sample late, which it is not.
+    """
+    power = np.array([float(p.torque @ p.torque) for p in pieces])
+    shows = stated.left > _NOTHING * power
+    if np.any(law.left[shows] > _LEFT * stated.left[shows]):
+        return False
+    late = [p.torque - p.shares(late=1).sum(axis=1) for p in pieces] if law.lag_s else []
+    return not late or sum(float(x @ x) for x in late) > law.total
+
+
+def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> list[ShownCause]:
+    out = []
+    explained = 1.0 - law.total / stated.total
+    samples = sum(len(p.torque) for p in pieces)
+    if np.any(np.abs(law.factors - 1) > _SAME):
+        each = np.array([_factors([p], law.lag_s) for p in pieces])
+        spread = np.maximum(each.std(axis=0) * 2 / np.sqrt(len(pieces)), _FORMULA)
+        values = {
+            name: Interval(float(f - 1), float(f - 1 - s), float(f - 1 + s))
+            for name, f, s in zip(OTHER_GAINS[1], law.factors, spread, strict=True)
+        }
+        says = (
+            f"Axis {axis + 1}: the logged torque is {law.factors[0]:.4g} times the proportional and "
+            f"{law.factors[1]:.4g} times the integral share of the stated controller, "
+            f"which misses {100 * explained:.4g} % less so."
+        )
+        out.append(ShownCause(OTHER_GAINS[0], axis + 1, values, samples, explained, says))
+    if law.lag_s:
+        lag = law.lag_s
+        value = {SPEED_FILTER[1]: Interval(lag, lag * (1 - _OF_A_LAG), lag * (1 + _OF_A_LAG))}
+        says = (
+            f"Axis {axis + 1}: with the measured speed through a low-pass of {1e3 * lag:.3g} ms the stated "
+            f"controller misses {100 * explained:.4g} % less of the logged torque."
+        )
+        out.append(ShownCause(SPEED_FILTER[0], axis + 1, value, samples, explained, says))
+    return out

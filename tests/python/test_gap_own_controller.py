@@ -1,0 +1,106 @@
+"""Controllers that are not the stated ones, as logs show them by themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, simulate
+from axisight.gap.own_controller import other_controllers
+from gap_data import HELD, PLAN, bare_axis, logs_of, reference, scattered
+
+GAINS = {"relative_proportional": 0.3, "relative_integral": -0.2}
+
+
+def shown(effects):
+    return other_controllers(bare_axis(), logs_of(scattered(bare_axis(), 4), effects, PLAN))
+
+
+def test_the_effect_is_a_controller_with_other_gains():
+    """A loop 1.2 times as fast has 1.2 times the proportional and 1.44 times the integral gain."""
+    robot = bare_axis()
+    ref = reference("multisine", 1, 2000, robot.sample_time_s)
+    changed = Effect(
+        "controller_gain", 1, {"relative_proportional": 0.2, "relative_integral": 0.44}
+    )
+    by_effect = simulate(robot, ref, effects=[changed]).torque_cmd_nm.values
+    by_gains = simulate(robot.with_controller_speed(1.2), ref).torque_cmd_nm.values
+    nominal = simulate(robot, ref).torque_cmd_nm.values
+    # The integrator's error bound decides, 1e-7 of the state through the gains.
+    np.testing.assert_allclose(by_effect, by_gains, atol=1e-5)
+    assert np.abs(by_effect - nominal).max() > 0.1
+
+
+def test_a_filter_is_the_low_pass_that_it_says():
+    """The command follows from the measured positions alone, by the law written out."""
+    robot = bare_axis()
+    time, lag = robot.sample_time_s, 3e-3
+    ref = reference("multisine", 1, 2000, time)
+    effect = Effect("velocity_filter", 1, {"time_constant_s": lag})
+    run = simulate(robot, ref, effects=[effect], noise_seed=1)
+    measured, command = run.position_rad.values[:, 0], run.torque_cmd_nm.values[:, 0]
+    gains = robot.controller_gains
+    filtered, wanted, out = 0.0, measured[0], []
+    for k in range(len(measured)):
+        speed = (measured[k] - measured[k - 1]) / time if k else 0.0
+        filtered += time / (time + lag) * (speed - filtered)
+        out.append(
+            gains["kp"][0] * (ref[k, 0] - filtered) + gains["ki"][0] * (wanted - measured[k])
+        )
+        wanted += time * ref[k, 0]
+    asked = np.array(out)
+    # But for the torque that the loop starts from.
+    off = command - asked - (command[0] - asked[0])
+    # The start angle is known from a noisy reading here: a constant share of the integral gain.
+    assert np.ptp(off) < 1e-9 * np.abs(command).max()
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        Effect("controller_gain", 1, GAINS),
+        Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
+    ],
+    ids=lambda e: e.name,
+)
+def test_another_controller_is_found_whatever_the_machine_has_besides(effect):
+    friction = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.05})
+    (found,) = shown([effect, friction])
+    assert found.effect.label == effect.label
+    assert found.explained > 0.99
+    for name, value in effect.parameters.items():
+        # The law is exact; a filter is written in several ways.
+        assert found.values[name].value == pytest.approx(value, abs=0.002 * max(abs(value), 1e-2))
+        assert found.values[name].low <= value <= found.values[name].high
+
+
+def test_gains_and_a_filter_together():
+    both = [
+        Effect("controller_gain", 1, GAINS),
+        Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
+    ]
+    assert [x.name for x in shown(both)] == ["controller_gain", "velocity_filter"]
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [],
+        [Effect("input_delay", 1, {"delay_s": 2e-3})],
+        [Effect("resolver_ripple", 1, {"order_1": 2.0, "cosine_1_rad": 2e-3})],
+        [Effect("backlash", 1, {"half_width_rad": 2e-4})],
+    ],
+    ids=lambda effects: effects[0].name if effects else "nothing",
+)
+def test_what_the_machine_has_is_no_controller(effects):
+    assert shown(effects) == ()
+
+
+def test_positions_read_late_are_no_filter():
+    """The controller saw positions a sample before the logged ones."""
+    logs = logs_of(scattered(bare_axis(), 4), [], PLAN | HELD)
+    late = [
+        replace(x, position_rad=np.concatenate([x.position_rad[1:], x.position_rad[-1:]]))
+        for x in logs
+    ]
+    assert other_controllers(bare_axis(), late) == ()
