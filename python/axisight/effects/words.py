@@ -6,7 +6,7 @@ import re
 
 from axisight.effects.table import effect_info
 
-_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
+_WORDS = {"coulomb": "Coulomb", "stribeck": "Stribeck", "com": "centre of mass"}
 
 # Last words of names that take no article: one says "friction", but "a delay".
 _UNCOUNTED = re.compile(
@@ -18,7 +18,7 @@ _UNCOUNTED = re.compile(
 
 def noun(name: str) -> str:
     """Return a name as words: ``coulomb_friction`` as ``Coulomb friction``, ``input_delay`` as it reads."""
-    words = [_PROPER.get(word, word) for word in name.split("_")]
+    words = [_WORDS.get(word, word) for word in name.split("_")]
     return " ".join(words).replace(" dependent", "-dependent").strip()
 
 
@@ -31,10 +31,12 @@ def title(name: str) -> str:
 def article(name: str) -> str:
     """Return what stands before the noun of an effect: ``a``, ``an``, ``the machine's`` or nothing.
 
-    An effect that changes what every simulator has by a share (stiffness, a torque constant) is the
-    machine's own value of it. Raises InputError for an unknown effect.
+    An effect that changes what every simulator has (stiffness or a torque constant by a share, a
+    link of the arm) is the machine's own value of it. Raises InputError for an unknown effect.
     """
-    if effect_info(name).parameters[0].name.startswith("relative_"):
+    info = effect_info(name)
+    of_a_link = info.scope == "axis" and info.acts == "arm"
+    if of_a_link or info.parameters[0].name.startswith("relative_"):
         return "the machine's"
     words = noun(name)
     if _UNCOUNTED.search(words):

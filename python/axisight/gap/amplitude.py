@@ -81,7 +81,9 @@ def _freedom(evidence: Evidence, stretch: NDArray[np.int64], columns: list[int])
     would give them. The least of all amplitudes.
     """
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    size = np.sqrt(np.diag(matrix))
+    # What has no influence has no share either.
+    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 1e-100)
     normal = matrix * np.outer(scale, scale) + 1e-9 * np.eye(len(matrix))
     pull = np.linalg.solve(normal, np.diag(scale)[:, columns]) * scale[:, None]
     by_block = np.einsum("ia,bij,ja->ba", pull, evidence.matrix, pull)

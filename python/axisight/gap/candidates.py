@@ -86,10 +86,13 @@ def _axes(robot: Robot, info: EffectInfo) -> list[int | None]:
 
 
 def _has_what_changes(robot: Robot, info: EffectInfo, axis: int) -> bool:
-    """Whether a relative change has something to change."""
+    """Whether an axis has the link that an effect acts on, and a relative change something to change."""
+    if info.acts == "arm" and robot.axis_parameter(axis, "mass") is None:
+        return False
     if info.stands_for is None or info.stands_for[1] == "absolute":
         return True
-    return robot.parameters()[f"{robot.axis_names[axis - 1]}.{info.stands_for[0]}"] != 0
+    name = robot.axis_parameter(axis, info.stands_for[0])
+    return name is not None and robot.parameters()[name] != 0
 
 
 def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:

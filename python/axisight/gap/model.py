@@ -432,7 +432,7 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
     stands_for = effect_info(effect.name).stands_for
     if effect.axis is None or stands_for is None:
         return None
-    return f"{robot.axis_names[effect.axis - 1]}.{stands_for[0]}"
+    return robot.axis_parameter(effect.axis, stands_for[0])
 
 
 def _names(setup: _Setup) -> list[tuple[int | None, str]]:

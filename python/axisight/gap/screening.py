@@ -128,27 +128,31 @@ class Screen:
         return [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
 
     def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
-        best = Start(option, self.model.robot_values, -np.inf)
-        if evidence is not None:
-            best = replace(best, gain=self.model.total - evidence.total + linear_gain(evidence))
-            if option.effect.axis is None:
-                fall = self.model.loss - evidence.loss + linear_falls(evidence)
-                best = replace(best, falls=np.bincount(self.model.axis, fall).astype(np.float64))
+        best = self._start(option, evidence)
         if len(option.free) > 1:
-            # Further starts of one that does nothing as it is: by what a step from there promises.
-            # Only sizes: where it has none, its shape shows nothing.
+            # Further starts, by what a step from there promises. Only sizes: where one does nothing
+            # as it is, its shape shows nothing.
             sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
             begins = [option.at(values) for values in option.starts]
             others = self._evaluated([sizes.at(b.effect.parameters or {}) for b in begins])
-            for begin, other in zip(begins, others, strict=True):
-                gain = -np.inf if other is None else linear_gain(other)
-                if gain > best.gain:
-                    best = replace(best, option=begin, gain=gain)
+            starts = (self._start(b, e) for b, e in zip(begins, others, strict=True))
+            best = max((best, *starts), key=lambda start: start.gain)
         elif option.starts:
             begin, gain = self.best_of_starts(option)
             if gain > best.gain:
                 best = Start(begin, {}, gain)
         return best
+
+    def _start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
+        """Return a candidate with what one linear step promises where ``evidence`` has it."""
+        if evidence is None:
+            return Start(option, self.model.robot_values, -np.inf)
+        gain = self.model.total - evidence.total + linear_gain(evidence)
+        falls = None
+        if option.effect.axis is None:
+            fall = self.model.loss - evidence.loss + linear_falls(evidence)
+            falls = np.bincount(self.model.axis, fall).astype(np.float64)
+        return Start(option, self.model.robot_values, gain, falls)
 
     def best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
         """Return the candidate at the best of its own starts, and what it gains there.

@@ -273,6 +273,70 @@ def _swing(trial: Trial) -> FreeEffect:
     )
 
 
+# Bases of arms rock from here to there; stiffer ones show less.
+_ROCKS_HZ = (6.0, 10.0, 16.0, 25.0)
+
+
+def _rocking(trial: Trial) -> FreeEffect | None:
+    """Begin with a base that swings at several frequencies, where there is much to explain."""
+    share = max(_axis_share(trial.at, i) for i in range(trial.robot.n_axes))
+    names = [p.name for p in trial.info.parameters if p.role == "amplitude"]
+    inertia = _inertia_about_base(trial.robot)
+    if share <= _SMALL_SHARE or not np.all(inertia > 0):
+        return None
+
+    def swinging(frequency_hz: float) -> dict[str, float]:
+        compliance = 1.0 / (inertia * (2 * np.pi * frequency_hz) ** 2)
+        return dict(zip(names, compliance.tolist(), strict=True))
+
+    # Stiffer, nothing shows and the spring is hard to integrate; softer, the arm would fall over.
+    bounds = {n: (0.02 * c, 100 * c) for n, c in swinging(_ROCKS_HZ[-1]).items()}
+    free = tuple(p.name for p in trial.info.parameters)
+    begin = FreeEffect(trial.effect(swinging(_ROCKS_HZ[-1])), free, bounds=bounds)
+    return replace(begin, starts=tuple(swinging(f) for f in _ROCKS_HZ))
+
+
+def _inertia_about_base(robot: Robot) -> Array:
+    """Return the inertia about x and y of the base (2,) [kg m^2], links as points."""
+    q = np.zeros(robot.n_joints)
+    q[robot.axis_joints] = robot.operating_point
+    out = np.zeros(2)
+    for i, joint in enumerate(robot.joints):
+        if joint.link is not None:
+            rotation, position = robot.pose(q, i)
+            x, y, z = position + rotation @ joint.link.com_m
+            out += joint.link.mass_kg * np.array([y * y + z * z, x * x + z * z])
+    return out
+
+
+# Of the longest log: over less it is viscous friction, over more it does not show.
+_WARM = (0.1, 0.5, 10.0)
+
+
+def _warming(trial: Trial) -> FreeEffect:
+    """Begin without, half a log to warm up."""
+    longest = max(float(log.time_s[-1]) for log in trial.logs)
+    least, middle, most = (share * longest for share in _WARM)
+    begin = _neutral(trial).at({"time_constant_s": middle})
+    return replace(begin, bounds={"time_constant_s": (least, most)})
+
+
+# Farther off, a link is not mistaken but another one, and something else is the likelier cause.
+_DOUBLE = (-0.6, 1.0)
+_DISTANCE_M = 0.5
+
+
+def _link_share(trial: Trial) -> FreeEffect:
+    """Begin at the neutral value; a link is at most twice what it was modelled as."""
+    return replace(_neutral(trial), bounds={p.name: _DOUBLE for p in trial.info.parameters})
+
+
+def _link_place(trial: Trial) -> FreeEffect:
+    """Begin at the neutral values, and stay on the link."""
+    reach = (-_DISTANCE_M, _DISTANCE_M)
+    return replace(_neutral(trial), bounds={p.name: reach for p in trial.info.parameters})
+
+
 def _shown_by_logs(_trial: Trial) -> None:
     """Offer nothing: what the controller does is algebra of the logs, no fit of a machine."""
 
@@ -308,5 +372,10 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "extra_mode": _swing,
     "controller_gain": _shown_by_logs,
     "velocity_filter": _shown_by_logs,
+    "link_mass": _link_share,
+    "link_com": _link_place,
+    "link_inertia": _link_share,
+    "base_compliance": _rocking,
+    "friction_warmup": _warming,
 }
 """By effect."""

@@ -110,6 +110,18 @@ class Robot:
         names = self.joint_names
         return [names[joint] for joint in self.axis_joints]
 
+    def axis_parameter(self, axis: int, quantity: str) -> str | None:
+        """Return the name of a parameter of an axis (from 1): of its joint, or of one that moves with it.
+
+        ``quantity`` is that of a joint (``stiffness``) or of a link (``mass``), which may be carried by
+        an elastic joint between the axis and the next. None where there is none.
+        """
+        places = [*self.axis_joints, self.n_joints]
+        moved = self.joint_names[places[axis - 1] : places[axis]]
+        known = self.parameters()
+        names = (f"{joint}.{quantity}" for joint in moved)
+        return next((name for name in names if name in known), None)
+
     @property
     def axis_is_prismatic(self) -> list[bool]:
         """Whether each axis slides."""

@@ -404,3 +404,25 @@ fn the_axis_fit_and_the_simulator_are_one_model() {
         }
     }
 }
+
+#[test]
+fn warming_friction_follows_its_own_clock() {
+    let (slope, time) = (-0.01, 4.0);
+    let kernel = build::<f64>("friction_warmup", &[slope, time]).expect("in the table");
+    assert_eq!(kernel.n_internal(), 1);
+    for done in [0.0, 0.3, 1.0] {
+        let internal = [done];
+        let motor = Motor {
+            angle: 1.0,
+            speed: 20.0,
+            command: 0.0,
+            load: 0.0,
+            internal: &internal,
+        };
+        let mut rates = [0.0];
+        kernel.motor_rates(&motor, &mut rates);
+        // The state is 1 - e^(-t/T), whose rate is e^(-t/T) / T.
+        assert!((rates[0] - (1.0 - done) / time).abs() < 1e-15);
+        assert!((kernel.motor_torque(&motor) + slope * done * 20.0).abs() < 1e-15);
+    }
+}

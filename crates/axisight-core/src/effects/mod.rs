@@ -97,6 +97,11 @@ effect_table!(
     extra_mode,
     controller_gain,
     velocity_filter,
+    link_mass,
+    link_com,
+    link_inertia,
+    base_compliance,
+    friction_warmup,
 );
 
 /// Description of effect `name`.

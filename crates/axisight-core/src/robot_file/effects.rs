@@ -111,7 +111,20 @@ fn axis_number(
         let expected = "an axis with a compliant transmission".to_owned();
         return Err(entry.invalid(expected, format!("axis {} (rigid)", index + 1)));
     }
+    if info.acts == Acts::Arm && !has_link(robot, index) {
+        let expected = "an axis that moves a link with mass".to_owned();
+        return Err(entry.invalid(expected, format!("axis {} (massless)", index + 1)));
+    }
     Ok(index)
+}
+
+/// Whether a link moves with an axis and not with the next one.
+fn has_link(robot: &RobotDescription, index: usize) -> bool {
+    let places: Vec<usize> = robot.driven().map(|(place, ..)| place).collect();
+    let end = places.get(index + 1).copied().unwrap_or(robot.joints.len());
+    robot.joints[places[index]..end]
+        .iter()
+        .any(|joint| joint.link.is_some())
 }
 
 fn read_parameters(section: &Section, info: &EffectInfo) -> Result<Vec<f64>, RobotError> {

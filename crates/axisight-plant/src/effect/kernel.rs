@@ -100,12 +100,21 @@ pub struct Arm<'a, S> {
 pub struct PlantParameters<'a, S> {
     /// Links, and gravity in the frame of the base.
     pub chain: &'a mut Chain<S>,
+    /// Joint of the chain that carries the link of the axis; `None` for arm effects or without mass.
+    pub link: Option<usize>,
     /// Gear stiffness of the axis [Nm/rad]; `None` for arm effects or a rigid transmission.
     pub stiffness: Option<&'a mut S>,
     /// Gear damping of the axis [Nm s/rad]; `None` as for the stiffness.
     pub damping: Option<&'a mut S>,
     /// Motor inertia of the axis [kg m^2]; `None` for arm effects.
     pub motor_inertia: Option<&'a mut S>,
+}
+
+impl<S: Scalar> PlantParameters<'_, S> {
+    /// The body that moves with the axis.
+    pub fn body(&mut self) -> Option<&mut Body<S>> {
+        self.chain.joints[self.link?].body.as_mut()
+    }
 }
 
 /// A spring the arm stands on: an elastic joint below the first one.

@@ -146,6 +146,7 @@ impl<S: Scalar> Plant<S> {
     fn add_to_arm(&mut self, own: Own<S>) {
         own.kernel.prepare(&mut PlantParameters {
             chain: &mut self.chain,
+            link: None,
             stiffness: None,
             damping: None,
             motor_inertia: None,
@@ -185,16 +186,18 @@ impl<S: Scalar> Plant<S> {
         own: Own<S>,
     ) -> Result<(), PlantError> {
         let own = self.with_states(own);
+        let link = self.link(index);
         let axis = &mut self.axes[index];
+        let needs = |expected: &str, lack: &str| EffectError::Axis {
+            effect: info.name,
+            expected: expected.to_owned(),
+            got: format!("{} ({lack})", Place::Axis(index)),
+        };
         if info.acts == Acts::Transmission && axis.gear.is_none() {
-            let got = format!("{} (rigid)", Place::Axis(index));
-            let expected = "an axis with a compliant transmission".to_owned();
-            return Err(EffectError::Axis {
-                effect: info.name,
-                expected,
-                got,
-            }
-            .into());
+            return Err(needs("an axis with a compliant transmission", "rigid").into());
+        }
+        if info.acts == Acts::Arm && link.is_none() {
+            return Err(needs("an axis that moves a link with mass", "massless").into());
         }
         let (stiffness, damping) = match &mut axis.gear {
             Some(gear) => (Some(&mut gear.stiffness), Some(&mut gear.damping)),
@@ -202,6 +205,7 @@ impl<S: Scalar> Plant<S> {
         };
         own.kernel.prepare(&mut PlantParameters {
             chain: &mut self.chain,
+            link,
             stiffness,
             damping,
             motor_inertia: Some(&mut axis.motor_inertia),
@@ -214,6 +218,17 @@ impl<S: Scalar> Plant<S> {
             _ => {}
         }
         Ok(())
+    }
+}
+
+impl<S: Scalar> Plant<S> {
+    /// Joint that carries the link which moves with an axis and not with the next one.
+    fn link(&self, index: usize) -> Option<usize> {
+        let end = self
+            .axes
+            .get(index + 1)
+            .map_or(self.chain.len(), |next| next.joint);
+        (self.axes[index].joint..end).find(|i| self.chain.joints[*i].body.is_some())
     }
 }
 

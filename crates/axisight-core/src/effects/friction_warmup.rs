@@ -1,0 +1,73 @@
+//! Viscous friction that changes while the gear warms up.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "friction_warmup",
+    summary: "viscous friction changes with the time since the log began, as grease warms up",
+    equation: "tau_f = F_w (1 - e^(-t / T_w)) phi'",
+    source: "Bittencourt and Gunnarsson (2012), Journal of Dynamic Systems, Measurement, and Control 134(5) (viscous friction falls with temperature)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    family: Family::Friction,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::Speeds],
+    parameters: &[
+        ParameterInfo {
+            name: "viscous_nm_s_rad",
+            unit: "Nm s/rad",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e4,
+            upper: 1e4,
+            typical: 0.01,
+        },
+        ParameterInfo {
+            name: "time_constant_s",
+            unit: "s",
+            role: Role::Shape,
+            neutral: 600.0,
+            lower: 0.1,
+            upper: 1e5,
+            typical: 10.0,
+        },
+    ],
+};
+
+struct Warmup<S> {
+    viscous: S,
+    time_constant: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Warmup {
+        viscous: p[0],
+        time_constant: p[1],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Warmup<S> {
+    fn n_internal(&self) -> usize {
+        1
+    }
+
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
+        // How far it has come: 1 - e^(-t / T), a state of its own.
+        let done = motor.internal.first().map_or_else(S::zero, |z| *z);
+        -(self.viscous * done * motor.speed)
+    }
+
+    fn motor_rates(&self, motor: &Motor<'_, S>, rates: &mut [S]) {
+        if let (Some(done), Some(out)) = (motor.internal.first(), rates.first_mut()) {
+            *out = (S::one() - *done) / self.time_constant;
+        }
+    }
+}

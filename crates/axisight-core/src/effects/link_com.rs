@@ -1,0 +1,50 @@
+//! Centre of mass of one link other than the simulator's.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn shift(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "m (frame of the link)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -2.0,
+        upper: 2.0,
+        typical: 0.05,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "link_com",
+    summary: "the centre of mass of a link is not where it is modelled",
+    equation: "c + d",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.2 (the dynamic parameters of a link)",
+    scope: Scope::Axis,
+    acts: Acts::Arm,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::Poses],
+    parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
+};
+
+struct Shift<S>([S; 3]);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Shift([p[0], p[1], p[2]]))
+}
+
+impl<S: Scalar> Kernel<S> for Shift<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(body) = plant.body() {
+            body.com = std::array::from_fn(|i| body.com[i] + self.0[i]);
+        }
+    }
+}

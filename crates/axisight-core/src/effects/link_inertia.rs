@@ -1,0 +1,47 @@
+//! Inertia of one link other than the simulator's.
+
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "link_inertia",
+    summary: "the inertia of a link about its centre of mass is off by more than its tolerance",
+    equation: "J (1 + s)",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.2 (the dynamic parameters of a link)",
+    scope: Scope::Axis,
+    acts: Acts::Arm,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: Some(StandsFor { quantity: "inertia_scale", change: Change::Relative }),
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::Poses],
+    parameters: &[ParameterInfo {
+        name: "relative_change",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.95,
+        upper: 20.0,
+        typical: 0.1,
+    }],
+};
+
+struct Inertia<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Inertia(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Inertia<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(body) = plant.body() {
+            let factor = self.0 + 1.0;
+            body.inertia = body.inertia.map(|entry| entry * factor);
+        }
+    }
+}
