@@ -184,6 +184,7 @@ class ParameterSpec(Protocol):
     ``initial``, ``lower``, ``upper``, ``scale`` and ``prior`` (mean, standard deviation) are in
     the parameter's unit; ``scale`` is the natural size of a change. A ``nuisance`` parameter's
     Jacobian column is computed once and refreshed only after the search has settled.
+    ``amplitude``: of a shape, the place of its effect's only size in that effect's table.
     """
 
     @property
@@ -204,6 +205,8 @@ class ParameterSpec(Protocol):
     def frozen(self) -> bool: ...
     @property
     def nuisance(self) -> bool: ...
+    @property
+    def amplitude(self) -> int | None: ...
 
 @type_check_only
 class OptionSpec(Protocol):

@@ -33,6 +33,8 @@ pub struct ParameterSpec {
     prior: Option<(f64, f64)>,
     frozen: bool,
     nuisance: bool,
+    /// Of a shape: the only size of its effect, in the table of the effect.
+    amplitude: Option<usize>,
 }
 
 /// Settings of a fit, as Python hands them over.
@@ -60,9 +62,13 @@ pub fn status_advice() -> Vec<(&'static str, &'static str)> {
     all.filter_map(|s| Some((s.name(), s.advice()?))).collect()
 }
 
-fn parameters(specs: Vec<ParameterSpec>, robot: &RobotDescription) -> PyResult<Vec<FitParameter>> {
+fn parameters(specs: &[ParameterSpec], robot: &RobotDescription) -> PyResult<Vec<FitParameter>> {
+    let size = |s: &ParameterSpec| {
+        let wanted = (s.effect?.0, s.amplitude?);
+        specs.iter().position(|other| other.effect == Some(wanted))
+    };
     specs
-        .into_iter()
+        .iter()
         .enumerate()
         .map(|(i, s)| {
             let target = match (&s.robot, s.effect) {
@@ -83,6 +89,7 @@ fn parameters(specs: Vec<ParameterSpec>, robot: &RobotDescription) -> PyResult<V
                 scale: s.scale,
                 prior: s.prior,
                 frozen: s.frozen,
+                amplitude: size(s),
                 nuisance: s.nuisance,
             })
         })
@@ -200,7 +207,7 @@ impl SimulationSpec<'_, '_> {
         let problem = SimulationErrorProblem {
             robot: robot.clone(),
             effects: settings(self.effects),
-            parameters: parameters(self.parameters, robot)?,
+            parameters: parameters(&self.parameters, robot)?,
             records: self.records.iter().map(record).collect::<PyResult<_>>()?,
             input: match self.input {
                 "reference" => SimulationInput::Reference,
@@ -367,7 +374,7 @@ fn inverse_dynamics(
     let problem = InverseDynamics {
         robot: robot.clone(),
         effects: settings(effects),
-        parameters: parameters(specs, robot)?,
+        parameters: parameters(&specs, robot)?,
         records: records.iter().map(record).collect::<PyResult<_>>()?,
         weighting: weightings(weighting),
         block_s,

@@ -9,6 +9,7 @@ from rich.table import Table
 from axisight.cli.common import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
 from axisight.gap.headline import in_order
+from axisight.report.limits import limit_table
 
 _RANKED = 8
 _REFITTED = 10
@@ -30,6 +31,9 @@ def show_diagnosis(found: Diagnosis) -> None:
         OUT.print(_refitted(found.refit))
     if found.ranking:
         OUT.print(_ranking(found))
+    # What could be there all the same is the other half of finding nothing.
+    if found.verdict == "none" and found.detection_limits:
+        OUT.print(_limits(found))
 
 
 def _say(text: str) -> None:
@@ -103,6 +107,16 @@ def _refitted(refit: dict[str, Interval]) -> Table:
         table.add_row(escape(name), f"{100 * p.value:+.2g} %", interval)
     if len(largest) > _REFITTED:
         table.caption = f"and {len(largest) - _REFITTED} more that changed less"
+    return table
+
+
+def _limits(found: Diagnosis) -> Table:
+    limits = limit_table(found.detection_limits, len(found.gap.before_per_axis))
+    table = Table(title="smaller would not have shown (95 % power)", box=SIMPLE_HEAD)
+    for name in ("effect", "unit", *limits.columns):
+        table.add_column(name, overflow="fold")
+    for row in limits.rows:
+        table.add_row(*(escape(cell) for cell in row))
     return table
 
 

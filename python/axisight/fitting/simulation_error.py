@@ -145,6 +145,7 @@ class Spec:
     prior: tuple[float, float] | None
     frozen: bool
     nuisance: bool
+    amplitude: int | None
 
 
 PRIOR_REACH = 4.0
@@ -215,7 +216,19 @@ def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> Spec:
         prior=parameter.prior,
         frozen=parameter.frozen,
         nuisance=parameter.nuisance,
+        amplitude=None
+        if parameter.effect is None
+        else _amplitude(effects[parameter.effect], parameter.name),
     )
+
+
+def _amplitude(effect: Effect, name: str) -> int | None:
+    """Return which parameter is the only size of an effect, of a shape of it."""
+    table = effect_info(effect.name).parameters
+    sizes = [i for i, p in enumerate(table) if p.role == "amplitude"]
+    shape = any(p.name == name and p.role == "shape" for p in table)
+    # One that is nothing at a limit, not at zero, is no factor.
+    return sizes[0] if shape and len(sizes) == 1 and table[sizes[0]].neutral == 0 else None
 
 
 def fit(

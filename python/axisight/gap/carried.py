@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.by_axis import OwnAxes
+from axisight.gap.edge import BENT
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.result import Gap
@@ -24,9 +25,6 @@ _SEEN = 0.03
 # Causes have to remove this share of the explainable squared gap of validation logs: less than half
 # of its amplitude is left then. One of two equal causes does not.
 _ENOUGH = 0.8
-# Own parameters at the edge (three tolerances, one machine in four hundred each): of so many, the
-# simulator is bent to something unmodelled.
-_BENT = 0.25
 # Noise cannot be this much larger than a gap that contains it.
 _ABSURD = 1.25
 
@@ -123,7 +121,7 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
 
 def _out_of_shape(bent: float) -> str | None:
     """Say so where the simulator's own parameters make up for what the causes do not explain."""
-    if bent < _BENT:
+    if bent < BENT:
         return None
     return (
         f"The causes found explain the gap only with {100 * bent:.0f} % of the simulator's own parameters at "

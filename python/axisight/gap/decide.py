@@ -89,10 +89,20 @@ class Standing:
 
     def without_first(self, count: int) -> Standing:
         """Return the same without its first candidates, probabilities of the others scaled up."""
-        left = self.ranked[count:]
+        return self._of(self.ranked[count:])
+
+    def without(self, label: str) -> Standing:
+        """Return the same without a candidate, probabilities of the others scaled up."""
+        return self._of(tuple(r for r in self.ranked if r.trial.label != label))
+
+    def _of(self, left: tuple[Ranked, ...]) -> Standing:
         whole = sum(r.probability for r in left) + self.p_none + self.p_unknown
         scaled = (replace(r, probability=r.probability / whole) for r in left)
         return Standing(self.axis, tuple(scaled), self.p_none / whole, self.p_unknown / whole)
+
+    def led_by(self, first: Ranked) -> Standing:
+        """Return the same with one of its candidates first."""
+        return replace(self, ranked=(first, *(r for r in self.ranked if r is not first)))
 
     def inseparable(self) -> list[Ranked]:
         """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
@@ -108,10 +118,7 @@ class Standing:
         effect = self.best.trial.candidate.effect
         labels = {Effect(name, effect.axis).label for name in effect_info(effect.name).usual}
         usual = next((r for r in self.inseparable() if r.trial.label in labels), None)
-        if usual is None:
-            return self
-        rest = tuple(r for r in self.ranked if r is not usual)
-        return replace(self, ranked=(usual, *rest))
+        return self if usual is None else self.led_by(usual)
 
 
 # A rival this likely beside the winner leaves the cause open.
@@ -194,6 +201,11 @@ def likelier(loss: float, cost: float, *, than: tuple[float, float]) -> bool:
     """Whether a held-out loss with so many fitted numbers is likelier than another."""
     gain = 0.5 * _INDEPENDENT_BLOCKS * float(np.log(than[0] / loss))
     return gain > _PARAMETER_COST * (cost - than[1])
+
+
+def smallest_likely_fall(loss: Array, cost: float) -> Array:
+    """Return by how much a held-out loss has to fall for so many fitted numbers to be likelier than none."""
+    return np.asarray(loss * -np.expm1(-2 * _PARAMETER_COST * cost / _INDEPENDENT_BLOCKS))
 
 
 def clearly_worse(loss: float, than: float) -> bool:

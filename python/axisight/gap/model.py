@@ -189,17 +189,21 @@ class ModelFitter(ABC):
         ]
 
     def within_tolerance(self, effect: Effect) -> bool:
-        """Whether an effect is no more than ordinary scatter of a parameter (three deviations)."""
-        name = _same_quantity(self.robot, effect)
-        if name is None:
-            return False
-        tolerance = tolerance_of(self.tolerances, name) or 0.0
+        """Whether an effect is no more than ordinary scatter of a parameter."""
         change = effect.values()[0]
         for own in self.robot.effects:
             if own.label == effect.label:
                 change -= own.values()[0]
+        return abs(change) < self.tolerated(effect)
+
+    def tolerated(self, effect: Effect) -> float:
+        """Return up to which size an effect is ordinary scatter of a parameter (three deviations)."""
+        name = _same_quantity(self.robot, effect)
+        if name is None:
+            return 0.0
+        tolerance = tolerance_of(self.tolerances, name) or 0.0
         nominal = 1.0 if _is_relative(effect.name) else robot_parameters(self.robot)[name]
-        return abs(change) < 3 * tolerance * nominal
+        return 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
         """Whether a robot parameter matters to this error."""

@@ -18,13 +18,15 @@ from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
+from axisight.gap.detection import detection_limits
+from axisight.gap.edge import bent, parameters_at_edge
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
-from axisight.gap.remainder import parameters_at_edge, refit_worse, remainder_of
+from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.settings import Settings
@@ -268,10 +270,8 @@ def _assemble(
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     names = [log.name for log in held_logs]
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
-    edge = parameters_at_edge(found.model, nominal, tolerances)
-    # Where errors add up, masses that a few seconds hardly tell go to the edge by themselves.
-    bent = 0.0 if view.fitter.adds_up else len(edge) / max(len(found.model.robot_values), 1)
-    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own, bent)
+    share = bent(view.fitter, found.model)
+    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own, share)
     causes = _causes(conclusion, reach.reductions)
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     # Where nothing was named, `after` is the simulator re-fitted alone.
@@ -297,6 +297,7 @@ def _assemble(
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
         remainder=remainder_of(reach.stages, gap, reach.left, settings),
+        detection_limits=detection_limits(found, view),
         findings=(
             *noted,
             *refit_worse(reach.stages, names),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,15 +10,10 @@ from axisight.gap.carried import above_floor
 from axisight.gap.faults import Finding
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stages
-from axisight.gap.model import Evidence
 from axisight.gap.result import Gap, Remainder
 from axisight.gap.settings import Settings
-from axisight.gap.tolerances import tolerance_of
 from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
 
-# A parameter this many of its tolerances off is one machine in four hundred: rather something
-# unmodelled that pulls at it.
-_EDGE = 3.0
 # A squared gap may rise by so much of what stands above noise through scatter of the logs.
 _WORSE = 0.2
 
@@ -70,27 +65,4 @@ def refit_worse(stages: Stages, names: Sequence[str]) -> tuple[Finding, ...]:
                 f"to is no property of the machine; state tighter tolerances."
             )
             out.append(Finding("refit_worse", "flag", message, log=name, field="tolerances"))
-    return tuple(out)
-
-
-def parameters_at_edge(
-    fitted: Evidence, nominal: Mapping[str, float], tolerances: Mapping[str, float]
-) -> tuple[Finding, ...]:
-    """Return a finding for each re-fitted parameter three tolerances off, or at its bound.
-
-    ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity or name.
-    """
-    out = []
-    for name, value in fitted.robot_values.items():
-        tolerance = tolerance_of(tolerances, name) or 0.0
-        change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
-        bound = (None, name) in fitted.at_bound
-        if bound or abs(change) >= _EDGE * tolerance:
-            message = (
-                f"ended {100 * change:+.3g} % off the simulator's value, "
-                f"{abs(change) / tolerance:.1f} of its tolerance of {100 * tolerance:g} %"
-                f"{', at the bound of the fit' if bound else ''}: the value or the tolerance is "
-                f"wrong, or something that no effect stands for pulls at it."
-            )
-            out.append(Finding("parameter_at_edge", "flag", message, field=name))
     return tuple(out)

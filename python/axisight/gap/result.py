@@ -151,6 +151,21 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class DetectionLimit:
+    """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
+
+    ``parameter`` is the first amplitude, the others nothing, shapes as usual; ``value`` in ``unit``,
+    None where no size that the effect may have would show. ``axis`` from 1, None for the arm.
+    """
+
+    effect: str
+    axis: int | None
+    parameter: str
+    value: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
 class Overlay:
     """Measured and simulated torque on one axis of one held-out log, for plotting.
 
@@ -173,6 +188,7 @@ class Diagnosis:
     each a Dataset with ``share`` (of that axis's squared baseline error above
     the floor), ``excess`` (ratio of the squared error to the floor) and
     ``significance`` (in standard errors). Band and bin coordinates are labels.
+    ``detection_limits``: what these logs would have shown of each effect that is no cause.
     ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
     the names of `Settings`.
     ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
@@ -199,6 +215,7 @@ class Diagnosis:
     p_none: float = 0.0
     p_unknown: float = 0.0
     remainder: Remainder | None = None
+    detection_limits: tuple[DetectionLimit, ...] = ()
     findings: tuple[Finding, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -227,6 +244,7 @@ class Diagnosis:
             "p_unknown": self.p_unknown,
             "axes": [_axis(a, self.gap) for a in self.axes],
             "remainder": None if self.remainder is None else _remainder(self.remainder),
+            "detection_limits": [asdict(limit) for limit in self.detection_limits],
             "refit": {name: _interval(change) for name, change in self.refit.items()},
             "ranking": [_ranked(c) for c in self.ranking],
             "checks": list(self.checks),

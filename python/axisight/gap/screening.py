@@ -17,6 +17,7 @@ from axisight.errors import InputError
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
 from axisight.gap.score import linear_falls, linear_gain
+from axisight.gap.sensitivity import Sensitivity, sensitivity
 
 Array = NDArray[np.float64]
 A = TypeVar("A")
@@ -39,13 +40,15 @@ def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]
 class Start:
     """Where the fit of a candidate begins, and the gain it promises.
 
-    ``falls`` (n_axes,): by axis, of one that acts on the whole arm.
+    ``falls`` (n_axes,): by axis, of one that acts on the whole arm; ``sensitivity``: of one that does
+    nothing as it is.
     """
 
     option: FreeEffect
     robot_values: Mapping[str, float]
     gain: float
     falls: Array | None = None
+    sensitivity: Sensitivity | None = None
 
 
 class Bench:
@@ -81,10 +84,13 @@ class Bench:
 
 
 class Screen:
-    """The screen of one model. ``scale``: of gains, where the bench has only some of the logs."""
+    """The screen of one model.
 
-    def __init__(self, bench: Bench, scale: float = 1.0) -> None:
-        self.bench, self.scale = bench, scale
+    Where the bench has only some of the logs, ``scale`` is that of gains, ``more`` of data.
+    """
+
+    def __init__(self, bench: Bench, scale: float = 1.0, more: float = 1.0) -> None:
+        self.bench, self.scale, self.more = bench, scale, more
         self.fitter, self.model = bench.fitter, bench.model
 
     def groups(self, options: Sequence[FreeEffect]) -> list[list[FreeEffect]]:
@@ -111,9 +117,16 @@ class Screen:
         best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
         return [self._scaled(start) for start in best]
 
+    def sensitivities(self, group: list[FreeEffect]) -> list[Sensitivity]:
+        """Return the sensitivities of candidates, of those that do nothing as they are."""
+        found = zip(group, self._shared(group), strict=True)
+        known = [sensitivity(o, e, self.model.axis) for o, e in found if e is not None]
+        return [s.scaled(self.more) for s in known if s is not None]
+
     def _scaled(self, start: Start) -> Start:
         falls = None if start.falls is None else self.scale * start.falls
-        return replace(start, gain=self.scale * start.gain, falls=falls)
+        known = None if start.sensitivity is None else start.sensitivity.scaled(self.more)
+        return replace(start, gain=self.scale * start.gain, falls=falls, sensitivity=known)
 
     def _evaluated(self, options: Sequence[FreeEffect]) -> list[Linearized | None]:
         """Return the model with each of several candidates of one size, as many at a time as go."""
@@ -136,11 +149,13 @@ class Screen:
             begins = [option.at(values) for values in option.starts]
             others = self._evaluated([sizes.at(b.effect.parameters or {}) for b in begins])
             starts = (self._start(b, e) for b, e in zip(begins, others, strict=True))
+            known = best.sensitivity
             best = max((best, *starts), key=lambda start: start.gain)
+            best = replace(best, sensitivity=known)
         elif option.starts:
             begin, gain = self.best_of_starts(option)
             if gain > best.gain:
-                best = Start(begin, {}, gain)
+                best = Start(begin, {}, gain, sensitivity=best.sensitivity)
         return best
 
     def _start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
@@ -152,7 +167,8 @@ class Screen:
         if option.effect.axis is None:
             fall = self.model.loss - evidence.loss + linear_falls(evidence)
             falls = np.bincount(self.model.axis, fall).astype(np.float64)
-        return Start(option, self.model.robot_values, gain, falls)
+        known = sensitivity(option, evidence, self.model.axis)
+        return Start(option, self.model.robot_values, gain, falls, known)
 
     def best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
         """Return the candidate at the best of its own starts, and what it gains there.
@@ -193,7 +209,8 @@ def thinned(bench: Bench, above: Array, layout: Layout) -> Screen:
     if kept.all():
         return Screen(bench)
     scale = float(above.sum() / max(above[kept].sum(), 1e-300))
-    return Screen(Bench(bench.fitter.part(logs), bench.model.part(logs)), max(scale, 1.0))
+    more = float(layout.counted.sum() / max(layout.counted[kept].sum(), 1e-300))
+    return Screen(Bench(bench.fitter.part(logs), bench.model.part(logs)), max(scale, 1.0), more)
 
 
 def loudest_logs(above: Array, layout: Layout) -> list[int]:

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
+from axisight.gap.edge import BENT, bent
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.merged import one_for_several
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.screening import kept_beside
+from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
+from axisight.gap.swaps import straightened
 from axisight.gap.trials import Progress, Trials, fresh, interact, settled
 
 Array = NDArray[np.float64]
@@ -47,6 +50,7 @@ class Search:
     ``baseline``: the simulator re-fitted without effects; ``model``: with the
     accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
     blocks lie; ``skipped``: candidates that failed, with the reason;
+    ``sensitivities`` by label, of candidates as they were screened last;
     ``adds_up``: errors add up axis by axis; ``by_axis``: the effects explain their axes, not the arm.
     """
 
@@ -56,6 +60,7 @@ class Search:
     layout: Layout
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
+    sensitivities: dict[str, Sensitivity] = field(default_factory=dict)
     adds_up: bool = False
     by_axis: bool = False
 
@@ -129,6 +134,7 @@ def search(
             trials = round_.refined([*trials, *round_.run_waiting(number)], number)
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
+        out.sensitivities |= round_.sensitivities
         out.rounds.append(Round(standings, taken, out.left()))
         if not taken:
             break
@@ -137,6 +143,7 @@ def search(
         refused |= _merge(fitter, out, settings, offered)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
+    _straighten(fitter, out)
     if not fitter.adds_up:
         _withdraw_doubtful(fitter, out, settings)
     return out
@@ -272,6 +279,20 @@ def _take_in(
             free = [*kept_beside(free, new), new]
         state.model = settled(fitter, free, state.model)
     progress(label, 1, 1)
+
+
+def _straighten(fitter: ModelFitter, state: Search) -> None:
+    """Put a rival in the place of a cause that holds only with a bent simulator."""
+    if bent(fitter, state.model) < BENT:
+        return
+    labels = {f.effect.label for f in state.model.free}
+    entered = [
+        (r, x.standings) for x in state.rounds for r, _ in x.accepted if r.trial.label in labels
+    ]
+    found = straightened(fitter, state.model, entered)
+    if found is not None:
+        state.model, _, rival = found
+        state.rounds.append(Round((rival[1],), (rival,), state.left()))
 
 
 def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[str]:

@@ -274,7 +274,7 @@ def _swing(trial: Trial) -> FreeEffect:
 
 
 # Bases of arms rock from here to there; stiffer ones show less.
-_ROCKS_HZ = (6.0, 10.0, 16.0, 25.0)
+_ROCKS_HZ = (6.0, 12.0, 24.0)
 
 
 def _rocking(trial: Trial) -> FreeEffect | None:
@@ -293,7 +293,7 @@ def _rocking(trial: Trial) -> FreeEffect | None:
     bounds = {n: (0.02 * c, 100 * c) for n, c in swinging(_ROCKS_HZ[-1]).items()}
     free = tuple(p.name for p in trial.info.parameters)
     begin = FreeEffect(trial.effect(swinging(_ROCKS_HZ[-1])), free, bounds=bounds)
-    return replace(begin, starts=tuple(swinging(f) for f in _ROCKS_HZ))
+    return replace(begin, starts=tuple(swinging(f) for f in _ROCKS_HZ[:-1]))
 
 
 def _inertia_about_base(robot: Robot) -> Array:
@@ -310,7 +310,7 @@ def _inertia_about_base(robot: Robot) -> Array:
 
 
 # Of the longest log: over less it is viscous friction, over more it does not show.
-_WARM = (0.1, 0.5, 10.0)
+_WARM = (0.25, 0.5, 10.0)
 
 
 def _warming(trial: Trial) -> FreeEffect:

@@ -17,6 +17,7 @@ from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import Bench, Start, thinned
+from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 
 Array = NDArray[np.float64]
@@ -73,7 +74,8 @@ def settled(
 class Trials:
     """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
 
-    ``least`` (n_axes,): fall of the loss below which nothing is a cause.
+    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``sensitivities`` by label,
+    of candidates that were screened.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class Trials:
         self.current = held_out_loss(model)
         self.bench = Bench(fitter, model)
         self.waiting: list[Start] = []
+        self.sensitivities: dict[str, Sensitivity] = {}
 
     @property
     def skipped(self) -> dict[str, str]:
@@ -114,7 +117,10 @@ class Trials:
         with self._threads() as pool:
             screened = self._each(pool, screen.starts, screen.groups(options), label)
         self.skipped.update(screen.bench.skipped)
-        return [start for group in screened for start in group]
+        starts = [start for group in screened for start in group]
+        known = (s.sensitivity for s in starts)
+        self.sensitivities = {s.option.effect.label: s for s in known if s is not None}
+        return starts
 
     def run_waiting(self, number: int) -> list[Trial]:
         """Fit the candidates that were left to the next round."""

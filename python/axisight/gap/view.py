@@ -40,15 +40,19 @@ class View(ABC):
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs settle by themselves: no candidates."""
 
-    def candidates(self, model: Evidence) -> list[FreeEffect]:
-        """Return the candidates, with start values from the residual of a model."""
+    def candidates(self, model: Evidence, *, everywhere: bool = False) -> list[FreeEffect]:
+        """Return the candidates, with start values from the residual of a model.
+
+        On the axes where it leaves something worth a cause, or ``everywhere``.
+        """
+        enough = self.floor.expected + self.settings.smallest_gain
         at = situation(
             self.robot,
             self.logs,
             model,
             self.fitter.weighting.decimation,
             self._weighted_response,
-            self.floor.expected + self.settings.smallest_gain,
+            np.full_like(enough, -1.0) if everywhere else enough,
         )
         found = all_candidates(
             self.robot,

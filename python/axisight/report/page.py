@@ -33,6 +33,7 @@ from axisight.report.figures import (
     page_json,
     ranking_figure,
 )
+from axisight.report.limits import limit_table
 from axisight.report.wording import (
     NO_VALUE,
     GapMap,
@@ -109,6 +110,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "findings": [str(finding) for finding in diagnosis.findings],
         "where": _places(diagnosis.where),
         "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
+        "limits": limit_table(diagnosis.detection_limits, len(diagnosis.gap.before_per_axis)),
         "maps": _maps(gap_maps(diagnosis)),
         "causes": [_cause(cause) for cause in in_order(diagnosis.causes)],
         "ranking": [_candidate(c) for c in ranking],

@@ -109,6 +109,7 @@ pub fn free(target: Target, initial: f64, scale: f64) -> FitParameter {
         scale,
         prior: None,
         frozen: false,
+        amplitude: None,
         nuisance: false,
     }
 }

@@ -110,6 +110,9 @@ const MOVED: f64 = 0.01;
 /// the shape of a friction of no size, say.
 const LEAST_INFLUENCE: f64 = 1e-12;
 
+/// Most that the step of a shape is stretched where the size of its effect shrinks.
+const MOST_STRETCHED: f64 = 2.0;
+
 /// Derivatives that a trial point gets at once: as many as cost less than another simulation.
 const FEW: usize = 4;
 
@@ -337,6 +340,26 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
 
     fn normal(&self) -> &Normal {
         &self.normal
+    }
+
+    /// Shapes move by less as the size of their effect grows, and by more as it shrinks.
+    ///
+    /// An effect `a f(s)` changes by `f da + a f' ds`, which a step of `ds a / (a + da)` from the new
+    /// size still makes: a valley along which size and shape make up for each other is followed
+    /// straight on, which would be crept along otherwise.
+    fn land(&self, from: &[f64], to: &mut [f64]) {
+        for slot in 0..to.len() {
+            let amplitude = self.parameters[self.free[slot]].amplitude;
+            let place = amplitude.and_then(|size| self.free.iter().position(|i| *i == size));
+            if let Some(size) = place {
+                let shrunk = if to[size] == 0.0 {
+                    0.0
+                } else {
+                    from[size] / to[size]
+                };
+                to[slot] = from[slot] + (to[slot] - from[slot]) * shrunk.clamp(0.0, MOST_STRETCHED);
+            }
+        }
     }
 
     fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Evaluation)>, ProblemError> {

@@ -31,6 +31,8 @@ pub struct FitParameter {
     pub prior: Option<(f64, f64)>,
     /// Kept at its initial value.
     pub frozen: bool,
+    /// Of a shape: the parameter that is the only size of its effect.
+    pub amplitude: Option<usize>,
     /// Its sensitivity changes little: computed once, or taken from an earlier fit,
     /// and refreshed only when asked for.
     pub nuisance: bool,

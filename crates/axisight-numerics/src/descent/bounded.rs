@@ -13,6 +13,10 @@ pub trait LeastSquares {
     type Error;
     /// Normal equations at the present point.
     fn normal(&self) -> &Normal;
+    /// Where a step `from` the present point that ends at `to` by the linear model had better end.
+    fn land(&self, from: &[f64], to: &mut [f64]) {
+        let _ = (from, to);
+    }
     /// Loss at `theta`, `None` where the model does not hold. Derivatives may wait until the
     /// point is accepted.
     ///
@@ -179,6 +183,11 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
             };
             if self.cut(&step) {
                 continue;
+            }
+            self.problem.land(&self.theta, &mut self.next);
+            let bounds = self.limits.lower.iter().zip(&self.limits.upper);
+            for (to, (lower, upper)) in self.next.iter_mut().zip(bounds) {
+                *to = to.clamp(*lower, *upper);
             }
             let normal = self.problem.normal();
             let moves = self.theta.iter().zip(&self.next).enumerate();

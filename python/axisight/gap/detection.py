@@ -1,0 +1,94 @@
+"""Detection limits: the smallest amplitude of an effect that these logs would have shown.
+
+A simulator that lacks an amplitude leaves a loss, however it is re-fitted within its bounds. The
+effect is found where that is as much as a cause has to be worth, and noise does not take it below:
+a loss ``d`` that falls scatters by ``2 sqrt(d s)``, with ``s`` the mean square of the residual.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.gap.decide import numbers, smallest_likely_fall
+from axisight.gap.result import DetectionLimit
+from axisight.gap.score import held_out_loss
+from axisight.gap.screening import Bench, thinned
+from axisight.gap.search import Search
+from axisight.gap.sensitivity import Sensitivity
+from axisight.gap.view import View
+
+Array = NDArray[np.float64]
+
+# An amplitude at its limit is found with this probability.
+_POWER = 0.95
+# Sizes that are looked at, of the usual one, and how well a limit is found.
+_SPAN = (1e-5, 1e5)
+_PRECISION = 0.02
+
+
+def detection_limits(found: Search, view: View) -> tuple[DetectionLimit, ...]:
+    """Return the limit of every effect at every place that is no cause.
+
+    On the axis where it shows best, with all causes in. Competition between effects that look alike
+    is not in it: at the limit something is seen; what it is may need more.
+    """
+    settings = view.settings
+    loss = found.layout.by_axis(held_out_loss(found.model))
+    noise = np.maximum(loss, found.layout.by_axis(found.floor)) / found.layout.samples()
+    least = np.maximum(found.least_falls(settings), settings.smallest_score * found.left())
+    named = {e.label for e in found.model.effects}
+    known = {**found.sensitivities, **_not_tried(found, view)}
+    kept = [s for label, s in known.items() if label not in named]
+    limits = []
+    for s in sorted(kept, key=_order):
+        needed = np.maximum(least, smallest_likely_fall(loss, numbers(s.option)))
+        sure = float(scipy.stats.norm.ppf(_POWER)) * np.sqrt(noise)
+        shows = (sure + np.sqrt(sure**2 + needed)) ** 2
+        limits.append(_limit(s, shows, view.fitter.tolerated(s.option.effect)))
+    return tuple(limits)
+
+
+def _not_tried(found: Search, view: View) -> dict[str, Sensitivity]:
+    """Return the sensitivities of candidates on axes where nothing was to be explained."""
+    options = [
+        o
+        for o in view.candidates(found.model, everywhere=True)
+        if o.effect.label not in found.sensitivities and not o.effect.acts
+    ]
+    bench = Bench(view.fitter, found.model)
+    screen = thinned(bench, held_out_loss(found.model) - found.floor, found.layout)
+    with ThreadPoolExecutor(view.settings.threads) as pool:
+        each = pool.map(screen.sensitivities, screen.groups(options))
+        return {s.option.effect.label: s for group in each for s in group}
+
+
+def _order(sensitivity: Sensitivity) -> tuple[str, int]:
+    effect = sensitivity.option.effect
+    return effect.name, effect.axis or 0
+
+
+def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
+    """Return the limit of a candidate.
+
+    ``shows`` (n_axes,): loss that is seen; ``tolerated``: change of the quantity that is scatter.
+    """
+    effect = s.option.effect
+    info = next(p for p in effect_info(effect.name).parameters if p.name == s.parameter)
+    largest = max(abs(info.lower), abs(info.upper))
+
+    def missing(log_size: float) -> float:
+        return float(np.max(np.sqrt(s.losses(float(np.exp(log_size))) / shows))) - 1.0
+
+    low, high = np.log(info.typical * _SPAN[0]), np.log(min(largest, info.typical * _SPAN[1]))
+    if missing(high) < 0.0:
+        # Larger than the effect can be: these logs do not show it at all.
+        return DetectionLimit(effect.name, effect.axis, s.parameter, None, info.unit)
+    if missing(low) < 0.0:
+        low = scipy.optimize.brentq(missing, low, high, xtol=_PRECISION)
+    value = max(float(np.exp(low)), tolerated)
+    return DetectionLimit(effect.name, effect.axis, s.parameter, value, info.unit)

@@ -1,0 +1,77 @@
+"""How much an amplitude of an effect would raise the loss, from the normal equations of one evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.gap.model import FreeEffect, Linearized
+from axisight.gap.score import linear_step, predicted_loss
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What the first amplitude of a candidate does, everything else of the candidate nothing.
+
+    ``rest``: normal equations of all other parameters, one block an axis, for an amplitude of one
+    that the model lacks; ``more``: how many times as much data there are.
+    """
+
+    option: FreeEffect
+    parameter: str
+    rest: Linearized
+    more: float = 1.0
+
+    def scaled(self, factor: float) -> Sensitivity:
+        """Return that of ``factor`` times as much data."""
+        return replace(self, more=factor * self.more)
+
+    def losses(self, amplitude: float) -> Array:
+        """Return what an amplitude that the model lacks leaves on each axis (n_axes,).
+
+        The simulator's own parameters make up for what they can within their bounds.
+        """
+        lacking = replace(
+            self.rest, gradient=amplitude * self.rest.gradient, loss=amplitude**2 * self.rest.loss
+        )
+        every = np.ones(len(lacking.loss), dtype=bool)
+        left = predicted_loss(lacking, every, linear_step(lacking))
+        return np.asarray(self.more * np.maximum(left, 0.0))
+
+
+def sensitivity(
+    option: FreeEffect, evidence: Linearized, axis: NDArray[np.int64]
+) -> Sensitivity | None:
+    """Return the sensitivity of a candidate that does nothing as it is; None of any other.
+
+    ``evidence``: the model with the candidate, last; ``axis`` (n_blocks,) of the blocks.
+    """
+    sizes = {p.name for p in effect_info(option.effect.name).parameters if p.role == "amplitude"}
+    name = next((n for n in option.free if n in sizes), None)
+    last = max((place for place, _ in evidence.parameters if place is not None), default=None)
+    if option.effect.acts or name is None or (last, name) not in evidence.parameters:
+        return None
+    column = evidence.parameters.index((last, name))
+    rest = [i for i, (place, _) in enumerate(evidence.parameters) if place != last]
+    names = tuple(evidence.parameters[i] for i in rest)
+    axes = range(int(axis.max()) + 1)
+    by_axis = np.stack([evidence.matrix[axis == i].sum(axis=0) for i in axes])
+    # From where the fit stands: what it left of its own is no matter of the effect.
+    return Sensitivity(
+        option,
+        name,
+        Linearized(
+            parameters=names,
+            at_bound=(),
+            matrix=by_axis[:, rest][:, :, rest],
+            gradient=by_axis[:, rest, column],
+            loss=by_axis[:, column, column],
+            prior_matrix=evidence.prior_matrix[np.ix_(rest, rest)],
+            prior_gradient=np.zeros(len(rest)),
+        ),
+    )

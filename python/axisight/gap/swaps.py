@@ -1,0 +1,73 @@
+"""A cause that holds only with a bent simulator gives way to one that does as well without.
+
+Two effects may explain as much of an axis within what formulas differ by, and the simpler one leads: a
+heavier link for a load beside it. What it leaves is small against what it explains, not against
+noise, and the simulator's own parameters are bent to it as far as they go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.errors import InputError
+from axisight.gap.decide import Ranked, Standing
+from axisight.gap.edge import BENT, bent
+from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.screening import kept_beside
+from axisight.gap.trials import settled
+
+Found = tuple[Ranked, Standing]
+
+# Rivals that are tried, and what they explain of what the cause does.
+_RIVALS = 3
+_AS_MUCH = 0.95
+
+
+def straightened(
+    fitter: ModelFitter, model: Evidence, entered: Sequence[tuple[Ranked, Sequence[Standing]]]
+) -> tuple[Evidence, Ranked, Found] | None:
+    """Return a model with a rival in the place of one of its causes, that cause, and the rival.
+
+    ``entered``: the causes, each with the standings of the round it came in. None where no rival
+    leaves less with a simulator that is not bent.
+    """
+    best: tuple[Evidence, Ranked, Found] | None = None
+    for cause, standings in entered:
+        for rival in _rivals(cause, standings):
+            other = _with(fitter, model, cause, rival[0])
+            least = model.total if best is None else best[0].total
+            if other is not None and other.total < least and bent(fitter, other) < BENT:
+                best = other, cause, rival
+    return best
+
+
+def _rivals(cause: Ranked, standings: Sequence[Standing]) -> list[Found]:
+    """Return those that explain as much, each as it stands best without the cause, likeliest first."""
+    found: dict[str, Found] = {}
+    label = cause.trial.label
+    for standing in standings:
+        score = next((r.score for r in standing.ranked if r.trial.label == label), None)
+        if score is None:
+            continue
+        alone = standing.without(label)
+        for r in alone.ranked:
+            known = found.get(r.trial.label)
+            if r.score >= _AS_MUCH * score and (
+                known is None or r.probability > known[0].probability
+            ):
+                found[r.trial.label] = r, alone.led_by(r)
+    ranked = sorted(found.values(), key=lambda x: (x[0].trial.evidence.total, x[0].trial.label))
+    return ranked[:_RIVALS]
+
+
+def _with(fitter: ModelFitter, model: Evidence, cause: Ranked, rival: Ranked) -> Evidence | None:
+    new = rival.trial.evidence.free[-1]
+    others = [f for f in model.free if f.effect.label != cause.trial.label]
+    free = [*kept_beside(others, new), new]
+    alone = len(free) == len(rival.trial.evidence.free)
+    start = rival.trial.evidence if alone else model
+    try:
+        fitted = fitter.fit(free, start, refreshes=1)
+        return settled(fitter, fitted.free, fitted)
+    except InputError:
+        return None

@@ -1,0 +1,39 @@
+"""Detection limits as a table: one line an effect, one column an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from axisight.gap.result import DetectionLimit
+from axisight.report.wording import NO_VALUE, number, plain_name
+
+_HIDDEN = "never"
+
+
+@dataclass(frozen=True)
+class LimitTable:
+    """``columns``: axes, and the arm where an effect acts on it; ``rows``: title, unit, values."""
+
+    columns: list[str]
+    rows: list[list[str]]
+
+
+def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
+    """Return the limits in words; ``never`` where no size that the effect may have would show."""
+    places: list[int | None] = list(range(1, n_axes + 1))
+    if any(limit.axis is None for limit in limits):
+        places.append(None)
+    lines: dict[str, dict[int | None, DetectionLimit]] = {}
+    for limit in limits:
+        lines.setdefault(limit.effect, {})[limit.axis] = limit
+    rows = []
+    for effect, mine in sorted(lines.items()):
+        unit = next(iter(mine.values())).unit
+        values = [_value(mine[p]) if p in mine else NO_VALUE for p in places]
+        rows.append([plain_name(effect), "" if unit == "1" else unit, *values])
+    return LimitTable(["arm" if p is None else f"axis {p}" for p in places], rows)
+
+
+def _value(limit: DetectionLimit) -> str:
+    return _HIDDEN if limit.value is None else number(limit.value, 2)

@@ -1,0 +1,78 @@
+"""Detection limits: what logs would have shown, against machines that have it."""
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings, diagnose
+from axisight.effects import effect_info
+from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
+
+LOOKED_AT = (
+    "coulomb_friction",
+    "torque_offset",
+    "quadratic_drag",
+    "input_delay",
+    "transmission_error",
+    "torque_deadband",
+)
+
+
+def run(effects):
+    machine = scattered(bare_axis(), 4)
+    return diagnose(
+        robot=bare_axis(),
+        estimation=logs_of(machine, effects, PLAN),
+        validation=logs_of(machine, effects, HELD),
+        settings=Settings(bootstrap=50),
+    )
+
+
+@pytest.fixture(scope="module")
+def nothing():
+    return run([])
+
+
+@pytest.fixture(scope="module")
+def limits(nothing):
+    return {(limit.effect, limit.axis): limit for limit in nothing.detection_limits}
+
+
+def test_every_effect_that_may_be_nothing_has_a_limit_at_every_place(nothing, limits):
+    assert nothing.verdict == "none"
+    assert set(LOOKED_AT) <= {name for name, _ in limits}
+    assert len(limits) == len(nothing.detection_limits)
+    for limit in limits.values():
+        info = {p.name: p for p in effect_info(limit.effect).parameters}
+        assert info[limit.parameter].role == "amplitude"
+        assert limit.unit == info[limit.parameter].unit
+        assert limit.value is None or limit.value > 0
+
+
+def test_what_is_scatter_of_a_parameter_is_below_the_limit(limits):
+    # Three deviations of 1.5 %, by which motors of one type differ.
+    assert limits["motor_inertia", 1].value >= 0.045
+
+
+@pytest.mark.parametrize("name", LOOKED_AT)
+def test_twice_the_limit_is_found_and_a_third_is_not(name, limits):
+    """Nineteen in twenty at the limit; at twice it, four times the loss, all but always."""
+    limit = limits[name, 1]
+    found = run([Effect(name, 1, {limit.parameter: 2.0 * limit.value})])
+    assert name in {c.effect for c in found.ranking[:4]}
+    assert found.causes, found.headline
+    assert run([Effect(name, 1, {limit.parameter: limit.value / 3.0})]).causes == ()
+
+
+def test_limits_fall_with_more_data(limits):
+    machine = scattered(bare_axis(), 4)
+    twice = PLAN | {"third": ("multisine", 5), "fourth": ("multisine", 6), "fifth": ("moves", 1)}
+    longer = diagnose(
+        robot=bare_axis(),
+        estimation=logs_of(machine, [], twice, seconds=9.0),
+        validation=logs_of(machine, [], HELD),
+        settings=Settings(bootstrap=50),
+    )
+    more = {(limit.effect, limit.axis): limit.value for limit in longer.detection_limits}
+    ratio = [more[k] / x.value for k, x in limits.items() if x.value and more.get(k)]
+    # What a cause has to be worth grows with the data as what it shows does: limits stay.
+    assert 0.5 < np.median(ratio) < 1.1

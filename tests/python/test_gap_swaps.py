@@ -1,0 +1,107 @@
+"""Causes that hold only with a bent simulator, and their rivals."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from axisight import Effect, load_robot
+from axisight.gap.decide import Ranked, Standing, Trial
+from axisight.gap.edge import BENT, bent
+from axisight.gap.swaps import straightened
+
+ROBOT = load_robot("irb6600_like").with_effects([])
+TOLERANCE = {"mass": 0.015, "stiffness": 0.015, "motor_inertia": 0.015}
+
+
+@dataclass
+class Model:
+    """As much of a fitted model as swaps look at."""
+
+    free: list
+    total: float
+    off: float
+    """Relative change of every parameter of the simulator."""
+    renewed: bool = True
+    converged: bool = True
+    fresh: bool = False
+    status: str = "loss_converged"
+    at_bound: tuple = ()
+    robot_values: dict = field(init=False)
+
+    def __post_init__(self):
+        known = ROBOT.parameters()
+        names = [n for n in known if n.rsplit(".", 1)[1] in TOLERANCE]
+        self.robot_values = {n: (1 + self.off) * known[n] for n in names}
+
+
+@dataclass
+class Free:
+    """A free effect."""
+
+    effect: Effect
+
+
+@dataclass
+class Fitter:
+    """Fits by table: labels of the effects to what the model is then."""
+
+    known: dict
+    robot = ROBOT
+    tolerances = TOLERANCE
+    adds_up: bool = False
+
+    def fit(self, free, _start, **_options):
+        total, off = self.known[tuple(sorted(f.effect.label for f in free))]
+        return Model(list(free), total, off)
+
+
+MASS = Free(Effect("link_mass", 3, {"relative_change": 0.2}))
+LOAD = Free(Effect("payload", None, {"mass_kg": 100.0}))
+OFFSET = Free(Effect("torque_offset", 3, {"offset_nm": 3.0}))
+
+
+def ranked(free, score, probability):
+    trial = Trial(free, Model([free], 1e5, 0.0), np.zeros(1))
+    return Ranked(trial, score, 1.0, 10.0, probability)
+
+
+def standing(offset_score=0.999):
+    first, second = ranked(MASS, 0.999, 0.9), ranked(LOAD, 0.998, 0.05)
+    third = ranked(OFFSET, offset_score, 0.04)
+    return Standing(2, (first, second, third), 0.0, 0.01)
+
+
+def swap(known, offset_score=0.999):
+    at = standing(offset_score)
+    return straightened(Fitter(known), Model([MASS], 300.0, 0.1), [(at.ranked[0], (at,))])
+
+
+def test_the_rival_that_leaves_less_with_a_straight_simulator_takes_the_place():
+    model, gone, (rival, at) = swap(
+        {("payload",): (30.0, 0.001), ("torque_offset@3",): (40.0, 0.0)}
+    )
+    assert gone.trial.label == "link_mass@3"
+    assert rival.trial.label == "payload" == at.best.trial.label
+    assert model.total == 30.0
+    # What the cause had is shared by the others: 0.05 of 0.1.
+    assert rival.probability == pytest.approx(0.5)
+
+
+def test_a_rival_that_bends_the_simulator_too_does_not():
+    assert swap({("payload",): (30.0, 0.1), ("torque_offset@3",): (310.0, 0.0)}) is None
+
+
+def test_one_that_explains_less_is_no_rival():
+    known = {("payload",): (310.0, 0.0)}
+    # The offset is not fitted at all: the table does not have it.
+    assert swap(known, offset_score=0.9) is None
+
+
+def test_bent_is_a_share_of_parameters_three_tolerances_off():
+    fitter = Fitter({})
+    straight, crooked = Model([], 1.0, 2.9 * 0.015), Model([], 1.0, 3.1 * 0.015)
+    assert bent(fitter, straight) == 0.0
+    assert bent(fitter, crooked) == 1.0 > BENT
+    # Where errors add up it says nothing.
+    assert bent(Fitter({}, adds_up=True), crooked) == 0.0
