@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from axisight import Settings
-from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
 from axisight.gap.edge import parameters_at_edge
+from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
 from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
 from axisight.logs import Log
