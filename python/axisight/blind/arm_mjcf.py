@@ -19,8 +19,8 @@ class Native:
     ``half_width_rad``: the gear's tendon is slack within; ``friction_nm``: dry friction of the motor by
     the constraint solver; ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
     to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
-    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``tip_kg`` at
-    ``tip_m`` in the frame of the last link.
+    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
+    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed.
     """
 
     half_width_rad: float = 0.0
@@ -31,11 +31,39 @@ class Native:
     viscous: float = 0.0
     gear: float = 0.0
     lag_s: float = 0.0
-    tip_kg: float = 0.0
-    tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    kp: float = 0.0
+    ki: float = 0.0
+    filter_s: float = 0.0
 
 
 NOTHING = Native()
+
+
+@dataclass(frozen=True)
+class Ends:
+    """What MuJoCo changes at both ends of the arm.
+
+    ``tip_kg`` at ``tip_m`` in the frame of the last link; ``rocks_rad_nm``: compliance of the base about
+    x and y, none where it is zero, ``rocks_s`` their damping over stiffness.
+    """
+
+    tip_kg: float = 0.0
+    tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rocks_rad_nm: tuple[float, float] = (0.0, 0.0)
+    rocks_s: float = 0.0
+
+    @property
+    def springs(self) -> list[tuple[str, float]]:
+        """Axis and stiffness of each spring of the base, ground to arm."""
+        named = zip(("1 0 0", "0 1 0"), self.rocks_rad_nm, strict=True)
+        return [(axis, 1 / c) for axis, c in named if c]
+
+
+PLAIN = Ends()
+
+
+# MuJoCo wants mass in every moving body; this much changes nothing visible.
+_NEARLY_MASSLESS = '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
 
 
 @dataclass
@@ -50,18 +78,25 @@ class _Parts:
     axes: list[str] = field(default_factory=list)
 
 
-def mjcf(robot: Robot, native: Mapping[int, Native], tip: Native, step_s: float) -> str:
+def mjcf(robot: Robot, native: Mapping[int, Native], ends: Ends, step_s: float) -> str:
     """Return the model (MJCF) of a robot: rotors on tendons that pull at their joints.
 
-    ``native``: changes by axis, from 0. Positions are motor angles, then joint angles.
+    ``native``: changes by axis, from 0. Positions are motor angles, then those of the base's springs,
+    then joint angles.
     """
     parts = _Parts()
+    for axis, stiffness in ends.springs:
+        parts.bodies += (
+            f'<body><joint axis="{axis}" stiffness="{stiffness!r}" damping="{stiffness * ends.rocks_s!r}"/>'
+            f"{_NEARLY_MASSLESS}"
+        )
+        parts.close += "</body>"
     for joint in robot.joints:
         _add_joint(parts, joint, native)
-    if tip.tip_kg:
+    if ends.tip_kg:
         parts.bodies += (
-            f'<body pos="{_vector(tip.tip_m)}">'
-            f'<inertial pos="0 0 0" mass="{tip.tip_kg!r}" diaginertia="1e-6 1e-6 1e-6"/></body>'
+            f'<body pos="{_vector(ends.tip_m)}">'
+            f'<inertial pos="0 0 0" mass="{ends.tip_kg!r}" diaginertia="1e-6 1e-6 1e-6"/></body>'
         )
     return f"""<mujoco><compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
     <option timestep="{step_s!r}" integrator="RK4" gravity="{_vector(robot.gravity_m_s2)}">
@@ -77,8 +112,7 @@ def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> Non
     parts.bodies += f'<body pos="{_vector(joint.origin_m)}">'
     parts.bodies += f'<joint name="{joint.name}" axis="{_vector(joint.axis)}" {spring}/>'
     if joint.link is None:
-        # MuJoCo wants mass in every moving body; this much changes nothing visible.
-        parts.bodies += '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
+        parts.bodies += _NEARLY_MASSLESS
     else:
         parts.bodies += (
             f'<inertial pos="{_vector(joint.link.com_m)}" mass="{joint.link.mass_kg!r}"'

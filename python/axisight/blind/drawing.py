@@ -38,11 +38,12 @@ _SECONDS = 10.0
 
 @dataclass(frozen=True)
 class Draw:
-    """One case as drawn: effects, the machine that has them, references by name and role."""
+    """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role."""
 
     number: int
     effects: tuple[Drawn, ...]
     machine: Machine
+    bare: Machine
     references: dict[str, tuple[str, Array]]
 
 
@@ -51,7 +52,8 @@ def draw(seed: int, number: int, robot: Robot) -> Draw:
     rng = np.random.default_rng([seed, number])
     effects = _effects(rng, number, robot)
     machine = _without_scatter_of(effects, scattered(rng, robot), robot)
-    return Draw(number, effects, machine_of(machine, effects), references(rng, robot))
+    bare = machine_of(machine, ())
+    return Draw(number, effects, machine_of(machine, effects), bare, references(rng, robot))
 
 
 def _effects(rng: np.random.Generator, number: int, robot: Robot) -> tuple[Drawn, ...]:
@@ -96,8 +98,9 @@ def machine_of(robot: Robot, effects: Sequence[Drawn]) -> Machine:
     out = Machine(robot)
     for effect in effects:
         if effect.axis is None:
-            out = replace(out, tip=effect.native)
+            out = replace(out, ends=effect.ends)
             continue
+        out = replace(out, robot=out.robot.with_parameters(effect.changed))
         axis = effect.axis - 1
         out = replace(
             out,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.blind.arm_mjcf import NOTHING, STEPS_PER_SAMPLE, Native, mjcf
+from axisight.blind.arm_mjcf import NOTHING, PLAIN, STEPS_PER_SAMPLE, Ends, Native, mjcf
 from axisight.blind.laws import Axis, Law
 from axisight.errors import InputError, MissingExtraError
 from axisight.robot import Robot
@@ -32,7 +32,7 @@ class Machine:
 
     robot: Robot
     native: Mapping[int, Native] = field(default_factory=dict)
-    tip: Native = NOTHING
+    ends: Ends = PLAIN
     laws: Mapping[int, Sequence[Law]] = field(default_factory=dict)
 
 
@@ -59,10 +59,10 @@ class _Loop:
         self.n = robot.n_axes
         self.sample_s = robot.sample_time_s
         self.step_s = self.sample_s / STEPS_PER_SAMPLE
-        text = mjcf(robot, machine.native, machine.tip, self.step_s)
+        text = mjcf(robot, machine.native, machine.ends, self.step_s)
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
-        self.joints = np.array([self.n + place for place in robot.axis_joints])
+        self.joints = np.array(robot.axis_joints) + self.n + len(machine.ends.springs)
         self.ratio = np.asarray(robot.gear_ratio, np.float64)
         names = [robot.joint_names[place] for place in robot.axis_joints]
         ids = [
@@ -70,7 +70,13 @@ class _Loop:
         ]
         self.stiffness = self.model.tendon_stiffness[ids].reshape(len(ids), -1)[:, 0].copy()
         gains = robot.controller_gains
-        self.kp, self.ki = gains["kp"], gains["ki"]
+        own = [machine.native.get(axis, NOTHING) for axis in range(self.n)]
+        self.kp = gains["kp"] * (1 + np.array([x.kp for x in own]))
+        self.ki = gains["ki"] * (1 + np.array([x.ki for x in own]))
+        lags = np.array([x.filter_s for x in own])
+        # Of a first-order lag between samples, exactly; all of a new speed without.
+        self.fresh = -np.expm1(-self.sample_s / np.maximum(lags, 1e-12))
+        self.speed = np.zeros(self.n)
         self.laws = [(axis, law) for axis, laws in machine.laws.items() for law in laws]
         for _, law in self.laws:
             law.begin(self.step_s)
@@ -103,7 +109,8 @@ class _Loop:
             moved = measured - self.measured
             self.measured = measured
             self.behind -= moved
-            command = self.kp * (wanted - moved / self.sample_s) + self.ki * self.behind
+            self.speed += self.fresh * (moved / self.sample_s - self.speed)
+            command = self.kp * (wanted - self.speed) + self.ki * self.behind
             self.behind += wanted * self.sample_s
             angle[k] = measured
             torque[k] = command

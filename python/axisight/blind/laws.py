@@ -73,6 +73,19 @@ class ExponentialStribeck(Law):
 
 
 @dataclass
+class Warmup(Law):
+    """Viscous friction that comes or goes as 1 - exp(-t / T)."""
+
+    viscous_nm_s_rad: float
+    time_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        done = 1 - exp(-at.time_s / self.time_s)
+        return -self.viscous_nm_s_rad * done * at.motor_speed, 0.0
+
+
+@dataclass
 class LoadFriction(Law):
     """Friction that follows the load: a share of the gear torque as the motor feels it."""
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from axisight.blind.case_files import CaseFolder
-from axisight.blind.drawing import Draw, draw, machine_of
+from axisight.blind.drawing import Draw, draw
 from axisight.blind.engine import run
 from axisight.blind.processes import Progress, shared_out
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
@@ -80,7 +80,6 @@ def _severity(drawn: Draw) -> list[float]:
     """Return rms torque change by all effects over rms torque noise, largest validation log, by axis."""
     if not drawn.effects:
         return [0.0] * drawn.machine.robot.n_axes
-    bare = machine_of(drawn.machine.robot, ())
     rng = np.random.default_rng(0)
     out = np.zeros(drawn.machine.robot.n_axes)
     for role, reference in drawn.references.values():
@@ -90,7 +89,7 @@ def _severity(drawn: Draw) -> list[float]:
         noise = drawn.machine.robot.position_noise_std * rng.standard_normal(reference.shape)
         with_it, without, noisy = (
             run(machine, reference, added)[0]
-            for machine, added in ((drawn.machine, quiet), (bare, quiet), (bare, noise))
+            for machine, added in ((drawn.machine, quiet), (drawn.bare, quiet), (drawn.bare, noise))
         )
         change, floor = (np.sqrt(np.mean((x - without) ** 2, axis=0)) for x in (with_it, noisy))
         out = np.maximum(out, change / floor)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from axisight.blind import laws
-from axisight.blind.arm_mjcf import NOTHING, STEPS_PER_SAMPLE, Native
+from axisight.blind.arm_mjcf import NOTHING, PLAIN, STEPS_PER_SAMPLE, Ends, Native
 from axisight.robot import Robot
 
 Rng = np.random.Generator
@@ -24,7 +24,7 @@ Rng = np.random.Generator
 class Drawn:
     """One effect as drawn: parameters as the library states them, and what makes it.
 
-    ``axis`` from 1; None for the arm.
+    ``axis`` from 1; None for the arm, which ``ends`` is of. ``changed``: parameters of the robot.
     """
 
     effect: str
@@ -32,6 +32,8 @@ class Drawn:
     parameters: Mapping[str, float]
     native: Native = NOTHING
     laws: Sequence[laws.Law] = field(default_factory=tuple)
+    ends: Ends = PLAIN
+    changed: Mapping[str, float] = field(default_factory=dict)
 
 
 Draw = Callable[[Rng, Robot, int], Drawn]
@@ -181,7 +183,60 @@ def _payload(rng: Rng, robot: Robot, _axis: int) -> Drawn:
     link = next(j.link for j in reversed(robot.joints) if j.link is not None)
     x, y, z = (float(c + rng.uniform(-0.3, 0.3)) for c in link.com_m)
     values = {"mass_kg": mass, "x_m": x, "y_m": y, "z_m": z}
-    return Drawn("payload", None, values, Native(tip_kg=mass, tip_m=(x, y, z)))
+    return Drawn("payload", None, values, ends=Ends(tip_kg=mass, tip_m=(x, y, z)))
+
+
+def _of_link(robot: Robot, axis: int, quantity: str) -> tuple[str, float]:
+    """Return the name and the nominal value of a parameter of the link of an axis."""
+    name = robot.axis_parameter(axis, quantity)
+    assert name is not None  # every axis of the preset moves a link
+    return name, robot.parameters()[name]
+
+
+def _link_share(effect: str, quantity: str, low: float, high: float) -> Draw:
+    def draw(rng: Rng, robot: Robot, axis: int) -> Drawn:
+        share = _between(rng, low, high)
+        name, nominal = _of_link(robot, axis, quantity)
+        changed = {name: nominal * (1 + share)}
+        return Drawn(effect, axis, {"relative_change": share}, changed=changed)
+
+    return draw
+
+
+def _link_com(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    shift = {f"{k}_m": _sign(rng) * _between(rng, 0.02, 0.08) for k in "xyz"}
+    changed = {}
+    for key, size in shift.items():
+        name, nominal = _of_link(robot, axis, f"com_{key[0]}")
+        changed[name] = nominal + size
+    return Drawn("link_com", axis, shift, changed=changed)
+
+
+def _rocking(rng: Rng, _robot: Robot, _axis: int) -> Drawn:
+    about = _between(rng, 2e-8, 2e-7), _between(rng, 2e-8, 2e-7)
+    damping = _between(rng, 5e-4, 4e-3)
+    values = {"about_x_rad_nm": about[0], "about_y_rad_nm": about[1], "damping_s": damping}
+    return Drawn("base_compliance", None, values, ends=Ends(rocks_rad_nm=about, rocks_s=damping))
+
+
+def _warmup(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    own = robot.parameters()[f"{robot.axis_names[axis - 1]}.viscous_friction"]
+    size, time = -own * _between(rng, 0.4, 0.8), _between(rng, 2.0, 6.0)
+    values = {"viscous_nm_s_rad": size, "time_constant_s": time}
+    return Drawn("friction_warmup", axis, values, laws=[laws.Warmup(size, time)])
+
+
+def _gains(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    kp, ki = (_sign(rng) * _between(rng, 0.08, 0.3) for _ in range(2))
+    values = {"relative_proportional": kp, "relative_integral": ki}
+    return Drawn("controller_gain", axis, values, Native(kp=kp, ki=ki))
+
+
+def _speed_filter(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    lag, sample = _between(rng, 1e-3, 5e-3), robot.sample_time_s
+    # Of an exact lag; the library states that of a backward difference which forgets as fast.
+    stated = sample / -float(np.expm1(-sample / lag)) - sample
+    return Drawn("velocity_filter", axis, {"time_constant_s": stated}, Native(filter_s=lag))
 
 
 # Of the largest torque of the arm's logs, as the caller knows it.
@@ -240,6 +295,14 @@ KINDS: Mapping[str, Kind] = {
     "payload": Kind(_payload),
     "torque_saturation": Kind(_limit),
     "torque_deadband": Kind(_deadband),
+    "controller_gain": Kind(_gains),
+    "velocity_filter": Kind(_speed_filter),
+    # Beyond what the same link of another machine weighs.
+    "link_mass": Kind(_link_share("link_mass", "mass", 0.08, 0.3)),
+    "link_inertia": Kind(_link_share("link_inertia", "inertia_scale", 0.2, 0.8)),
+    "link_com": Kind(_link_com),
+    "base_compliance": Kind(_rocking),
+    "friction_warmup": Kind(_warmup),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),
