@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.gap.decide import Standing, Trial, falls, stand, trial
+from axisight.gap.edge import BENT, bent
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss
@@ -38,6 +39,9 @@ _MOST = 0.5
 # with sensitivities of its own does not make more of the rest.
 _REFINED = 2
 _CLOSE = 0.6
+# The same where the leader bends the simulator.
+_REFINED_BENT = 4
+_FAR = 0.3
 # One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
 _ALONE = 0.5
@@ -196,7 +200,8 @@ class Trials:
         """
         done: set[str] = set()
         label = f"refining the leaders, round {number}"
-        while todo := next(iter(self._worth_refining(trials, done)), None):
+        crooked = self._crooked(trials)
+        while todo := next(iter(self._worth_refining(trials, done, crooked)), None):
             self.progress(label, len(done), len(done) + 1)
             done.add(todo.label)
             better = trial(todo.candidate, settled(self.fitter, todo.evidence.free, todo.evidence))
@@ -204,7 +209,14 @@ class Trials:
         self.progress(label, 1, 1)
         return trials
 
-    def _worth_refining(self, trials: Sequence[Trial], done: set[str]) -> list[Trial]:
+    def _crooked(self, trials: Sequence[Trial]) -> set[int]:
+        """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
+        leaders = ((s.axis, s.best.trial.evidence) for s in self.standings(trials))
+        return {axis for axis, evidence in leaders if bent(self.fitter, evidence) >= BENT}
+
+    def _worth_refining(
+        self, trials: Sequence[Trial], done: set[str], crooked: set[int]
+    ) -> list[Trial]:
         """Return the leaders that explain anything, not done yet, where it is not clear which leads.
 
         An effect is judged on its own axis: how it fares on others says little of what it would be
@@ -214,11 +226,13 @@ class Trials:
         for standing in self.standings(trials):
             leader = standing.best
             gain = leader.gain * self.layout.samples()[standing.axis]
-            if _clear(standing) or gain < self.least[standing.axis]:
+            bends = standing.axis in crooked
+            if (_clear(standing) and not bends) or gain < self.least[standing.axis]:
                 continue
-            for r in standing.ranked[:_REFINED]:
+            count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
+            for r in standing.ranked[:count]:
                 here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
-                near = r.score > max(0.5 * self.settings.smallest_score, _CLOSE * leader.score)
+                near = r.score > max(0.5 * self.settings.smallest_score, close * leader.score)
                 if here and near and r.trial.label not in done and r.trial not in out:
                     out.append(r.trial)
         return out
