@@ -67,6 +67,9 @@ def differ(a: Linearized, b: Linearized) -> float:
 # differs by roundings of its largest entry, 1e-15, of which no more than a thousandth may be a
 # typical one.
 ROUNDING = 1e-12
+# With many columns the arm is linear along the run between nodes, alone it is exact: what changes a
+# link differs by the curvature of its forces between them.
+LINEAR_ARM = 1e-3
 
 
 @pytest.mark.parametrize("near", [False, True], ids=["exact", "near"])
@@ -80,7 +83,9 @@ def test_candidates_evaluated_together_are_as_alone(view, fitter, effects, near:
     together = fitter.evaluate_each(options, start, runs)
     for option, found in zip(options, together, strict=True):
         alone = fitter.evaluate([*start.free, option], start, near=runs)
-        assert differ(found, alone) < ROUNDING, option.effect.label
+        of_the_arm = effect_info(option.effect.name).acts == "arm"
+        most = LINEAR_ARM if of_the_arm and not near else ROUNDING
+        assert differ(found, alone) < most, option.effect.label
 
 
 def test_what_stands_in_for_a_fitted_parameter_leaves_it_where_it_is(view, fitter):

@@ -55,10 +55,11 @@ def detection_limits(found: Search, view: View) -> tuple[DetectionLimit, ...]:
 
 def _not_tried(found: Search, view: View) -> dict[str, Sensitivity]:
     """Return the sensitivities of candidates on axes where nothing was to be explained."""
+    known = {*found.sensitivities, *(e.label for e in found.model.effects)}
     options = [
         o
         for o in view.candidates(found.model, everywhere=True)
-        if o.effect.label not in found.sensitivities and not o.effect.acts
+        if o.effect.label not in known and not o.effect.acts
     ]
     bench = Bench(view.fitter, found.model)
     screen = thinned(bench, held_out_loss(found.model) - found.floor, found.layout)

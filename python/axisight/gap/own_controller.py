@@ -75,7 +75,7 @@ class _Piece:
     def _seen(self, x: Array) -> Array:
         """Return a torque below the band, where no limit cuts it, without its mean."""
         low = lowpass(np.ascontiguousarray(x), self._time, self._band_hz)[self._kept]
-        return np.asarray(low - low.mean())
+        return np.asarray(low - low.mean()) if len(low) else low
 
 
 def _later(x: Array, samples: int) -> Array:

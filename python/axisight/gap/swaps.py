@@ -42,7 +42,10 @@ def straightened(
 
 
 def _rivals(cause: Ranked, standings: Sequence[Standing]) -> list[Found]:
-    """Return those that explain as much, each as it stands best without the cause, likeliest first."""
+    """Return those that explain as much, each as it stands best without the cause.
+
+    Those whose fits left least come first.
+    """
     found: dict[str, Found] = {}
     label = cause.trial.label
     for standing in standings:
