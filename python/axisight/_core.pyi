@@ -491,6 +491,9 @@ class Linearization:
     def jacobian(self) -> _Array:
         """Derivatives of the residuals, shape (n_free, n_residuals): one row per parameter."""
     @property
+    def columns(self) -> list[Column]:
+        """The same, kept where they are for fits that use them."""
+    @property
     def blocks(self) -> list[tuple[int, int, int, int]]:
         """Blocks of the residual vector: (log, axis, start, length), all from 0."""
     @property

@@ -47,6 +47,12 @@ fn stacked(columns: &[Shared]) -> Vec<f64> {
     columns.iter().flat_map(|c| c.iter().copied()).collect()
 }
 
+/// Columns that others may use too.
+fn handed_out(columns: &[Shared]) -> Vec<Column> {
+    let shared = columns.iter().map(Arc::clone);
+    shared.map(|shared| Column { shared }).collect()
+}
+
 /// Result of a fit; arrays are copies.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct FitResult {
@@ -115,8 +121,7 @@ impl FitResult {
     /// The same, kept where they are.
     #[getter]
     fn columns(&self) -> Vec<Column> {
-        let shared = self.fit.columns.iter().map(Arc::clone);
-        shared.map(|shared| Column { shared }).collect()
+        handed_out(&self.fit.columns)
     }
     #[getter]
     fn blocks(&self) -> Vec<BlockTuple> {
@@ -168,6 +173,11 @@ impl Linearization {
     #[getter]
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array2(py, stacked(&self.at.columns), self.at.residual.len())
+    }
+    /// The same, kept where they are.
+    #[getter]
+    fn columns(&self) -> Vec<Column> {
+        handed_out(&self.at.columns)
     }
     #[getter]
     fn blocks(&self) -> Vec<BlockTuple> {

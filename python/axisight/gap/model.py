@@ -57,7 +57,8 @@ class Linearized:
 
     By block (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
     ``loss`` (n_blocks,); ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters``
-    names the p columns: (None, robot parameter) or (effect position, parameter).
+    names the p columns: (None, robot parameter) or (effect position, parameter); ``jacobian`` has
+    them, of a model that was not fitted.
     """
 
     parameters: tuple[tuple[int | None, str], ...]
@@ -67,6 +68,7 @@ class Linearized:
     loss: Array
     prior_matrix: Array
     prior_gradient: Array
+    jacobian: tuple[_core.Column, ...] = field(default=(), kw_only=True)
 
     @property
     def total(self) -> float:
@@ -97,6 +99,7 @@ class Linearized:
             loss=self.loss,
             prior_matrix=self.prior_matrix[pick],
             prior_gradient=self.prior_gradient[wanted],
+            jacobian=tuple(self.jacobian[i] for i in wanted) if self.jacobian else (),
         )
 
 
@@ -336,16 +339,16 @@ class ModelFitter(ABC):
         setup = self._setup(free, start, None, [True] * len(free), lazy=True, fixed_by=start.free)
         together = self._evaluated(setup, near)
         return [
-            together.without(n + i, among=range(n, len(free)), fixed=self._replaced([option]))
+            together.without(n + i, among=range(n, len(free)), fixed=self.replaced([option]))
             for i, option in enumerate(options)
         ]
 
     def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> Linearized:
         options = self._options()
         result = self.linearize(setup.effects, setup.parameters, options, setup.warm, near)
-        return _linearized(result, setup)
+        return replace(_linearized(result, setup), jacobian=tuple(result.columns))
 
-    def _replaced(self, free: Sequence[FreeEffect]) -> set[str]:
+    def replaced(self, free: Sequence[FreeEffect]) -> set[str]:
         """Return the robot's parameters that effects stand in for."""
         names = (_same_quantity(self.robot, f.effect) for f in free)
         return {name for name in names if name is not None}
@@ -382,7 +385,7 @@ class ModelFitter(ABC):
             begin = robot_values
         # One that the simulator has itself is tried with other values: it takes its place.
         tried = [f.effect for f in free]
-        same = self._replaced(free if fixed_by is None else fixed_by)
+        same = self.replaced(free if fixed_by is None else fixed_by)
         own = [
             replace(p, frozen=True)
             if p.name in same

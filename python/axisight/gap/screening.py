@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from axisight._core import Courses
 from axisight.effects import effect_info
 from axisight.errors import InputError
+from axisight.gap.kept import Bordered, KeptColumns
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
 from axisight.gap.score import linear_falls, linear_gain
@@ -26,6 +27,8 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Evaluations between two starts of an effect.
 _SCANS = 10
+# Share of the most that there is to explain in as many logs, where others stay the ones to screen on.
+_NEARLY = 0.8
 # Logs that the core runs in lock-step: fewer cost as much.
 _LOCK_STEP = 4
 
@@ -86,21 +89,39 @@ class Bench:
 class Screen:
     """The screen of one model.
 
-    Where the bench has only some of the logs, ``scale`` is that of gains, ``more`` of data.
+    Where the bench has only some of the logs, ``scale`` is that of gains, ``more`` of data. What
+    candidates that do nothing as they are do to the error goes to ``kept``.
     """
 
-    def __init__(self, bench: Bench, scale: float = 1.0, more: float = 1.0) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        scale: float = 1.0,
+        more: float = 1.0,
+        kept: KeptColumns | None = None,
+    ) -> None:
         self.bench, self.scale, self.more = bench, scale, more
         self.fitter, self.model = bench.fitter, bench.model
+        self.kept = KeptColumns() if kept is None else kept
+        # What the simulator's own parameters gain by a step to what is best on these logs.
+        self._own, self._own_falls = linear_gain(self.model), linear_falls(self.model)
+
+    def from_kept(self) -> KeptScreen:
+        """Return the screen by what was kept."""
+        return KeptScreen(self.bench, self.scale, self.more, self.kept)
+
+    def idle(self, option: FreeEffect) -> bool:
+        """Whether a candidate does nothing to the model as it is."""
+        beside = kept_beside(self.model.free, option)
+        return not option.effect.acts and len(beside) == len(self.model.free)
 
     def groups(self, options: Sequence[FreeEffect]) -> list[list[FreeEffect]]:
         """Return the candidates by evaluation: those that do nothing as they are share one."""
         alone: list[FreeEffect] = []
         together: list[FreeEffect] = []
         for option in options:
-            beside = kept_beside(self.model.free, option)
-            idle = not option.effect.acts and len(beside) == len(self.model.free)
-            (together if idle and len(option.free) <= _TOGETHER else alone).append(option)
+            few = len(option.free) <= _TOGETHER
+            (together if self.idle(option) and few else alone).append(option)
         groups: list[list[FreeEffect]] = []
         for option in sorted(together, key=lambda o: -len(o.free)):
             room = (g for g in groups if _size(g) + len(option.free) <= _TOGETHER)
@@ -134,6 +155,13 @@ class Screen:
 
     def _shared(self, group: Sequence[FreeEffect]) -> list[Linearized | None]:
         """Return the model with each of a group, by one evaluation if they allow it."""
+        found = self._run(group)
+        for option, evidence in zip(group, found, strict=True):
+            if evidence is not None and self.idle(option):
+                self.kept.keep(option, evidence)
+        return found
+
+    def _run(self, group: Sequence[FreeEffect]) -> list[Linearized | None]:
         if len(group) > 1:
             # One that cannot be simulated leaves all to be tried alone.
             with suppress(InputError):
@@ -143,11 +171,9 @@ class Screen:
     def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
         best = self._start(option, evidence)
         if len(option.free) > 1:
-            # Further starts, by what a step from there promises. Only sizes: where one does nothing
-            # as it is, its shape shows nothing.
-            sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
+            # Further starts, by what a step from there promises.
             begins = [option.at(values) for values in option.starts]
-            others = self._evaluated([sizes.at(b.effect.parameters or {}) for b in begins])
+            others = self._evaluated(self._at_starts(option))
             starts = (self._start(b, e) for b, e in zip(begins, others, strict=True))
             known = best.sensitivity
             best = max((best, *starts), key=lambda start: start.gain)
@@ -158,14 +184,22 @@ class Screen:
                 best = Start(begin, {}, gain, sensitivity=best.sensitivity)
         return best
 
+    def _at_starts(self, option: FreeEffect) -> list[FreeEffect]:
+        """Return a candidate at its further starts.
+
+        Only sizes: where one does nothing as it is, its shape shows nothing.
+        """
+        sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
+        return [sizes.at(option.at(v).effect.parameters or {}) for v in option.starts]
+
     def _start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
         """Return a candidate with what one linear step promises where ``evidence`` has it."""
         if evidence is None:
             return Start(option, self.model.robot_values, -np.inf)
-        gain = self.model.total - evidence.total + linear_gain(evidence)
+        gain = self.model.total - evidence.total + linear_gain(evidence) - self._own
         falls = None
         if option.effect.axis is None:
-            fall = self.model.loss - evidence.loss + linear_falls(evidence)
+            fall = self.model.loss - evidence.loss + linear_falls(evidence) - self._own_falls
             falls = np.bincount(self.model.axis, fall).astype(np.float64)
         known = sensitivity(option, evidence, self.model.axis)
         return Start(option, self.model.robot_values, gain, falls, known)
@@ -199,25 +233,52 @@ class Screen:
         return option.at({name: value}), self.model.total - least
 
 
-def thinned(bench: Bench, above: Array, layout: Layout) -> Screen:
+class KeptScreen(Screen):
+    """The screen of a model by what candidates did to the error of one before it."""
+
+    def __init__(self, bench: Bench, scale: float, more: float, kept: KeptColumns) -> None:
+        super().__init__(bench, scale, more, kept)
+        self._bordered = Bordered(self.model)
+
+    def knows(self, option: FreeEffect) -> bool:
+        """Whether all that a candidate is screened by was kept."""
+        scanned = bool(option.starts) and len(option.free) == 1
+        wanted = [option, *self._at_starts(option)]
+        known = all(self.kept.rows(o) is not None for o in wanted)
+        return known and self.idle(option) and not scanned
+
+    def _shared(self, group: Sequence[FreeEffect]) -> list[Linearized | None]:
+        return [self._with(option) for option in group]
+
+    def _with(self, option: FreeEffect) -> Linearized | None:
+        rows = self.kept.rows(option)
+        if rows is None:
+            return None
+        return self._bordered.with_candidate(option, rows, self.fitter.replaced([option]))
+
+
+def thinned(bench: Bench, above: Array, layout: Layout, kept: KeptColumns | None = None) -> Screen:
     """Return the screen of a model on the logs of a bench that have most to explain.
 
-    ``above`` (n_blocks,): loss above the floor.
+    ``above`` (n_blocks,): loss above the floor; ``kept``: what models before it have left.
     """
-    logs = loudest_logs(above, layout)
-    kept = np.isin(layout.log, logs)
-    if kept.all():
-        return Screen(bench)
-    scale = float(above.sum() / max(above[kept].sum(), 1e-300))
-    more = float(layout.counted.sum() / max(layout.counted[kept].sum(), 1e-300))
-    return Screen(Bench(bench.fitter.part(logs), bench.model.part(logs)), max(scale, 1.0), more)
+    logs = loudest_logs(above, layout, [] if kept is None else kept.logs)
+    if kept is not None:
+        kept.begin(logs)
+    here = np.isin(layout.log, logs)
+    if here.all():
+        return Screen(bench, kept=kept)
+    scale = float(above.sum() / max(above[here].sum(), 1e-300))
+    more = float(layout.counted.sum() / max(layout.counted[here].sum(), 1e-300))
+    part = Bench(bench.fitter.part(logs), bench.model.part(logs))
+    return Screen(part, max(scale, 1.0), more, kept)
 
 
-def loudest_logs(above: Array, layout: Layout) -> list[int]:
+def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> list[int]:
     """Return the logs to screen on: at least half of them, with most of what is to be explained.
 
     ``above`` (n_blocks,): loss above the floor. Every axis counts alike. As many as run in
-    lock-step at the cost of fewer.
+    lock-step at the cost of fewer. Those of ``before`` where they have nearly as much.
     """
     logs = np.unique(layout.log)
     count = _LOCK_STEP * -(-len(logs) // (2 * _LOCK_STEP))
@@ -225,8 +286,10 @@ def loudest_logs(above: Array, layout: Layout) -> list[int]:
     for axis in range(layout.n_axes):
         here = [float(above[(layout.axis == axis) & (layout.log == log)].sum()) for log in logs]
         share += np.maximum(here, 0.0) / max(sum(np.maximum(here, 0.0)), 1e-300)
-    kept = np.argsort(-share, kind="stable")[:count]
-    return sorted(int(log) for log in logs[kept])
+    most = np.argsort(-share, kind="stable")[:count]
+    if len(before) == count and share[np.isin(logs, before)].sum() > _NEARLY * share[most].sum():
+        return list(before)
+    return sorted(int(log) for log in logs[most])
 
 
 def _amplitudes(option: FreeEffect) -> set[str]:

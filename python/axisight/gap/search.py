@@ -14,6 +14,7 @@ from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
 from axisight.gap.edge import BENT, bent
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
+from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.merged import one_for_several
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
@@ -122,9 +123,10 @@ def search(
     floor = expected[baseline.axis] * baseline.samples
     out = Search(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
     refused: set[str] = set()
+    kept = KeptColumns()
     for number in range(1, _MOST_ROUNDS + 1):
         least = out.least_falls(settings)
-        round_ = Trials(fitter, out.model, floor, out.layout, least, settings, progress)
+        round_ = Trials(fitter, out.model, floor, out.layout, least, settings, progress, kept)
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.gap.decide import Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
+from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.score import held_out_loss
-from axisight.gap.screening import Bench, Start, thinned
+from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 
@@ -31,6 +32,8 @@ _FITTED = 4
 _NEAR = 0.3
 # A linear step promises less than a fit may gain; this much less of what is worth naming.
 _HOPELESS = 0.3
+# And this much less again where what it did to a model before tells.
+_ROUGHLY = 0.3
 # Candidates fitted where none is worth it.
 _LOOKED_AT = 3
 # Share of what is left on an axis that one fitted elsewhere explains: what is tried there waits.
@@ -78,7 +81,8 @@ def settled(
 class Trials:
     """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
 
-    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``sensitivities`` by label,
+    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``kept``: what candidates
+    did to models before, and will have done to this; ``sensitivities`` by label,
     of candidates that were screened.
     """
 
@@ -91,8 +95,9 @@ class Trials:
         least: Array,
         settings: Settings,
         progress: Progress,
+        kept: KeptColumns,
     ) -> None:
-        self.fitter, self.model, self.floor = fitter, model, floor
+        self.fitter, self.model, self.floor, self.kept = fitter, model, floor, kept
         self.layout, self.least = layout, least
         self.settings, self.progress = settings, progress
         self.current = held_out_loss(model)
@@ -114,17 +119,34 @@ class Trials:
             return self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
 
     def _screened(self, options: Sequence[FreeEffect], number: int) -> list[Start]:
-        screen = thinned(self.bench, self.current - self.floor, self.layout)
+        screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
         if any(option.starts and len(option.free) == 1 for option in options):
             screen.bench.begin_nominal()
+        rough = self._by_kept(screen, options)
         label = f"screening candidates, round {number}"
+        todo = screen.groups([o for o in options if o.effect.label not in rough])
         with self._threads() as pool:
-            screened = self._each(pool, screen.starts, screen.groups(options), label)
+            screened = self._each(pool, screen.starts, todo, label)
         self.skipped.update(screen.bench.skipped)
-        starts = [start for group in screened for start in group]
+        starts = [*rough.values(), *(start for group in screened for start in group)]
         known = (s.sensitivity for s in starts)
         self.sensitivities = {s.option.effect.label: s for s in known if s is not None}
         return starts
+
+    def _by_kept(self, screen: Screen, options: Sequence[FreeEffect]) -> dict[str, Start]:
+        """Return the candidates, by label, that what they did to a model before shows to be hopeless."""
+        if not self.kept.logs:
+            return {}
+        kept = screen.from_kept()
+        known = [o for o in options if kept.knows(o)]
+        worth = _ROUGHLY * _HOPELESS * self._worth()
+        starts = (start for o in known for start in kept.starts([o]))
+        return {
+            s.option.effect.label: s
+            for s in starts
+            if (s.falls is None and s.gain < worth[(s.option.effect.axis or 1) - 1])
+            or (s.falls is not None and np.all(s.falls < worth))
+        }
 
     def run_waiting(self, number: int) -> list[Trial]:
         """Fit the candidates that were left to the next round."""
@@ -246,10 +268,14 @@ class Trials:
         """Whether a candidate bends the simulator, and has sensitivities of its own."""
         return start.robot_values is not self.model.robot_values
 
+    def _worth(self) -> Array:
+        """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""
+        left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
+        return np.asarray(np.maximum(self.least, self.settings.smallest_score * left))
+
     def _promising(self, starts: Sequence[Start]) -> list[Start]:
         """Return the candidates to fit: at every place the best, where anything is to be gained."""
-        left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
-        worth = np.maximum(self.least, self.settings.smallest_score * left)
+        worth = self._worth()
         ranked = sorted(starts, key=lambda s: -s.gain)
         keep: list[Start] = []
         best = np.zeros(self.layout.n_axes)

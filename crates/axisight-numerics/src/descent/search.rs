@@ -170,6 +170,10 @@ fn advance<D: Descent>(
     let mut failures = 0;
     loop {
         let step = descent.step(damper.value)?;
+        // A longer step has failed, and this one would not gain enough if it kept its promise.
+        if failures > 0 && step.is_some_and(|s| s.promise > 0.0 && s.promise < enough) {
+            return Ok(Advance::Ended(at_end(descent, rules)?));
+        }
         if let Some(step) = step
             && let Some(status) = end(descent, rules, step, damper.value)?
         {
@@ -198,14 +202,18 @@ fn advance<D: Descent>(
         damper.failed();
         failures += 1;
         if failures > damper.failures() {
-            let status = if settled(descent, rules)? {
-                Status::LossConverged
-            } else {
-                Status::Stalled
-            };
-            return Ok(Advance::Ended(status));
+            return Ok(Advance::Ended(at_end(descent, rules)?));
         }
     }
+}
+
+/// How a search ended whose steps, however short, gain nothing.
+fn at_end<D: Descent>(descent: &mut D, rules: &Rules) -> Result<Status, D::Error> {
+    Ok(if settled(descent, rules)? {
+        Status::LossConverged
+    } else {
+        Status::Stalled
+    })
 }
 
 /// Whether the search ends before this step is tried.

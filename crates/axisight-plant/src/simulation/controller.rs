@@ -46,7 +46,8 @@ pub struct ControlLoop<S> {
     integral: Vec<S>,
     own: Vec<OwnLaw<S>>,
     filtered: Vec<S>,
-    first_lag: Option<Vec<S>>,
+    first_lag: Vec<S>,
+    last_lag: Vec<S>,
 }
 
 impl<S: Scalar> ControlLoop<S> {
@@ -68,7 +69,8 @@ impl<S: Scalar> ControlLoop<S> {
             reference_angle: angle.to_vec(),
             previous: None,
             integral: vec![S::zero(); angle.len()],
-            first_lag: None,
+            first_lag: Vec::with_capacity(angle.len()),
+            last_lag: Vec::with_capacity(angle.len()),
         }
     }
 
@@ -99,18 +101,19 @@ impl<S: Scalar> ControlLoop<S> {
     /// the machine.
     pub fn follow(&mut self, measured: &[S], logged: &[S], command: &mut [S]) {
         let rate = 1.0 / self.sample_time;
-        // The lag behind the log takes the place of the measured angle of an ordinary loop.
-        let lag: Vec<S> = measured.iter().zip(logged).map(|(m, l)| *m - *l).collect();
-        let first = self.first_lag.get_or_insert_with(|| lag.clone()).clone();
-        for i in 0..lag.len() {
-            let behind = lag[i] - first[i];
-            let speed = self
-                .previous
-                .as_ref()
-                .map_or_else(S::zero, |p| (lag[i] - p[i]) * rate);
+        let first_sample = self.first_lag.is_empty();
+        for i in 0..measured.len() {
+            // The lag behind the log takes the place of the measured angle of an ordinary loop.
+            let lag = measured[i] - logged[i];
+            if first_sample {
+                self.first_lag.push(lag);
+                self.last_lag.push(lag);
+            }
+            let behind = lag - self.first_lag[i];
+            let speed = (lag - self.last_lag[i]) * rate;
+            self.last_lag[i] = lag;
             command[i] += self.feedback(i, -speed, -behind, [S::one(); 2]);
         }
-        self.previous = Some(lag);
     }
 
     /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.
