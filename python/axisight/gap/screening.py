@@ -27,6 +27,8 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Evaluations between two starts of an effect.
 _SCANS = 10
+# Share of the loss that the first start of a candidate has to promise where others are dear.
+_LEAST_GAIN = 0.002
 # Share of the most that there is to explain in as many logs, where others stay the ones to screen on.
 _NEARLY = 0.8
 # Logs that the core runs in lock-step: fewer cost as much.
@@ -170,7 +172,9 @@ class Screen:
 
     def _best_start(self, option: FreeEffect, evidence: Linearized | None) -> Start:
         best = self._start(option, evidence)
-        if len(option.free) > 1:
+        # One that acts as it is costs a run of its own for every start.
+        hopeless = option.effect.acts and best.gain < _LEAST_GAIN * self.model.total
+        if len(option.free) > 1 and not hopeless:
             # Further starts, by what a step from there promises.
             begins = [option.at(values) for values in option.starts]
             others = self._evaluated(self._at_starts(option))

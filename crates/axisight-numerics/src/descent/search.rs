@@ -171,6 +171,7 @@ fn advance<D: Descent>(
     loop {
         let step = descent.step(damper.value)?;
         // A longer step has failed, and this one would not gain enough if it kept its promise.
+        // A longer step has failed, and this one would not gain enough if it kept its promise.
         if failures > 0 && step.is_some_and(|s| s.promise > 0.0 && s.promise < enough) {
             return Ok(Advance::Ended(at_end(descent, rules)?));
         }
