@@ -279,7 +279,8 @@ def _take_in(
         for r, _ in taken:
             new = r.trial.evidence.free[-1]
             free = [*kept_beside(free, new), new]
-        state.model = settled(fitter, free, state.model)
+        # From the simulator of the first: a gap may have bent the one without it.
+        state.model = settled(fitter, free, start)
     progress(label, 1, 1)
 
 
