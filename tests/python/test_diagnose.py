@@ -54,6 +54,7 @@ def test_scatter_alone_is_none():
         Effect("transmission_error", 1, {"cosine_rad": 3e-4, "sine_rad": 1e-4, "returned": 0.0}),
         Effect("gear_hysteresis", 1, {"share": 0.3, "deflection_rad": 3e-4}),
         Effect("torque_deadband", 1, {"width_nm": 0.4}),
+        Effect("piecewise_stiffness", 1, {"step": 0.8, "knee_rad": 3e-4}),
         Effect("extra_mode", 1, {"inertia_kg_m2": 100.0, "frequency_hz": 14.0, "damping": 0.04}),
         Effect("controller_gain", 1, {"relative_proportional": 0.3, "relative_integral": -0.2}),
         Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),

@@ -1,5 +1,7 @@
 """The diagnosis of a six-axis arm by inverse dynamics, friction missing from its simulator."""
 
+from dataclasses import replace
+
 import jsonschema
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from axisight.gap import verdict_schema
 from axisight.gap.cutoff import chosen_filtering, highest_cutoff_hz
 from axisight.gap.inverse import predicted_torque
 from axisight.gap.torques import AS_GIVEN
-from rigid_arm import COULOMB_NM, VISCOUS, arm, arm_toml, log_of
+from rigid_arm import COULOMB_NM, VISCOUS, arm, arm_toml, log_of, motion
 
 ROBOT = arm()
 QUICK = Settings(bootstrap=50)
@@ -123,6 +125,24 @@ def test_an_axis_whose_cause_does_not_carry_over_takes_nothing_from_the_others()
     assert [(c.effect, c.axis) for c in found.causes] == [("coulomb_friction", 2)]
     assert any("axis 5" in check and "does not carry over" in check for check in found.checks)
     assert found.axes[1].verdict == "explained" and found.axes[4].verdict == "unknown"
+
+
+def test_a_zero_of_a_joint_is_found_from_gravity():
+    # The machine's joint 3 stands 0.05 rad further than its encoder says.
+    offset = 0.05 * (np.arange(6) == 2)
+
+    def turned(seed):
+        log = log_of(ROBOT, seed, np.zeros(6), np.zeros(6), 20.0)
+        position, speed, acceleration = motion(seed, 20.0)
+        there = ROBOT.inverse_dynamics(position + offset, speed, acceleration)
+        change = there - ROBOT.inverse_dynamics(position, speed, acceleration)
+        return replace(log, torque_nm=log.torque_nm + change)
+
+    logs = [turned(seed) for seed in range(3)]
+    found = diagnose(robot=ROBOT, estimation=logs[:2], validation=logs[2:], settings=QUICK)
+    assert [(c.effect, c.axis) for c in found.causes] == [("joint_zero_offset", 3)]
+    value = found.causes[0].parameters["offset_rad"]
+    assert value.value == pytest.approx(0.05, rel=0.05)
 
 
 def test_a_tilted_base_is_one_cause_of_the_arm():

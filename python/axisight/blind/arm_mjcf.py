@@ -20,7 +20,8 @@ class Native:
     the constraint solver; ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
     to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
     ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
-    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed.
+    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
+    ``zero_rad``: angle of the joint where it counts zero.
     """
 
     half_width_rad: float = 0.0
@@ -34,6 +35,7 @@ class Native:
     kp: float = 0.0
     ki: float = 0.0
     filter_s: float = 0.0
+    zero_rad: float = 0.0
 
 
 NOTHING = Native()
@@ -110,7 +112,10 @@ def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> Non
     if joint.drive is None and joint.spring is not None:
         spring = f'stiffness="{joint.spring.stiffness!r}" damping="{joint.spring.damping!r}"'
     parts.bodies += f'<body pos="{_vector(joint.origin_m)}">'
-    parts.bodies += f'<joint name="{joint.name}" axis="{_vector(joint.axis)}" {spring}/>'
+    change = native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
+    # A position counts from where the bodies stand as they are written.
+    zero = f'ref="{-change.zero_rad!r}"' if change.zero_rad else ""
+    parts.bodies += f'<joint name="{joint.name}" axis="{_vector(joint.axis)}" {spring} {zero}/>'
     if joint.link is None:
         parts.bodies += _NEARLY_MASSLESS
     else:
@@ -120,7 +125,7 @@ def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> Non
         )
     parts.close += "</body>"
     if joint.drive is not None:
-        _add_drive(parts, joint, native.get(len(parts.axes), NOTHING))
+        _add_drive(parts, joint, change)
 
 
 def _add_drive(parts: _Parts, joint: Joint, change: Native) -> None:

@@ -142,6 +142,27 @@ class CubicSpring(Law):
 
 
 @dataclass
+class KneeSpring(Law):
+    """A gear with one stiffness up to some deflection and another beyond."""
+
+    more_nm_rad: float
+    knee_rad: float
+    half_step_s: float = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
+        self.half_step_s = 0.5 * step_s
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what is stiffer beyond the knee, in the middle of the step."""
+        rate = at.gear_ratio * at.motor_speed - at.joint_speed
+        deflection = at.deflection + self.half_step_s * rate
+        beyond = copysign(max(abs(deflection) - self.knee_rad, 0.0), deflection)
+        total = self.more_nm_rad * beyond
+        return -at.gear_ratio * total, total
+
+
+@dataclass
 class GearWave(Law):
     """A gear whose angle waves with the motor's, a Fourier series; power is conserved or not."""
 

@@ -98,6 +98,18 @@ def _cubic(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     return Drawn("nonlinear_stiffness", axis, {"cubic_nm_rad3": cubic}, laws=[law])
 
 
+def _knee(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    step, knee = _between(rng, 0.4, 1.2), _between(rng, 1e-4, 3e-4)
+    stiff = _stiffness(robot, axis)
+    law = laws.KneeSpring(step * stiff, knee)
+    return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
+
+
+def _zero(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    offset = _sign(rng) * _between(rng, 0.02, 0.1)
+    return Drawn("joint_zero_offset", axis, {"offset_rad": offset}, Native(zero_rad=offset))
+
+
 def _softer(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     share = _sign(rng) * _between(rng, 0.08, 0.25)
     return Drawn("joint_stiffness", axis, {"relative_change": share}, Native(spring=share))
@@ -303,6 +315,8 @@ KINDS: Mapping[str, Kind] = {
     "link_com": Kind(_link_com),
     "base_compliance": Kind(_rocking),
     "friction_warmup": Kind(_warmup),
+    "piecewise_stiffness": Kind(_knee),
+    "joint_zero_offset": Kind(_zero),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),

@@ -35,7 +35,7 @@ def article(name: str) -> str:
     link of the arm) is the machine's own value of it. Raises InputError for an unknown effect.
     """
     info = effect_info(name)
-    of_a_link = info.scope == "axis" and info.acts == "arm"
+    of_a_link = info.scope == "axis" and info.family == "load"
     if of_a_link or info.parameters[0].name.startswith("relative_"):
         return "the machine's"
     words = noun(name)

@@ -33,20 +33,22 @@ def one_for_several(
 ) -> tuple[Ranked, Standing] | None:
     """Return the first effect that does what several of its axis and family do; None without.
 
-    ``options``: the candidates, of which those that the model does not have are tried; ``floor``
+    ``options``: the candidates, which are tried in their place, as is each of the several; ``floor``
     (n_blocks,): loss of noise alone. It has fewer numbers, and may leave a little more.
     """
     for (axis, family), several in several_together(model).items():
         rest = [f for f in model.free if f not in several]
         count = sum(numbers(f) for f in several)
-        others = [
+        labels = {f.effect.label for f in several}
+        new = [
             o
             for o in options
-            if numbers(o) < count
-            and o.effect.axis == axis
+            if o.effect.axis == axis
             and effect_info(o.effect.name).family == family
-            and o.effect.label not in {f.effect.label for f in several}
+            and o.effect.label not in labels
         ]
+        # One of them may do it alone from where it is now, and could not from its start.
+        others = [o for o in (*new, *several) if numbers(o) < count]
         try:
             without = fitter.fit(rest, model, lazy=True)
         except InputError:

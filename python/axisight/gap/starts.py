@@ -180,6 +180,20 @@ def _slip(trial: Trial) -> FreeEffect:
     )
 
 
+# Where a gear's stiffness has its knee, as shares of the deflection.
+_KNEES = (0.1, 0.35, 1.2)
+
+
+def _knee(trial: Trial) -> FreeEffect:
+    """Begin at several deflections beyond which the gear is another spring."""
+    name, deflection = "knee_rad", _deflection_rad(trial)
+    starts = tuple({name: share * deflection} for share in _KNEES)
+    bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
+    begin = trial.effect({"step": 0.0, "within": 0.0, **starts[1]})
+    further = (starts[0], starts[2])
+    return FreeEffect(begin, ("step", "within", name), bounds=bounds, starts=further)
+
+
 def _axis_share(at: Situation, index: int) -> float:
     """Return the share of the residual error on an axis [1]."""
     logs = zip(*at.turning, strict=True)
@@ -377,5 +391,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "link_inertia": _link_share,
     "base_compliance": _rocking,
     "friction_warmup": _warming,
+    "piecewise_stiffness": _knee,
+    "joint_zero_offset": _neutral,
 }
 """By effect."""

@@ -296,6 +296,29 @@ fn little_promise_that_nothing_keeps_is_settled() {
     }
 }
 
+/// After a failure, a shorter step that would gain too little if it kept its promise is not tried.
+#[test]
+fn short_steps_that_promise_too_little_are_not_tried() {
+    let rules = Rules {
+        progress: Progress::Gained { always: false },
+        loss_tolerance: 0.1,
+        settled: 0.1,
+        step_tolerance: 0.0,
+        ..RULES[1]
+    };
+    // 1 + t^2 at 0.5 promises 0.25 (1 - (d / (1 + d))^2) at damping d: more than a tenth of the loss
+    // at 0.001, 0.008, 0.064 and 0.512, less at 4.1.
+    let start = [0.5];
+    let kinked = |t: &[f64]| {
+        let kink = if t[0] == 0.5 { 0.0 } else { 1.0 };
+        Some((vec![t[0], 1.0 + kink], vec![vec![1.0], vec![0.0]]))
+    };
+    let mut model = Model::new(kinked, &start);
+    let (outcome, theta) = run(&mut model, &wide(1), &rules, &start);
+    assert_eq!((outcome.status, theta[0]), (Status::Stalled, 0.5));
+    assert_eq!(model.trials, 4);
+}
+
 /// The second parameter does nothing; the first arrives.
 #[test]
 fn parameter_without_influence_stays() {

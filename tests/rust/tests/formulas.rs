@@ -86,6 +86,33 @@ fn a_gear_that_slips_follows_the_bouc_wen_model() {
 }
 
 #[test]
+fn a_gear_with_a_knee_has_two_stiffnesses() {
+    let (step, within, knee, k) = (0.6, -0.2, 3e-4, 1e5);
+    let kernel = build::<f64>("piecewise_stiffness", &[step, within, knee]).expect("in the table");
+    let torque = |loaded: f64| {
+        k * loaded
+            + kernel.gear_torque(&Spring {
+                loaded,
+                rate: 0.0,
+                stiffness: k,
+                internal: &[],
+            })
+    };
+    // Clear of the corners, rounded over a twentieth of the knee.
+    for (from, to, stiffness) in [
+        (-2.5e-4, 2.5e-4, k * (1.0 + within)),
+        (3.5e-4, 9e-4, k * (1.0 + within + step)),
+        (-9e-4, -3.5e-4, k * (1.0 + within + step)),
+    ] {
+        let slope = (torque(to) - torque(from)) / (to - from);
+        assert!((slope / stiffness - 1.0).abs() < 1e-12, "{from}");
+    }
+    // Beyond the corners the lines meet at the knee.
+    let meet = torque(9e-4) - k * (1.0 + within + step) * (9e-4 - knee);
+    assert!((meet / (k * (1.0 + within) * knee) - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn a_slipping_spring_that_the_stiffness_includes_shows_in_large_motions_only() {
     let (a, d, k) = (0.3, 2e-4, 1e5);
     let kernel = build("gear_hysteresis", &[a, d, 1.0]).expect("in the table");

@@ -8,7 +8,7 @@ use axisight_core::effects::{
     Acts, Arm, AxisTorque, BaseJoint, EffectInfo, Family, Joint, Kernel, Linear, Motor, Pair,
     PlantParameters, Scope, Spring,
 };
-use axisight_core::plant::Plant;
+use axisight_core::plant::{Plant, equilibrium};
 use axisight_core::robot::{Motion, Place, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
 use axisight_tests::{PRESET, Trace, effect, plant, relative, robot, sines, trace};
@@ -349,6 +349,27 @@ fn a_tilted_base_is_gravity_from_elsewhere() {
         run(&plant(&tilted, &[]), &tilted, RK4),
     );
     assert!(relative(&got.command, &want.command) < 1e-12);
+}
+
+/// A joint that counts its zero elsewhere, at rest: the arm is held as it is held where it stands.
+#[test]
+fn a_zero_offset_turns_the_arm_beyond() {
+    let mut here = robot(PRESET);
+    here.operating_point = vec![0.1, 0.3, -0.2];
+    for (axis, offset) in [(1, 0.07), (2, -0.04)] {
+        let mut there = here.clone();
+        there.operating_point[axis] += offset;
+        let moved = effect("joint_zero_offset", Some(axis), &[offset]);
+        let (got, want) = (
+            equilibrium(&plant::<f64>(&here, &[moved]), &here.operating_point).expect("rest"),
+            equilibrium(&plant::<f64>(&there, &[]), &there.operating_point).expect("rest"),
+        );
+        for (got, want) in got.motor_torque.iter().zip(&want.motor_torque) {
+            assert!((got - want).abs() < 1e-9, "axis {axis}: {got} {want}");
+        }
+        let plain = equilibrium(&plant::<f64>(&here, &[]), &here.operating_point).expect("rest");
+        assert!((plain.motor_torque[axis] - got.motor_torque[axis]).abs() > 1e-2);
+    }
 }
 
 /// Torques that hold: effects of the arm and between axes belong to the equilibrium.

@@ -102,6 +102,8 @@ effect_table!(
     link_inertia,
     base_compliance,
     friction_warmup,
+    piecewise_stiffness,
+    joint_zero_offset,
 );
 
 /// Description of effect `name`.

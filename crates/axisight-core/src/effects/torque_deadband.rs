@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::TorquePath,
     contains: &[],
     parts: &[],
-    usual: &[],
+    usual: &["torque_offset"],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,

@@ -75,7 +75,7 @@ pub enum Progress {
     /// What a step promises, before it is tried.
     Promised,
     /// What a step has gained, after it was accepted; not believed after failures, which make
-    /// steps short, unless `always`.
+    /// steps short, unless `always`. Nor is a step tried then that promises less than it has to gain.
     Gained {
         /// Believed after failures too.
         always: bool,
@@ -171,8 +171,8 @@ fn advance<D: Descent>(
     loop {
         let step = descent.step(damper.value)?;
         // A longer step has failed, and this one would not gain enough if it kept its promise.
-        // A longer step has failed, and this one would not gain enough if it kept its promise.
-        if failures > 0 && step.is_some_and(|s| s.promise > 0.0 && s.promise < enough) {
+        let little = step.is_some_and(|s| s.promise > 0.0 && s.promise < enough);
+        if failures > 0 && little && rules.progress != Progress::Promised {
             return Ok(Advance::Ended(at_end(descent, rules)?));
         }
         if let Some(step) = step

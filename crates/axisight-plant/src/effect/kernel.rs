@@ -1,6 +1,6 @@
 //! The points where an effect may act, and what it sees there.
 
-use crate::robot::{Body, Chain, Motion};
+use crate::robot::{Body, Chain, ChainJoint, Motion};
 use axisight_scalar::Scalar;
 
 /// State of one motor as its effects see it.
@@ -100,6 +100,8 @@ pub struct Arm<'a, S> {
 pub struct PlantParameters<'a, S> {
     /// Links, and gravity in the frame of the base.
     pub chain: &'a mut Chain<S>,
+    /// Joint of the chain that the axis drives; `None` for arm effects.
+    pub driven: Option<usize>,
     /// Joint of the chain that carries the link of the axis; `None` for arm effects or without mass.
     pub link: Option<usize>,
     /// Gear stiffness of the axis [Nm/rad]; `None` for arm effects or a rigid transmission.
@@ -111,6 +113,11 @@ pub struct PlantParameters<'a, S> {
 }
 
 impl<S: Scalar> PlantParameters<'_, S> {
+    /// The joint that the axis drives.
+    pub fn joint(&mut self) -> Option<&mut ChainJoint<S>> {
+        self.chain.joints.get_mut(self.driven?)
+    }
+
     /// The body that moves with the axis.
     pub fn body(&mut self) -> Option<&mut Body<S>> {
         self.chain.joints[self.link?].body.as_mut()

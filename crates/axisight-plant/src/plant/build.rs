@@ -146,6 +146,7 @@ impl<S: Scalar> Plant<S> {
     fn add_to_arm(&mut self, own: Own<S>) {
         own.kernel.prepare(&mut PlantParameters {
             chain: &mut self.chain,
+            driven: None,
             link: None,
             stiffness: None,
             damping: None,
@@ -172,6 +173,7 @@ impl<S: Scalar> Plant<S> {
                 motion: joint.motion,
                 origin: None,
                 axis: joint.axis,
+                zero: S::zero(),
                 body: joint.body,
             };
             self.chain.joints.insert(place, link);
@@ -205,6 +207,7 @@ impl<S: Scalar> Plant<S> {
         };
         own.kernel.prepare(&mut PlantParameters {
             chain: &mut self.chain,
+            driven: Some(axis.joint),
             link,
             stiffness,
             damping,

@@ -34,6 +34,8 @@ pub struct ChainJoint<S> {
     pub origin: Option<[f64; 3]>,
     /// Unit vector of the axis in the parent link's frame.
     pub axis: [f64; 3],
+    /// Angle [rad] or shift [m] that the joint has where it counts zero.
+    pub zero: S,
     /// Mass properties of the link; `None` is massless.
     pub body: Option<Body<S>>,
 }
@@ -48,6 +50,7 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
                 .any(|x| *x != 0.0)
                 .then_some(joint.origin),
             axis: joint.axis,
+            zero: S::zero(),
             body: joint.link.as_ref().map(Body::from),
         }
     }
@@ -93,6 +96,7 @@ impl<S: Scalar> Chain<S> {
             motion: j.motion,
             origin: j.origin,
             axis: j.axis,
+            zero: D::from_real(j.zero),
             body: j.body.as_ref().map(body),
         };
         Chain {
@@ -101,7 +105,8 @@ impl<S: Scalar> Chain<S> {
         }
     }
 
-    /// Whether gravity and all masses are those of `other` bit for bit, derivatives aside.
+    /// Whether gravity, zeros of joints and all masses are those of `other` bit for bit, derivatives
+    /// aside.
     pub fn same_masses(&self, other: &Chain<S::Real>) -> bool {
         let same =
             |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l).to_bits() == b.lane(l).to_bits());
@@ -114,7 +119,9 @@ impl<S: Scalar> Chain<S> {
             _ => false,
         };
         let joints = self.joints.iter().zip(&other.joints);
-        all(&self.gravity, &other.gravity) && joints.into_iter().all(|(a, b)| bodies(a, b))
+        let mut joints = joints.into_iter();
+        all(&self.gravity, &other.gravity)
+            && joints.all(|(a, b)| same(&a.zero, &b.zero) && bodies(a, b))
     }
 
     /// Number of joints.
@@ -134,7 +141,8 @@ impl<S: Scalar> Chain<S> {
         };
         let bodies = self.joints.iter().filter_map(|joint| joint.body.as_ref());
         let mut numbers = bodies.flat_map(|b| [b.mass].into_iter().chain(b.com).chain(b.inertia));
-        numbers.any(|x| depends(&x)) || self.gravity.iter().any(depends)
+        let mut zeros = self.joints.iter().map(|joint| &joint.zero);
+        numbers.any(|x| depends(&x)) || self.gravity.iter().any(depends) || zeros.any(depends)
     }
 
     /// Pose of every link frame at joint angles `q`.
@@ -152,11 +160,11 @@ impl<S: Scalar> Chain<S> {
             }
             match joint.motion {
                 Motion::Revolute => {
-                    let (s, c) = q.sin_cos();
+                    let (s, c) = (*q + joint.zero).sin_cos();
                     let turn = rotation(&joint.axis, s, c);
                     pose.rotation = pose.rotation.times(&turn);
                 }
-                Motion::Prismatic => pose.position += pose.axis.scale(*q),
+                Motion::Prismatic => pose.position += pose.axis.scale(*q + joint.zero),
             }
             out.push(pose);
         }

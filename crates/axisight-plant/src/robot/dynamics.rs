@@ -104,6 +104,7 @@ impl<S: Scalar> Moments<S> {
 struct Segment<S> {
     turn: Turn,
     origin: Option<[f64; 3]>,
+    zero: S,
     body: Option<Moments<S>>,
 }
 
@@ -112,6 +113,7 @@ impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
         Self {
             turn: Turn::new(joint.motion, joint.axis),
             origin: joint.origin,
+            zero: joint.zero,
             body: joint.body.as_ref().map(Moments::of),
         }
     }
@@ -432,8 +434,8 @@ impl<S: Scalar> Dynamics<S> {
 
     #[inline(never)]
     fn place_sized<const N: usize>(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
-        for (angle, q) in scratch.angles.iter_mut().zip(q) {
-            *angle = *q;
+        for ((angle, q), segment) in scratch.angles.iter_mut().zip(q).zip(&self.segments) {
+            *angle = *q + segment.zero;
         }
         if let Some(mut sized) = scratch.sized::<N>(self.len()) {
             self.sweep_out(&mut sized);

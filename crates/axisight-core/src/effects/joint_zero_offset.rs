@@ -1,0 +1,46 @@
+//! Zero of a joint angle other than the simulator's: the arm beyond stands turned.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "joint_zero_offset",
+    summary: "the zero of a joint is not where it is modelled: its encoder was mounted or set otherwise",
+    equation: "q + q_0 in M, c and g",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
+    scope: Scope::Axis,
+    acts: Acts::Arm,
+    family: Family::Arm,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    stands_for: None,
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
+    shown_by: &[Experiment::Poses],
+    parameters: &[ParameterInfo {
+        name: "offset_rad",
+        unit: "rad (joint side)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -1.6,
+        upper: 1.6,
+        typical: 0.02,
+    }],
+};
+
+struct Zero<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Zero(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Zero<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(joint) = plant.joint() {
+            joint.zero += self.0;
+        }
+    }
+}
