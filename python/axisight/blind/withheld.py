@@ -98,11 +98,11 @@ def _cubic(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     return Drawn("nonlinear_stiffness", axis, {"cubic_nm_rad3": cubic}, laws=[law])
 
 
-def _knee(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    step, knee = _between(rng, 0.4, 1.2), _between(rng, 1e-4, 3e-4)
-    stiff = _stiffness(robot, axis)
-    law = laws.KneeSpring(step * stiff, knee)
-    return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
+def _knee(rng: Rng, robot: Robot, _axis: int) -> Drawn:
+    step, knee = _between(rng, 0.4, 1.2), _between(rng, 3e-4, 1e-3)
+    # Where the gear carries weight it stays beyond its knee, and is another spring altogether.
+    law = laws.KneeSpring(step * _stiffness(robot, 1), knee)
+    return Drawn("piecewise_stiffness", 1, {"step": step, "knee_rad": knee}, laws=[law])
 
 
 def _zero(rng: Rng, _robot: Robot, axis: int) -> Drawn:

@@ -18,6 +18,7 @@ from axisight.cli.common import From, To, bars
 from axisight.cli.common import errors as _errors
 from axisight.cli.demo import write_demo_case
 from axisight.cli.excite import excite_command
+from axisight.cli.fleet import run_fleet
 from axisight.cli.identify import identify_app
 from axisight.cli.montecarlo import montecarlo_command
 from axisight.cli.reproduce import reproduce_command
@@ -74,8 +75,8 @@ def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
 @app.command("diagnose")
 def diagnose_command(
     case_or_logs: Annotated[
-        list[Path], typer.Argument(help="A case folder, or logs to fit and choose on.")
-    ],
+        list[Path] | None, typer.Argument(help="A case folder, or logs to fit and choose on.")
+    ] = None,
     model: Annotated[
         str | None, typer.Option(help="Simulator: robot.toml or a preset. A case brings its own.")
     ] = None,
@@ -109,9 +110,28 @@ def diagnose_command(
     effect: GivenEffects = None,
     start_s: From = 0.0,
     stop_s: To = None,
+    fleet: Annotated[
+        Path | None,
+        typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a fleet's verdicts, table and page.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes of a fleet here. Default: all processors.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler whose workers diagnose a fleet.")
+    ] = None,
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
+    if fleet is not None:
+        settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
+        run_fleet(fleet, out, settings, workers, scheduler)
+        return
     with _errors():
+        if not case_or_logs:
+            raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)

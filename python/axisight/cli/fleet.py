@@ -1,0 +1,52 @@
+"""``axisight diagnose --fleet``: many robots or many days."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rich.table import Table
+
+from axisight.cli.common import OUT, bars, errors
+from axisight.errors import InputError
+from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_fleet, trends
+from axisight.gap import Settings
+from axisight.storage import write_bytes, write_whole
+
+
+def run_fleet(
+    folder: Path, out: Path | None, settings: Settings, workers: int | None, scheduler: str | None
+) -> None:
+    """Diagnose a fleet into ``out``: verdicts, ``fleet.parquet`` and ``fleet.html``."""
+    with errors("stopped; finished verdicts stay, run again to go on"), bars() as progress:
+        if out is None:
+            raise InputError("--out: expected a folder for the verdicts of a fleet")
+        verdicts = diagnose_fleet(
+            folder,
+            out / "verdicts",
+            settings,
+            workers=workers or os.cpu_count() or 1,
+            scheduler=scheduler,
+            progress=progress,
+        )
+        table = fleet_table(fleet_cases(folder), verdicts)
+        series = trends(table)
+        write_bytes(out / "fleet.parquet", table.to_parquet(index=False))
+        write_whole(out / "fleet.html", render_fleet(folder.resolve().name, table, series))
+    shown = Table("case", "verdict", "causes")
+    for name, verdict in verdicts.items():
+        causes = [_label(c["effect"], c["axis"]) for c in verdict.get("causes", ())]
+        shown.add_row(name, verdict.get("verdict", verdict.get("error")), ", ".join(causes))
+    OUT.print(shown)
+    for t in series:
+        if t.changes:
+            way = "grows" if t.per_case > 0 else "shrinks"
+            label = t.effect if t.axis is None else f"{t.effect}@{t.axis}"
+            OUT.print(
+                f"{t.machine or folder.name}: {label} {way}, {t.per_case:.3g} {t.unit} a case"
+            )
+    OUT.print(f"table: {out / 'fleet.parquet'}; page: {out / 'fleet.html'}", soft_wrap=True)
+
+
+def _label(effect: str, axis: int | None) -> str:
+    return effect if axis is None else f"{effect}@{axis}"

@@ -1,0 +1,17 @@
+"""Many robots, many days: every case of a folder diagnosed, in one table and on one page."""
+
+from axisight.fleet.cases import FleetCase, fleet_cases
+from axisight.fleet.page import render_fleet
+from axisight.fleet.solve import diagnose_fleet
+from axisight.fleet.table import fleet_table
+from axisight.fleet.trends import Trend, trends
+
+__all__ = [
+    "FleetCase",
+    "Trend",
+    "diagnose_fleet",
+    "fleet_cases",
+    "fleet_table",
+    "render_fleet",
+    "trends",
+]

@@ -1,0 +1,51 @@
+"""Cases of a folder, and what a diagnosis of one depends on."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from axisight.errors import InputError
+
+
+@dataclass(frozen=True)
+class FleetCase:
+    """One case (`axisight.case/1`) of a fleet.
+
+    ``name``: its folder below the fleet's, with slashes; ``machine``: the folder that is in, which
+    cases of one machine share (empty for the fleet's own). Names in order are the order in time.
+    """
+
+    name: str
+    machine: str
+    path: Path
+
+    def files(self) -> dict[str, bytes]:
+        """Return every file of the case by its name with slashes."""
+        paths = (p for p in sorted(self.path.rglob("*")) if p.is_file())
+        return {p.relative_to(self.path).as_posix(): p.read_bytes() for p in paths}
+
+
+def fleet_cases(folder: Path) -> list[FleetCase]:
+    """Return the cases anywhere below a folder, by name.
+
+    Raises InputError where there is none.
+    """
+    paths = sorted(p.parent for p in folder.rglob("case.toml"))
+    if not paths:
+        raise InputError(f"{folder}: expected folders with a case.toml, got none")
+    names = [p.relative_to(folder) for p in paths]
+    return [
+        FleetCase(n.as_posix(), n.parent.as_posix() if len(n.parts) > 1 else "", p)
+        for n, p in zip(names, paths, strict=True)
+    ]
+
+
+def fingerprint(files: dict[str, bytes], also: str) -> str:
+    """Return a digest of the files of a case and of what else its verdict depends on."""
+    digest = hashlib.sha256(also.encode())
+    for name, data in files.items():
+        digest.update(f"{name}\0{len(data)}\0".encode())
+        digest.update(data)
+    return digest.hexdigest()

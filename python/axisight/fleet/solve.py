@@ -1,0 +1,122 @@
+"""Diagnoses of a fleet: here or on a Dask cluster, resumable, the same bits wherever they ran."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, replace
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from axisight.cluster import on_cluster
+from axisight.errors import AxisightError
+from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
+from axisight.gap import Settings, diagnose
+from axisight.storage import write_whole
+
+Progress = Callable[[str, int, int], None]
+
+_LABEL = "diagnosing cases"
+
+
+def diagnose_fleet(
+    folder: Path,
+    verdicts: Path,
+    settings: Settings,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    patience_s: float = 60.0,
+    progress: Progress = lambda _label, _done, _total: None,
+) -> dict[str, dict[str, Any]]:
+    """Diagnose every case below ``folder``; return the verdicts by name, in their order.
+
+    A verdict goes to ``verdicts`` / name + ``.json`` as soon as it is there, and stays where the
+    case, the settings and the version of this package are what they were. A case that cannot be
+    diagnosed has ``error``, the reason, in place of a verdict. ``workers``: processes here;
+    ``scheduler``: address of a Dask scheduler whose workers do it instead, which are sent the
+    files. A verdict does not depend on where it was made: every diagnosis has one thread.
+
+    Raises InputError for a folder without cases, BackendError where a scheduler or all of its
+    workers are gone for ``patience_s`` seconds; what is finished stays.
+    """
+    one = replace(settings, threads=1)
+    also = json.dumps([version("axisight"), asdict(one)], sort_keys=True, default=str)
+    cases = fleet_cases(folder)
+    found: dict[str, dict[str, Any]] = {}
+    todo = []
+    for case in cases:
+        known = _known(_path(verdicts, case), fingerprint(case.files(), also))
+        if known is None:
+            todo.append(case)
+        else:
+            found[case.name] = known
+    progress(_LABEL, len(found), len(cases))
+    if todo:
+        made = (
+            _here(todo, one, workers)
+            if scheduler is None
+            else on_cluster(
+                todo, lambda c: (verdict_of, c.name, c.files(), one), scheduler, patience_s
+            )
+        )
+        for case, text in made:
+            found[case.name] = verdict = json.loads(text)
+            verdict["fingerprint"] = fingerprint(case.files(), also)
+            write_whole(_path(verdicts, case), json.dumps(verdict, indent=2) + "\n")
+            progress(_LABEL, len(found), len(cases))
+    return {case.name: found[case.name] for case in cases}
+
+
+def verdict_of(name: str, files: dict[str, bytes], settings: Settings) -> str:
+    """Return the verdict (JSON) of a case given by its files; ``error`` says why there is none."""
+    with tempfile.TemporaryDirectory() as folder:
+        for relative, data in files.items():
+            path = Path(folder, relative)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        try:
+            found = diagnose(Path(folder), settings=settings)
+        except AxisightError as error:
+            reason = str(error).replace(f"{folder}/", "")
+            return json.dumps({"schema": "axisight.verdict/1", "name": name, "error": reason})
+        out = found.to_verdict()
+    # How long it took is no part of what was found.
+    out["provenance"].pop("seconds", None)
+    return json.dumps(out, allow_nan=False)
+
+
+def _path(verdicts: Path, case: FleetCase) -> Path:
+    return verdicts / f"{case.name}.json"
+
+
+def _known(path: Path, wanted: str) -> dict[str, Any] | None:
+    """Return the verdict in a file if it is that of the fingerprint."""
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    same = isinstance(found, dict) and found.get("fingerprint") == wanted
+    return found if same else None
+
+
+def _here(
+    cases: Sequence[FleetCase], settings: Settings, workers: int
+) -> Iterator[tuple[FleetCase, str]]:
+    """Yield every case with its verdict as it is done, by processes of this machine."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        try:
+            jobs = {pool.submit(_of_path, case, settings): case for case in cases}
+            for job in as_completed(jobs):
+                yield jobs[job], job.result()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _of_path(case: FleetCase, settings: Settings) -> str:
+    return verdict_of(case.name, case.files(), settings)

@@ -1,0 +1,88 @@
+"""Causes that grow: the size of a cause over the cases of one machine, in their order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# With fewer cases no order of sizes is rare: all five rise by chance once in sixty.
+_FEWEST = 5
+# Of all series together (Bonferroni).
+_FALSE_ALARMS = 0.05
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A cause of a machine over its cases: ``sizes`` (n_cases,) by case, zero where it is no cause.
+
+    ``axis`` from 1, None for the arm. ``per_case``: the median slope from one case to the next
+    (Theil, Sen), with its interval at 95 % from ``low`` to ``high``; ``p_value``: of Kendall's rank
+    correlation with time; ``changes``: whether that is small for so many series.
+    """
+
+    machine: str
+    effect: str
+    axis: int | None
+    parameter: str
+    unit: str
+    cases: tuple[str, ...]
+    sizes: Array
+    per_case: float
+    low: float
+    high: float
+    p_value: float
+    changes: bool
+
+
+def trends(table: pd.DataFrame) -> list[Trend]:
+    """Return the causes of a fleet's table over the cases of each machine, the surest first.
+
+    Only of machines with five cases that have a verdict, and more. A size is the absolute value of
+    the cause's first parameter; the case names give the order in time.
+    """
+    found = [t for _, own in table.groupby("machine", sort=True) for t in _of_machine(own)]
+    level = _FALSE_ALARMS / max(len(found), 1)
+    sure = [Trend(**{**vars(t), "changes": t.p_value < level}) for t in found]
+    return sorted(sure, key=lambda t: (t.p_value, t.machine, t.effect, t.axis or 0))
+
+
+def _of_machine(own: pd.DataFrame) -> list[Trend]:
+    judged = own[own["verdict"] != "error"]
+    cases = tuple(sorted(judged["case"].unique()))
+    if len(cases) < _FEWEST:
+        return []
+    causes = judged.dropna(subset=["effect"])
+    keys = causes.groupby(["effect", "axis", "parameter", "unit"], dropna=False, sort=True)
+    return [_trend(str(own["machine"].iloc[0]), key, rows, cases) for key, rows in keys]
+
+
+def _trend(
+    machine: str, key: tuple[object, ...], rows: pd.DataFrame, cases: tuple[str, ...]
+) -> Trend:
+    effect, axis, parameter, unit = key
+    by_case = rows.set_index("case")["value"].abs()
+    sizes = np.array([float(by_case.get(case, 0.0)) for case in cases])
+    time = np.arange(len(cases), dtype=np.float64)
+    slope = scipy.stats.theilslopes(sizes, time)
+    rank = scipy.stats.kendalltau(time, sizes)
+    return Trend(
+        machine=machine,
+        effect=str(effect),
+        axis=None if pd.isna(axis) else int(str(axis)),  # type: ignore[call-overload]
+        parameter=str(parameter),
+        unit=str(unit),
+        cases=cases,
+        sizes=sizes,
+        per_case=float(slope.slope),
+        low=float(slope.low_slope),
+        high=float(slope.high_slope),
+        # Sizes that are all the same have no rank.
+        p_value=float(np.nan_to_num(rank.pvalue, nan=1.0)),
+        changes=False,
+    )
