@@ -55,10 +55,14 @@ def detection_limits(found: Search, view: View) -> tuple[DetectionLimit, ...]:
 
 def _not_tried(found: Search, view: View) -> dict[str, Sensitivity]:
     """Return the sensitivities of candidates on axes where nothing was to be explained."""
+    tried = {s.option.effect.axis for s in found.sensitivities.values()}
+    axes = [axis for axis in view.robot.axis_numbers() if axis not in tried]
+    if not axes:
+        return {}
     known = {*found.sensitivities, *(e.label for e in found.model.effects)}
     options = [
         o
-        for o in view.candidates(found.model, everywhere=True)
+        for o in view.candidates(found.model, axes=axes)
         if o.effect.label not in known and not o.effect.acts
     ]
     bench = Bench(view.fitter, found.model)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -64,9 +65,13 @@ class Bench:
 
     def __init__(self, fitter: ModelFitter, model: Evidence) -> None:
         self.fitter, self.model = fitter, model
-        self.near = fitter.runs(model)
         self.near_nominal: Courses | None = None
         self.skipped: dict[str, str] = {}
+
+    @cached_property
+    def near(self) -> Courses | None:
+        """Runs of the model."""
+        return self.fitter.runs(self.model)
 
     def begin_nominal(self) -> None:
         """Get ready for candidates that begin at the nominal values of the simulator's own parameters."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,19 +40,24 @@ class View(ABC):
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs settle by themselves: no candidates."""
 
-    def candidates(self, model: Evidence, *, everywhere: bool = False) -> list[FreeEffect]:
+    def candidates(
+        self, model: Evidence, *, axes: Collection[int] | None = None
+    ) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model.
 
-        On the axes where it leaves something worth a cause, or ``everywhere``.
+        On ``axes`` (from 1), by default those where it leaves something worth a cause.
         """
         enough = self.floor.expected + self.settings.smallest_gain
+        if axes is not None:
+            # A square is more than less than nothing, and less than infinity.
+            enough = np.where(np.isin(self.robot.axis_numbers(), list(axes)), -1.0, np.inf)
         at = situation(
             self.robot,
             self.logs,
             model,
             self.fitter.weighting.decimation,
             self._weighted_response,
-            np.full_like(enough, -1.0) if everywhere else enough,
+            enough,
         )
         found = all_candidates(
             self.robot,
