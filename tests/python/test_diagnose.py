@@ -58,6 +58,7 @@ def test_scatter_alone_is_none():
         Effect("extra_mode", 1, {"inertia_kg_m2": 100.0, "frequency_hz": 14.0, "damping": 0.04}),
         Effect("controller_gain", 1, {"relative_proportional": 0.3, "relative_integral": -0.2}),
         Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
+        Effect("torque_sensor_gain", 1, {"relative_error": 0.08}),
     ],
     ids=lambda e: e.name,
 )

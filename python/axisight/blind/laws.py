@@ -240,6 +240,17 @@ class Delay(Law):
 
 
 @dataclass
+class Reported(Law):
+    """A drive that reports a share of its torque."""
+
+    share: float
+
+    def reported(self, torque: float) -> float:
+        """Return what it says."""
+        return self.share * torque
+
+
+@dataclass
 class Limit(Law):
     """A drive that gives no more, and reports what it gives."""
 

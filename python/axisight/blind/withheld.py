@@ -99,7 +99,7 @@ def _cubic(rng: Rng, _robot: Robot, axis: int) -> Drawn:
 
 
 def _knee(rng: Rng, robot: Robot, _axis: int) -> Drawn:
-    step, knee = _between(rng, 0.4, 1.2), _between(rng, 3e-4, 1e-3)
+    step, knee = _between(rng, 0.4, 1.2), _between(rng, 1e-4, 5e-4)
     # Where the gear carries weight it stays beyond its knee, and is another spring altogether.
     law = laws.KneeSpring(step * _stiffness(robot, 1), knee)
     return Drawn("piecewise_stiffness", 1, {"step": step, "knee_rad": knee}, laws=[law])
@@ -177,6 +177,12 @@ def _lag(rng: Rng, robot: Robot, axis: int) -> Drawn:
 def _constant(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     share = _sign(rng) * _between(rng, 0.03, 0.1)
     return Drawn("torque_constant", axis, {"relative_error": share}, Native(gear=share))
+
+
+def _reported(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    share = _sign(rng) * _between(rng, 0.03, 0.1)
+    law = laws.Reported(1 + share)
+    return Drawn("torque_sensor_gain", axis, {"relative_error": share}, laws=[law])
 
 
 def _offset(rng: Rng, _robot: Robot, axis: int) -> Drawn:
@@ -317,6 +323,7 @@ KINDS: Mapping[str, Kind] = {
     "friction_warmup": Kind(_warmup),
     "piecewise_stiffness": Kind(_knee),
     "joint_zero_offset": Kind(_zero),
+    "torque_sensor_gain": Kind(_reported),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),

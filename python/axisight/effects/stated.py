@@ -91,5 +91,11 @@ OTHER_GAINS = ("controller_gain", ("relative_proportional", "relative_integral")
 SPEED_FILTER = ("velocity_filter", "time_constant_s")
 """What a filter on the controller's speed is, and its parameter."""
 
+TORQUE_CONSTANT = ("torque_constant", "relative_error")
+"""What a motor with another torque constant is, and its parameter."""
+
+TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
+"""What a torque that is reported too large or too small is, and its parameter."""
+
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""

@@ -393,5 +393,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "friction_warmup": _warming,
     "piecewise_stiffness": _knee,
     "joint_zero_offset": _neutral,
+    "torque_sensor_gain": _shown_by_logs,
 }
 """By effect."""

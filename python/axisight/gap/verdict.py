@@ -12,24 +12,13 @@ from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
 from axisight.gap.intervals import intervals
 from axisight.gap.model import Evidence
+from axisight.gap.named import NamedCause
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
-
-
-@dataclass(frozen=True)
-class NamedCause:
-    """A cause before its effect on the validation logs is measured."""
-
-    effect: str
-    axis: int | None
-    probability: float
-    parameters: dict[str, Interval]
-    units: dict[str, str]
-    family: str
-    family_probability: float
+from axisight.gap.torque_sensor import with_torque_sensors
 
 
 @dataclass(frozen=True)
@@ -91,7 +80,10 @@ def conclude(
         verdict = "undecidable" if open_groups else "explained"
     believed = verdict in ("explained", "undecidable") or found.by_axis
     searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
-    causes = (*map(_shown, shown), *searched) if believed else ()
+    causes, effects = with_torque_sensors(
+        (*map(_shown, shown), *searched) if believed else (),
+        (*(x.effect for x in shown), *found.model.effects) if believed else (),
+    )
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
@@ -107,7 +99,7 @@ def conclude(
         p_unknown=p_unknown,
         axes=_axes(found, settings, causes, gap=gap),
         checks=(*(x.says for x in shown), *_checks(found, settings, explained)),
-        effects=(*(x.effect for x in shown), *found.model.effects) if believed else (),
+        effects=effects,
     )
 
 

@@ -281,10 +281,9 @@ fn courses_that_end_too_early_are_refused() {
     let Err(ProblemError::Failed(text)) = error else {
         panic!("{error:?}")
     };
-    assert!(
-        text.starts_with("course: expected at least 500 samples"),
-        "{text}"
-    );
+    // Of the logs in one batch or in the other, whichever is found first.
+    assert!(text.starts_with("course: expected at least "), "{text}");
+    assert!(text.contains("got 200 samples"), "{text}");
 }
 
 /// Courses of another arm, of more logs, or of a method without fixed steps serve nothing: the

@@ -372,6 +372,23 @@ fn a_zero_offset_turns_the_arm_beyond() {
     }
 }
 
+/// A drive that reports a share of its torque moves the machine as any other does.
+#[test]
+fn a_reported_share_changes_the_report_alone() {
+    let robot = robot(PRESET);
+    let share = effect("torque_sensor_gain", Some(1), &[0.08]);
+    let (got, want) = (
+        run(&plant(&robot, &[share]), &robot, RK4),
+        run(&plant(&robot, &[]), &robot, RK4),
+    );
+    assert_eq!(got.measured, want.measured);
+    let n = robot.n_axes();
+    for (i, (got, want)) in got.command.iter().zip(&want.command).enumerate() {
+        let factor = if i % n == 1 { 1.08 } else { 1.0 };
+        assert!((got - factor * want).abs() <= 1e-15 * want.abs(), "{i}");
+    }
+}
+
 /// Torques that hold: effects of the arm and between axes belong to the equilibrium.
 #[test]
 fn rest_is_rest_with_effects_at_every_point() {

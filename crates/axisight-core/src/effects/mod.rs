@@ -104,6 +104,7 @@ effect_table!(
     friction_warmup,
     piecewise_stiffness,
     joint_zero_offset,
+    torque_sensor_gain,
 );
 
 /// Description of effect `name`.

@@ -248,6 +248,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
         None
     }
 
+    /// Share of the commanded torque that the drive reports [1].
+    fn reported_share(&self) -> Option<S> {
+        None
+    }
     /// Error added to the measured motor position [rad].
     fn sensor(&self, _angle: S) -> S {
         S::zero()

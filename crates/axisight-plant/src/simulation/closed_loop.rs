@@ -56,7 +56,7 @@ pub struct Run<'a> {
 pub struct Sample<'a, S> {
     /// Sample number.
     pub index: usize,
-    /// Commanded motor torque [Nm].
+    /// Commanded motor torque as the drive reports it [Nm].
     pub command: &'a [S],
     /// Measured motor position [rad].
     pub measured: &'a [S],
@@ -165,7 +165,7 @@ pub fn simulate<S: Scalar>(
         .zip(&rest.motor_torque)
         .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
         .collect();
-    let mut signals = Signals::new(n_axes);
+    let mut signals = Signals::of(plant);
     let mut buffers = TorqueBuffers::new(n_axes);
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
@@ -214,6 +214,10 @@ pub struct Signals<S> {
     pub torque_disturbance: Vec<S>,
     /// Error of the measured positions, noise included [rad].
     pub position_disturbance: Vec<S>,
+    /// Share of each command that the drive reports, and what it reports [Nm]; empty where all
+    /// report what they are told.
+    reported_share: Vec<S>,
+    reported: Vec<S>,
 }
 
 impl<S: Scalar> Signals<S> {
@@ -226,7 +230,31 @@ impl<S: Scalar> Signals<S> {
             reference: zeros.clone(),
             torque_disturbance: zeros.clone(),
             position_disturbance: zeros,
+            reported_share: Vec::new(),
+            reported: Vec::new(),
         }
+    }
+
+    /// All zero, with what the drives of a plant report.
+    fn of(plant: &Plant<S>) -> Self {
+        let n_axes = plant.axes.len();
+        let mut signals = Self::new(n_axes);
+        let share = |i: usize| {
+            let shares = plant.axes[i]
+                .kernels
+                .iter()
+                .filter_map(|k| k.reported_share());
+            shares.fold(None, |all: Option<S>, one| {
+                Some(all.map_or(one, |a| a * one))
+            })
+        };
+        let shares: Vec<_> = (0..n_axes).map(share).collect();
+        if shares.iter().any(Option::is_some) {
+            let known = shares.into_iter().map(|s| s.unwrap_or_else(S::one));
+            signals.reported_share = known.collect();
+            signals.reported = vec![S::zero(); n_axes];
+        }
+        signals
     }
 
     fn measure(&mut self, plant: &Plant<S>, run: &Run<'_>, k: usize, x: &[S]) {
@@ -262,13 +290,13 @@ impl<S: Scalar> Signals<S> {
         match run.drive {
             Drive::Torque(torque) => {
                 for i in 0..n {
-                    self.command[i] = lane_value(torque, k, i, n);
+                    self.command[i] = self.commanded(lane_value(torque, k, i, n), i);
                 }
             }
             Drive::Tracking { torque, position } => {
                 for i in 0..n {
                     self.reference[i] = lane_value(position, k, i, n);
-                    self.command[i] = lane_value(torque, k, i, n);
+                    self.command[i] = self.commanded(lane_value(torque, k, i, n), i);
                 }
                 controller.follow(&self.measured, &self.reference, &mut self.command);
             }
@@ -278,6 +306,18 @@ impl<S: Scalar> Signals<S> {
                 }
                 controller.command(&self.measured, &self.reference, &mut self.command);
             }
+        }
+        for (i, share) in self.reported_share.iter().enumerate() {
+            self.reported[i] = self.command[i] * *share;
+        }
+    }
+
+    /// The command of an axis whose drive reports `torque`.
+    #[inline(always)]
+    fn commanded(&self, torque: S, axis: usize) -> S {
+        match self.reported_share.get(axis) {
+            Some(share) => torque / *share,
+            None => torque,
         }
     }
 
@@ -290,7 +330,11 @@ impl<S: Scalar> Signals<S> {
     pub fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
         Sample {
             index,
-            command: &self.command,
+            command: if self.reported.is_empty() {
+                &self.command
+            } else {
+                &self.reported
+            },
             measured: &self.measured,
             torque_disturbance: &self.torque_disturbance,
             position_disturbance: &self.position_disturbance,

@@ -1,0 +1,60 @@
+"""A torque that is reported too large: what looks like two causes and is one.
+
+Where a drive reports a constant share of its torque, the logs show both gains of the controller off by
+that share, and the machine a torque constant off by its inverse. Three numbers that agree are no chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.effects import Effect, effect_info
+from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
+from axisight.gap.named import NamedCause
+
+# The gains agree to this share, and the torque constant with their inverse to that.
+_SAME_GAINS = 0.008
+_INVERSE = 0.02
+
+
+def with_torque_sensors(
+    causes: Sequence[NamedCause], effects: Sequence[Effect]
+) -> tuple[tuple[NamedCause, ...], tuple[Effect, ...]]:
+    """Return causes and effects with one in the place of each such pair."""
+    kept, acting = list(causes), list(effects)
+    for gains in [c for c in causes if c.effect == OTHER_GAINS[0]]:
+        constant = next(
+            (c for c in kept if c.effect == TORQUE_CONSTANT[0] and c.axis == gains.axis), None
+        )
+        if constant is None or not _agree(gains, constant):
+            continue
+        one = _sensor(gains, constant)
+        gone = {(gains.effect, gains.axis), (constant.effect, constant.axis)}
+        kept = [one, *(c for c in kept if (c.effect, c.axis) not in gone)]
+        value = {TORQUE_SENSOR[1]: one.parameters[TORQUE_SENSOR[1]].value}
+        acting = [e for e in acting if (e.name, e.axis) not in gone]
+        acting = [Effect(TORQUE_SENSOR[0], gains.axis, value), *acting]
+    return tuple(kept), tuple(acting)
+
+
+def _agree(gains: NamedCause, constant: NamedCause) -> bool:
+    """Whether both gains are off by one share, and the torque constant by its inverse."""
+    proportional, integral = (gains.parameters[name] for name in OTHER_GAINS[1])
+    error = constant.parameters[TORQUE_CONSTANT[1]]
+    doubt = max(_INVERSE, error.high - error.value)
+    same = abs(proportional.value - integral.value) < _SAME_GAINS
+    return same and abs((1 + error.value) * (1 + proportional.value) - 1) < doubt
+
+
+def _sensor(gains: NamedCause, constant: NamedCause) -> NamedCause:
+    info = effect_info(TORQUE_SENSOR[0])
+    sure = min(gains.probability, constant.probability)
+    return NamedCause(
+        info.name,
+        gains.axis,
+        sure,
+        {TORQUE_SENSOR[1]: gains.parameters[OTHER_GAINS[1][0]]},
+        {p.name: p.unit for p in info.parameters},
+        info.family,
+        sure,
+    )
