@@ -72,6 +72,29 @@ def test_linear_gain_takes_the_simulator_no_further_than_its_bounds(regression):
     assert gained < 0.99 * (aims @ aims - ((rows @ free - aims) ** 2).sum())
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_linear_step_is_the_least_within_bounds(seed: int):
+    # Parameters that look alike: the first step takes several beyond their bounds, some of which
+    # belong inside once the others are held.
+    rng = np.random.default_rng(seed)
+    n = 6
+    x = rng.normal(size=(400, n)) @ (0.3 * np.eye(n) + rng.normal(size=(n, n)) * 0.5)
+    y = x @ rng.normal(scale=6.0, size=n) + rng.normal(size=400)
+    evidence = replace(
+        linear_evidence(x, y, np.repeat([0, 1], 200)),
+        parameters=tuple((None, f"p{i}") for i in range(n)),
+        gradient=np.stack([-(x[k : k + 20].T @ y[k : k + 20]) for k in range(0, 400, 20)]),
+        loss=np.array([y[k : k + 20] @ y[k : k + 20] for k in range(0, 400, 20)]),
+        prior_matrix=np.eye(n),
+        prior_gradient=np.zeros(n),
+    )
+    rows, aims = np.vstack([x, np.eye(n)]), np.concatenate([y, np.zeros(n)])
+    best = scipy.optimize.lsq_linear(rows, aims, bounds=(-4.0, 4.0), method="bvls")
+    assert np.any(np.abs(best.x) > 3.999)
+    gained = aims @ aims - 2 * best.cost
+    np.testing.assert_allclose(linear_gain(evidence), gained, rtol=1e-6)
+
+
 # The size of an effect is judged in test_gap_amplitude.py.
 NO_EFFECT = linear_evidence(np.ones((800, 1)), np.zeros(800), np.zeros(800, int))
 

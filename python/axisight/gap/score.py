@@ -92,18 +92,37 @@ def linear_step(evidence: Linearized) -> Array:
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
     # An amplitude may start on its bound; a parameter of the simulator there is held.
     held = np.array([n in evidence.at_bound and n[0] is None for n in evidence.parameters])
-    free = (np.diag(matrix) > 0) & ~held
-    least, most = _room(evidence)
+    movable = (np.diag(matrix) > 0) & ~held
+    free, (least, most) = movable.copy(), _room(evidence)
     step = np.zeros(len(gradient))
-    # Every pass holds at least one more parameter, where it met its bound.
-    for _ in range(len(gradient)):
+    # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the
+    # strongest pull first, where the slope leads back from it.
+    for _ in range(3 * len(gradient)):
         step[free] = _newton_step(matrix, gradient + matrix @ np.where(free, 0.0, step), free)
         beyond = free & ((step < least) | (step > most))
-        if not beyond.any():
+        if beyond.any():
+            step[beyond] = np.clip(step, least, most)[beyond]
+            free &= ~beyond
+            continue
+        back = _pull_back(matrix, gradient, step, least, most)
+        back[~movable | free] = 0.0
+        if not np.any(back > _SLIGHT):
             break
-        step[beyond] = np.clip(step, least, most)[beyond]
-        free &= ~beyond
+        free[np.argmax(back)] = True
     return step
+
+
+# Of the curvature times the room of a parameter: a slope that this small leads nowhere.
+_SLIGHT = 1e-6
+
+
+def _pull_back(matrix: Array, gradient: Array, step: Array, least: Array, most: Array) -> Array:
+    """Return how hard the slope at a step pulls each parameter off its bound (n_parameters,) [1]."""
+    slope = gradient + matrix @ step
+    room = np.where(np.isfinite(most - least), most - least, 1.0)
+    size = np.maximum(np.diag(matrix) * np.maximum(room, 1e-300), 1e-300)
+    at_least, at_most = step <= least, step >= most
+    return np.asarray(np.where(at_least, -slope, 0.0) / size + np.where(at_most, slope, 0.0) / size)
 
 
 def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Array:
