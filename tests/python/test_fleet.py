@@ -147,8 +147,15 @@ def test_the_command_writes_table_and_page(fleet, tmp_path, verdicts):
     assert (out / "fleet.html").is_file()
     verdict = json.loads((out / "verdicts" / "packer" / "day_0.json").read_text("utf-8"))
     assert verdict["verdict"] == "none"
-    refused = CliRunner().invoke(app, ["diagnose", "--fleet", str(small)])
-    assert refused.exit_code == 2
+    for wrong, says in (
+        (["--fleet", str(small)], "--out"),
+        (["--fleet", str(small), "--out", str(out), "--json", "x"], "--json"),
+        ([str(small), "--scheduler", "tcp://x"], "--fleet only"),
+        ([], "--fleet FOLDER"),
+    ):
+        refused = CliRunner().invoke(app, ["diagnose", *wrong])
+        assert refused.exit_code == 2
+        assert says in refused.output
 
 
 def test_a_cluster_gives_the_same_bits_though_a_worker_dies(fleet, verdicts, tmp_path):

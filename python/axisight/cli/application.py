@@ -126,12 +126,27 @@ def diagnose_command(
 ) -> None:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
     if fleet is not None:
+        for_one = {
+            "a case or logs": case_or_logs,
+            "--model": model,
+            "--validation": validation,
+            "--columns": columns,
+            "--json": json,
+            "--report": report,
+            "--tolerance": tolerance,
+            "--threads": threads,
+            "--effect": effect,
+            "--from": start_s,
+            "--to": stop_s,
+        }
         settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
-        run_fleet(fleet, out, settings, workers, scheduler)
+        run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
         return
     with _errors():
         if not case_or_logs:
             raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
+        if out or workers or scheduler:
+            raise InputError("--out, --workers, --scheduler: expected with --fleet only")
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)

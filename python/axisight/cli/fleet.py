@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.table import Table
@@ -15,10 +16,20 @@ from axisight.storage import write_bytes, write_whole
 
 
 def run_fleet(
-    folder: Path, out: Path | None, settings: Settings, workers: int | None, scheduler: str | None
+    folder: Path,
+    out: Path | None,
+    settings: Settings,
+    workers: int | None,
+    scheduler: str | None,
+    for_one: Sequence[str],
 ) -> None:
-    """Diagnose a fleet into ``out``: verdicts, ``fleet.parquet`` and ``fleet.html``."""
+    """Diagnose a fleet into ``out``: verdicts, ``fleet.parquet`` and ``fleet.html``.
+
+    ``for_one``: options given that are for a single diagnosis, and refused.
+    """
     with errors("stopped; finished verdicts stay, run again to go on"), bars() as progress:
+        if for_one:
+            raise InputError(f"--fleet: expected without {', '.join(for_one)}")
         if out is None:
             raise InputError("--out: expected a folder for the verdicts of a fleet")
         verdicts = diagnose_fleet(
