@@ -1,10 +1,13 @@
 """Small studies and helpers for the tests of Monte Carlo studies."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -87,3 +90,33 @@ def until(condition, seconds: float = 30.0) -> None:
 def relative(got, want) -> float:
     """Largest difference over the largest value."""
     return float(np.max(np.abs(got - want)) / np.max(np.abs(want)))
+
+
+@contextmanager
+def dask_cluster(
+    folder: Path,
+) -> Iterator[tuple[str, subprocess.Popen[bytes], list[subprocess.Popen[bytes]]]]:
+    """Address of a scheduler on loopback, its process, and two worker processes without nannies."""
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    contact = folder / "scheduler.json"
+    host = ["--host", "127.0.0.1", "--no-dashboard"]
+    scheduler = start(
+        "-m", "distributed.cli.dask_scheduler", *host, "--port", "0",
+        "--scheduler-file", str(contact), **quiet,
+    )  # fmt: skip
+    processes = [scheduler]
+    try:
+        until(lambda: contact.exists() and contact.read_text().endswith("}"))
+        address = json.loads(contact.read_text())["address"]
+        workers = [
+            start(
+                "-m", "distributed.cli.dask_worker", address, *host, "--no-nanny",
+                "--nthreads", "1", "--local-directory", str(folder / f"worker{i}"), **quiet,
+            )
+            for i in range(2)
+        ]  # fmt: skip
+        processes += workers
+        yield address, scheduler, workers
+    finally:
+        for process in reversed(processes):
+            kill(process)

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from axisight.effects import Effect
 from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_fleet, trends
 from axisight.robot import load_robot
 from gap_data import bare_axis, logs_of, scattered
-from montecarlo_data import kill, start, until
+from montecarlo_data import dask_cluster, kill
 
 QUICK = Settings(bootstrap=50)
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -160,34 +159,14 @@ def test_the_command_writes_table_and_page(fleet, tmp_path, verdicts):
 
 def test_a_cluster_gives_the_same_bits_though_a_worker_dies(fleet, verdicts, tmp_path):
     pytest.importorskip("distributed")
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    contact = tmp_path / "scheduler.json"
-    host = ["--host", "127.0.0.1", "--no-dashboard"]
-    scheduler = start(
-        "-m", "distributed.cli.dask_scheduler", *host, "--port", "0",
-        "--scheduler-file", str(contact), **quiet,
-    )  # fmt: skip
-    processes = [scheduler]
-    try:
-        until(lambda: contact.exists() and contact.read_text().endswith("}"))
-        address = json.loads(contact.read_text())["address"]
-        processes += [
-            start(
-                "-m", "distributed.cli.dask_worker", address, *host, "--no-nanny",
-                "--nthreads", "1", "--local-directory", str(tmp_path / f"worker{i}"), **quiet,
-            )
-            for i in range(2)
-        ]  # fmt: skip
+    with dask_cluster(tmp_path) as (address, _, workers):
 
         def sabotage(_label, done, _total):
             if done == 2:
-                kill(processes[1])
+                kill(workers[0])
 
         far = diagnose_fleet(fleet, tmp_path / "far", QUICK, scheduler=address, progress=sabotage)
-    finally:
-        for process in reversed(processes):
-            kill(process)
-    assert processes[1].returncode == -9
+    assert workers[0].returncode == -9
     assert far == verdicts[1]
     for path in sorted(verdicts[0].rglob("*.json")):
         there = tmp_path / "far" / path.relative_to(verdicts[0])

@@ -1,53 +1,20 @@
 """The same study on a cluster: same bits, also when a worker dies; errors when all are gone."""
 
-import json
-import subprocess
-
 import pytest
 
 from axisight import BackendError, InputError
 from axisight import montecarlo as mc
-from montecarlo_data import blocks, kill, same_bits, small_study, start, until
+from montecarlo_data import blocks, dask_cluster, kill, same_bits, small_study
 
 distributed = pytest.importorskip("distributed")
 
 LONG = {"runs": 200, "block_runs": 4}
-QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
 
 @pytest.fixture
 def cluster(tmp_path):
-    """Address of a scheduler on loopback, and two worker processes without nannies."""
-    contact = tmp_path / "scheduler.json"
-    host = ["--host", "127.0.0.1", "--no-dashboard"]
-    scheduler = start(
-        "-m", "distributed.cli.dask_scheduler", *host, "--port", "0",
-        "--scheduler-file", str(contact), **QUIET,
-    )  # fmt: skip
-    processes = [scheduler]
-    try:
-        until(lambda: contact.exists() and contact.read_text().endswith("}"))
-        address = json.loads(contact.read_text())["address"]
-        workers = [
-            start(
-                "-m",
-                "distributed.cli.dask_worker",
-                address,
-                *host,
-                "--no-nanny",
-                "--nthreads",
-                "1",
-                "--local-directory",
-                str(tmp_path / f"worker{i}"),
-                **QUIET,
-            )
-            for i in range(2)
-        ]
-        processes += workers
-        yield address, scheduler, workers
-    finally:
-        for process in reversed(processes):
-            kill(process)
+    with dask_cluster(tmp_path) as found:
+        yield found
 
 
 def present(address: str, count: int) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.table import Table
 
 from axisight.cli.common import OUT, bars, errors
+from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_fleet, trends
 from axisight.gap import Settings
@@ -46,18 +47,12 @@ def run_fleet(
         write_whole(out / "fleet.html", render_fleet(folder.resolve().name, table, series))
     shown = Table("case", "verdict", "causes")
     for name, verdict in verdicts.items():
-        causes = [_label(c["effect"], c["axis"]) for c in verdict.get("causes", ())]
+        causes = [Effect(c["effect"], c["axis"]).label for c in verdict.get("causes", ())]
         shown.add_row(name, verdict.get("verdict", verdict.get("error")), ", ".join(causes))
     OUT.print(shown)
     for t in series:
         if t.changes:
             way = "grows" if t.per_case > 0 else "shrinks"
-            label = t.effect if t.axis is None else f"{t.effect}@{t.axis}"
-            OUT.print(
-                f"{t.machine or folder.name}: {label} {way}, {t.per_case:.3g} {t.unit} a case"
-            )
+            what = f"{Effect(t.effect, t.axis).label} {way}, {t.per_case:.3g} {t.unit} a case"
+            OUT.print(f"{t.machine or folder.name}: {what}", markup=False, soft_wrap=True)
     OUT.print(f"table: {out / 'fleet.parquet'}; page: {out / 'fleet.html'}", soft_wrap=True)
-
-
-def _label(effect: str, axis: int | None) -> str:
-    return effect if axis is None else f"{effect}@{axis}"

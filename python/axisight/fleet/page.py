@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jinja2
 import pandas as pd
 
 from axisight.fleet.trends import Trend
+from axisight.report.template import rendered
 from axisight.report.wording import NO_VALUE, number, percent, place, plain_name, probability
 
 _HEADS = (
@@ -29,13 +29,6 @@ def render_fleet(name: str, table: pd.DataFrame, series: Sequence[Trend]) -> str
 
     The same table gives the same text. All names and sentences are escaped.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("axisight.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     growing = [_trend(t, name) for t in series if t.changes]
     page = {
         "name": name,
@@ -46,7 +39,7 @@ def render_fleet(name: str, table: pd.DataFrame, series: Sequence[Trend]) -> str
         "heads": [{"title": title, "num": num} for title, num in _HEADS],
         "rows": [_row(row) for row in table.to_dict("records")],
     }
-    return environment.get_template("fleet.html.j2").render(page).strip() + "\n"
+    return rendered("fleet.html.j2", page)
 
 
 def _headline(table: pd.DataFrame, growing: int) -> str:

@@ -49,8 +49,9 @@ def diagnose_fleet(
     cases = fleet_cases(folder)
     found: dict[str, dict[str, Any]] = {}
     todo = []
+    prints = {case.name: fingerprint(case.files(), also) for case in cases}
     for case in cases:
-        known = _known(_path(verdicts, case), fingerprint(case.files(), also))
+        known = _known(_path(verdicts, case), prints[case.name])
         if known is None:
             todo.append(case)
         else:
@@ -66,7 +67,7 @@ def diagnose_fleet(
         )
         for case, text in made:
             found[case.name] = verdict = json.loads(text)
-            verdict["fingerprint"] = fingerprint(case.files(), also)
+            verdict["fingerprint"] = prints[case.name]
             write_whole(_path(verdicts, case), json.dumps(verdict, indent=2) + "\n")
             progress(_LABEL, len(found), len(cases))
     return {case.name: found[case.name] for case in cases}

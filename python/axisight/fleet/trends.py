@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -48,7 +48,7 @@ def trends(table: pd.DataFrame) -> list[Trend]:
     """
     found = [t for _, own in table.groupby("machine", sort=True) for t in _of_machine(own)]
     level = _FALSE_ALARMS / max(len(found), 1)
-    sure = [Trend(**{**vars(t), "changes": t.p_value < level}) for t in found]
+    sure = [replace(t, changes=t.p_value < level) for t in found]
     return sorted(sure, key=lambda t: (t.p_value, t.machine, t.effect, t.axis or 0))
 
 

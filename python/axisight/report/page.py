@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
@@ -34,6 +33,7 @@ from axisight.report.figures import (
     ranking_figure,
 )
 from axisight.report.limits import limit_table
+from axisight.report.template import rendered
 from axisight.report.wording import (
     NO_VALUE,
     GapMap,
@@ -77,14 +77,7 @@ def render_report(diagnosis: Diagnosis) -> str:
 
     The same diagnosis gives the same text. All names and sentences are escaped.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("axisight.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html.j2").render(_page(diagnosis)).strip() + "\n"
+    return rendered("report.html.j2", _page(diagnosis))
 
 
 def save_report(diagnosis: Diagnosis, path: Path | str) -> None:
