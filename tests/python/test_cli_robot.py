@@ -198,7 +198,7 @@ def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypa
         seen.append(inputs["robot"].effects)
         raise InputError("seen")
 
-    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
     command = ["diagnose", log, log, "--model", axis]
     assert "with the effects of" in run(*command, code=2)
     case = axis.parent / "case.toml"
@@ -219,7 +219,7 @@ def stopped(monkeypatch, attribute: str = "robot") -> list:
         seen.append(inputs if attribute == "all" else inputs[attribute])
         raise InputError("seen")
 
-    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
     return seen
 
 
@@ -468,7 +468,7 @@ def test_diagnose_takes_tolerances_of_the_file(axis, log, monkeypatch, options, 
         seen.append(inputs["settings"].tolerances)
         raise InputError("seen")
 
-    monkeypatch.setattr("axisight.cli.application.diagnose", stop)
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
     axis.write_text(axis.read_text() + "[tolerances]\nstiffness = 0.2\ndamping = 0.5\n")
     run("diagnose", log, log, "--model", axis, *options, code=2)
     assert seen == [{**DEFAULT_TOLERANCES, **wanted}]

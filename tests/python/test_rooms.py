@@ -11,6 +11,7 @@ from axisight import _core
 # What every room uses; the rest belongs to one.
 LOOSE = {
     "__init__.py",
+    "__init__.pyi",
     "_core.pyi",
     "arguments.py",
     "errors.py",

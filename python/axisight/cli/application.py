@@ -1,226 +1,108 @@
-"""The command line: diagnose, check, simulate, effects, schema, excite, identify, montecarlo, reproduce, demo."""
+"""The command line ``axisight``: its commands, each loaded when it is called."""
 
 from __future__ import annotations
 
-import os
 import sys
-from functools import partial
-from json import dumps
-from pathlib import Path
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
-from rich.table import Table
+from typer.core import TyperGroup
 
-from axisight.cli.blind import blind_app
-from axisight.cli.common import OUT as _out
-from axisight.cli.common import From, To, bars
-from axisight.cli.common import errors as _errors
-from axisight.cli.demo import write_demo_case
-from axisight.cli.excite import excite_command
-from axisight.cli.fleet import run_fleet
-from axisight.cli.identify import identify_app
-from axisight.cli.montecarlo import montecarlo_command
-from axisight.cli.reproduce import reproduce_command
-from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
-from axisight.cli.show import show_diagnosis
-from axisight.cli.simulate import simulate_command
-from axisight.effects import effect_table
-from axisight.errors import InputError
-from axisight.fitting import robot_parameters
-from axisight.gap import Diagnosis, Settings, diagnose, verdict_schema
-from axisight.gap.inputs import read_inputs
-from axisight.gap.settings import DEFAULT_TOLERANCES
-from axisight.gap.tolerances import with_tolerances
-from axisight.logs import check_log, render
-from axisight.report import save_report
-from axisight.robot import Robot
+# Commands, where each lives, and the first line of its help: without it the list of commands would
+# have to load them all, with the libraries of all.
+_COMMANDS = {
+    "excite": (
+        "excite:excite_command",
+        "Make references for a robot, check them against its limits in simulation, and write them.",
+    ),
+    "identify": (
+        "identify:identify_app",
+        "Identify a robot from logs or frequency responses, and write it back as a robot file.",
+    ),
+    "blind": (
+        "blind:blind_app",
+        "The withheld-effect benchmark: cases of another engine, diagnoses, a score.",
+    ),
+    "montecarlo": (
+        "montecarlo:montecarlo_command",
+        "Run a Monte Carlo study; the same study and seed give the same bits, however it is run.",
+    ),
+    "reproduce": (
+        "reproduce:reproduce_command",
+        "Reproduce the tables and figures of Wernholt's thesis on the preset robot.",
+    ),
+    "simulate": (
+        "simulate:simulate_command",
+        "Simulate a robot along the references or torques of a log and write the result as a log.",
+    ),
+    "diagnose": (
+        "diagnose:diagnose_command",
+        "Say where a simulator disagrees with measured logs, which effect causes it, and how far it "
+        "shrinks.",
+    ),
+    "check": (
+        "about:check_command",
+        "Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels.",
+    ),
+    "schema": (
+        "about:schema_command",
+        "Print the JSON Schema of the verdict that `diagnose --json` writes.",
+    ),
+    "effects": (
+        "about:effects_command",
+        "List the effects that can be simulated, fitted and named as causes.",
+    ),
+    "demo": (
+        "demo:demo_command",
+        "Make a small case (a simulated machine with a withheld effect) and diagnose it.",
+    ),
+}
+
+
+def load_command(name: str) -> Any:
+    """Return the command of a name as click knows it."""
+    module, attribute = _COMMANDS[name][0].split(":")
+    found = getattr(import_module(f"axisight.cli.{module}"), attribute)
+    if not isinstance(found, typer.Typer):
+        alone = typer.Typer(add_completion=False)
+        alone.command(name)(found)
+        found = alone
+    return typer.main.get_command(found)
+
+
+class _LoadedWhenCalled(TyperGroup):
+    """A group whose commands are only names until one is called."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command if name is None else load_command(name), rest
+
 
 app = typer.Typer(
-    help="Identify industrial robots, simulate them, and explain the sim-to-real gap.",
+    cls=_LoadedWhenCalled,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-app.command("excite")(excite_command)
-app.add_typer(identify_app, name="identify")
-app.add_typer(blind_app, name="blind")
-app.command("montecarlo")(montecarlo_command)
-app.command("reproduce")(reproduce_command)
-app.command("simulate")(simulate_command)
-
-Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
+for _name, (_, _help) in _COMMANDS.items():
+    app.command(_name, help=_help)(lambda: None)
 
 
-def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
-    """Return the tolerances given by quantity or name; raises InputError naming the option."""
-    own = [n for n in robot_parameters(robot) if n.rsplit(".", 1)[1] in DEFAULT_TOLERANCES]
-    changed = {}
-    for item in given:
-        name, _, value = item.partition("=")
-        try:
-            changed[name] = float(value)
-        except ValueError:
-            raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
-        if name not in DEFAULT_TOLERANCES and name not in own:
-            raise InputError(
-                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, or one of a joint "
-                f"({own[0]}), got {name!r}"
-            )
-        if not 0 < changed[name] < 1:
-            raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
-    return changed
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(import_module("axisight._core").__version__)
+        raise typer.Exit
 
 
-@app.command("diagnose")
-def diagnose_command(
-    case_or_logs: Annotated[
-        list[Path] | None, typer.Argument(help="A case folder, or logs to fit and choose on.")
-    ] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Simulator: robot.toml or a preset. A case brings its own.")
-    ] = None,
-    validation: Annotated[
-        list[Path] | None,
-        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
-    ] = None,
-    columns: Columns = None,
-    json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
-    tolerance: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Relative tolerance of a simulator parameter, e.g. mass=0.02, instead of that of "
-            "the robot file or the default."
-        ),
-    ] = None,
-    cutoff_hz: Annotated[
-        float | None,
-        typer.Option(
-            help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
-        ),
-    ] = None,
-    max_causes: Annotated[
-        int, typer.Option(min=0, help="Stop after so many causes.")
-    ] = Settings.max_causes,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Candidates tried at a time. Default: all cores.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
-    effect: GivenEffects = None,
-    start_s: From = 0.0,
-    stop_s: To = None,
-    fleet: Annotated[
-        Path | None,
-        typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for a fleet's verdicts, table and page.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes of a fleet here. Default: all processors.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler whose workers diagnose a fleet.")
-    ] = None,
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
 ) -> None:
-    """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
-    if fleet is not None:
-        for_one = {
-            "a case or logs": case_or_logs,
-            "--model": model,
-            "--validation": validation,
-            "--columns": columns,
-            "--json": json,
-            "--report": report,
-            "--tolerance": tolerance,
-            "--threads": threads,
-            "--effect": effect,
-            "--from": start_s,
-            "--to": stop_s,
-        }
-        settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
-        run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
-        return
-    with _errors():
-        if not case_or_logs:
-            raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
-        if out or workers or scheduler:
-            raise InputError("--out, --workers, --scheduler: expected with --fleet only")
-        load = partial(load_simulator, given=parse_effects(effect))
-        part = (start_s, stop_s)
-        inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
-        settings = Settings(
-            seed=seed,
-            cutoff_hz=cutoff_hz,
-            max_causes=max_causes,
-            threads=threads or os.cpu_count() or 1,
-        )
-        given = _tolerances(tolerance or [], inputs.robot)
-        settings = with_tolerances(settings, inputs.robot, inputs.robot_source, given)
-        with bars() as progress:
-            found = diagnose(
-                name=inputs.name,
-                robot=inputs.robot,
-                estimation=inputs.estimation,
-                validation=inputs.validation,
-                settings=settings,
-                progress=progress,
-            )
-        _write(found, json, report)
-
-
-def _write(found: Diagnosis, json: Path | None, report: Path | None) -> None:
-    show_diagnosis(found)
-    if json is not None:
-        found.save_verdict(json)
-        _out.print(f"verdict: {json}", soft_wrap=True)
-    if report is not None:
-        save_report(found, report)
-        _out.print(f"report: {report}", soft_wrap=True)
-
-
-@app.command()
-def check(
-    log: Annotated[Path, typer.Argument(help="Log to check.")], columns: Columns = None
-) -> None:
-    """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
-    with _errors():
-        found = check_log(log, columns)
-        _out.print(render(found))
-        if not found.ok:
-            raise typer.Exit(1)
-
-
-@app.command()
-def schema() -> None:
-    """Print the JSON Schema of the verdict that `diagnose --json` writes."""
-    typer.echo(dumps(verdict_schema(), indent=2))
-
-
-@app.command()
-def effects() -> None:
-    """List the effects that can be simulated, fitted and named as causes."""
-    table = Table("effect", "acts on", "equation", "parameters")
-    for info in effect_table().values():
-        parameters = ", ".join(f"{p.name} [{p.unit}]" for p in info.parameters)
-        table.add_row(info.name, info.acts, info.equation, parameters)
-    _out.print(table)
-
-
-@app.command()
-def demo(
-    out: Annotated[
-        Path, typer.Option(help="Folder for the case, the verdict and the report.")
-    ] = Path("demo"),
-) -> None:
-    """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
-    with _errors():
-        case = write_demo_case(out / "case")
-        _out.print(f"case: {case} (a simulated machine with an effect its simulator lacks)")
-        with bars() as progress:
-            found = diagnose(case, progress=progress)
-        _write(found, out / "verdict.json", out / "report.html")
+    """Identify industrial robots, simulate them, and explain the sim-to-real gap."""
 
 
 def main() -> None:

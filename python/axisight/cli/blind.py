@@ -14,6 +14,7 @@ from axisight.gap import Settings
 from axisight.storage import write_whole
 
 blind_app = typer.Typer(
+    add_completion=False,
     help="The withheld-effect benchmark: cases of another engine, diagnoses, a score.",
     no_args_is_help=True,
 )

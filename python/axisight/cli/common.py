@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -26,6 +27,7 @@ To = Annotated[
         "--to", metavar="SECONDS", help="Leave out what comes after in each log. Default: its end."
     ),
 ]
+Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
 
 
 @contextmanager

@@ -1,16 +1,21 @@
-"""A small case to try the diagnosis on: a simulated machine with an effect its simulator lacks."""
+"""The command ``axisight demo``: a small case to try the diagnosis on, a machine with an effect its simulator lacks."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from axisight.blind.case_files import CaseFolder, moves
+from axisight.cli.common import OUT, bars, errors
+from axisight.cli.diagnose import write_diagnosis
 from axisight.effects import Effect
 from axisight.effects.stated import DEMONSTRATION
 from axisight.errors import InputError
+from axisight.gap import diagnose
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
 
@@ -80,3 +85,17 @@ def _multisine(n: int, robot: Robot, rng: np.random.Generator, peak_rad_s: float
         ramp = np.minimum(time / 0.1, 1.0)
         out[:, i] = ramp * peak_rad_s * (0.7 * wave / np.abs(wave).max() + square)
     return out
+
+
+def demo_command(
+    out: Annotated[
+        Path, typer.Option(help="Folder for the case, the verdict and the report.")
+    ] = Path("demo"),
+) -> None:
+    """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
+    with errors():
+        case = write_demo_case(out / "case")
+        OUT.print(f"case: {case} (a simulated machine with an effect its simulator lacks)")
+        with bars() as progress:
+            found = diagnose(case, progress=progress)
+        write_diagnosis(found, out / "verdict.json", out / "report.html")

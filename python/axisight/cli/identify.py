@@ -9,6 +9,7 @@ from axisight.cli.identify_elastic import elastic_command
 from axisight.cli.identify_rigid import rigid_body_command
 
 identify_app = typer.Typer(
+    add_completion=False,
     help="Identify a robot from logs or frequency responses, and write it back as a robot file.",
     no_args_is_help=True,
 )

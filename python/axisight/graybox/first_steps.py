@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
-from axisight.frf import etfe
+from axisight.frf.etfe import etfe
 from axisight.graybox.axis_model import AxisData
 from axisight.graybox.axis_records import as_data, position_of, reference_of
 from axisight.graybox.chain_fit import fit_chain

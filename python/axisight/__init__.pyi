@@ -1,0 +1,129 @@
+"""What the package offers and where it lives: each is loaded when it is first named."""
+
+from . import (
+    blackbox,
+    calibration,
+    excitation,
+    frequency_fit,
+    frf,
+    graybox,
+    identifiability,
+    montecarlo,
+    records,
+    rigid_body,
+    robot_file,
+)
+from .effects import (
+    Effect,
+    EffectInfo,
+    effect_info,
+    effect_table,
+)
+from .errors import (
+    AxisightError,
+    BackendError,
+    CaseError,
+    ConvergenceError,
+    InputError,
+    LogError,
+    RobotError,
+    StoreError,
+    StudyError,
+)
+from .fitting import (
+    FitOptions,
+    Fitted,
+    Parameter,
+    Weighting,
+    effect_parameter,
+    fit,
+    robot_parameter,
+    robot_parameters,
+)
+from .frf.plots import (
+    plot_bode,
+    plot_response_matrix,
+)
+from .gap import (
+    Diagnosis,
+    Settings,
+    diagnose,
+)
+from .logs import (
+    Case,
+    Log,
+    check_log,
+    read_case,
+    read_log,
+)
+from .report.plots import (
+    plot_gap_map,
+    plot_log,
+    plot_overlay,
+    plot_ranking,
+    plot_simulation,
+)
+from .robot import (
+    Robot,
+    load_robot,
+)
+from .simulation import (
+    simulate,
+    simulate_batch,
+)
+
+__all__ = [
+    "AxisightError",
+    "BackendError",
+    "Case",
+    "CaseError",
+    "ConvergenceError",
+    "Diagnosis",
+    "Effect",
+    "EffectInfo",
+    "FitOptions",
+    "Fitted",
+    "InputError",
+    "Log",
+    "LogError",
+    "Parameter",
+    "Robot",
+    "RobotError",
+    "Settings",
+    "StoreError",
+    "StudyError",
+    "Weighting",
+    "blackbox",
+    "calibration",
+    "check_log",
+    "diagnose",
+    "effect_info",
+    "effect_parameter",
+    "effect_table",
+    "excitation",
+    "fit",
+    "frequency_fit",
+    "frf",
+    "graybox",
+    "identifiability",
+    "load_robot",
+    "montecarlo",
+    "plot_bode",
+    "plot_gap_map",
+    "plot_log",
+    "plot_overlay",
+    "plot_ranking",
+    "plot_response_matrix",
+    "plot_simulation",
+    "read_case",
+    "read_log",
+    "records",
+    "rigid_body",
+    "robot_file",
+    "robot_parameter",
+    "robot_parameters",
+    "simulate",
+    "simulate_batch",
+]
+
+__version__: str

@@ -1,0 +1,152 @@
+"""The command ``axisight diagnose``."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight import report as pages
+from axisight.cli.common import OUT, Columns, From, To, bars, errors
+from axisight.cli.fleet import run_fleet
+from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
+from axisight.cli.show import show_diagnosis
+from axisight.errors import InputError
+from axisight.fitting import robot_parameters
+from axisight.gap import Diagnosis, Settings, diagnose
+from axisight.gap.inputs import read_inputs
+from axisight.gap.settings import DEFAULT_TOLERANCES
+from axisight.gap.tolerances import with_tolerances
+from axisight.robot import Robot
+
+
+def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
+    """Return the tolerances given by quantity or name; raises InputError naming the option."""
+    own = [n for n in robot_parameters(robot) if n.rsplit(".", 1)[1] in DEFAULT_TOLERANCES]
+    changed = {}
+    for item in given:
+        name, _, value = item.partition("=")
+        try:
+            changed[name] = float(value)
+        except ValueError:
+            raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
+        if name not in DEFAULT_TOLERANCES and name not in own:
+            raise InputError(
+                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, or one of a joint "
+                f"({own[0]}), got {name!r}"
+            )
+        if not 0 < changed[name] < 1:
+            raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
+    return changed
+
+
+def diagnose_command(
+    case_or_logs: Annotated[
+        list[Path] | None, typer.Argument(help="A case folder, or logs to fit and choose on.")
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Simulator: robot.toml or a preset. A case brings its own.")
+    ] = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
+    ] = None,
+    columns: Columns = None,
+    json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Relative tolerance of a simulator parameter, e.g. mass=0.02, instead of that of "
+            "the robot file or the default."
+        ),
+    ] = None,
+    cutoff_hz: Annotated[
+        float | None,
+        typer.Option(
+            help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
+        ),
+    ] = None,
+    max_causes: Annotated[
+        int, typer.Option(min=0, help="Stop after so many causes.")
+    ] = Settings.max_causes,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Candidates tried at a time. Default: all cores.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
+    effect: GivenEffects = None,
+    start_s: From = 0.0,
+    stop_s: To = None,
+    fleet: Annotated[
+        Path | None,
+        typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a fleet's verdicts, table and page.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes of a fleet here. Default: all processors.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler whose workers diagnose a fleet.")
+    ] = None,
+) -> None:
+    """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
+    if fleet is not None:
+        for_one = {
+            "a case or logs": case_or_logs,
+            "--model": model,
+            "--validation": validation,
+            "--columns": columns,
+            "--json": json,
+            "--report": report,
+            "--tolerance": tolerance,
+            "--threads": threads,
+            "--effect": effect,
+            "--from": start_s,
+            "--to": stop_s,
+        }
+        settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
+        run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
+        return
+    with errors():
+        if not case_or_logs:
+            raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
+        if out or workers or scheduler:
+            raise InputError("--out, --workers, --scheduler: expected with --fleet only")
+        load = partial(load_simulator, given=parse_effects(effect))
+        part = (start_s, stop_s)
+        inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
+        settings = Settings(
+            seed=seed,
+            cutoff_hz=cutoff_hz,
+            max_causes=max_causes,
+            threads=threads or os.cpu_count() or 1,
+        )
+        given = _tolerances(tolerance or [], inputs.robot)
+        settings = with_tolerances(settings, inputs.robot, inputs.robot_source, given)
+        with bars() as progress:
+            found = diagnose(
+                name=inputs.name,
+                robot=inputs.robot,
+                estimation=inputs.estimation,
+                validation=inputs.validation,
+                settings=settings,
+                progress=progress,
+            )
+        write_diagnosis(found, json, report)
+
+
+def write_diagnosis(found: Diagnosis, json: Path | None, report: Path | None) -> None:
+    """Show a diagnosis, and write its verdict and its page where they are asked for."""
+    show_diagnosis(found)
+    if json is not None:
+        found.save_verdict(json)
+        OUT.print(f"verdict: {json}", soft_wrap=True)
+    if report is not None:
+        # Brings plotly: only for those who ask for a page.
+        pages.save_report(found, report)
+        OUT.print(f"report: {report}", soft_wrap=True)
