@@ -59,6 +59,9 @@ def facts(effect: Mapping[str, Any]) -> str:
     out = [f"Family: {effect['family'].replace('_', ' ')}."]
     if effect["contains"]:
         out.append(f"Contains {', '.join(f'`{n}`' for n in effect['contains'])}.")
+    if effect["twins"]:
+        twins = ", ".join(f"`{n}`" for n in effect["twins"])
+        out.append(f"Commands and motor angles are those of {twins}: no log tells them apart.")
     if effect["usual"]:
         usual = ", ".join(f"`{n}`" for n in effect["usual"])
         out.append(

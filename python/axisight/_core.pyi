@@ -102,6 +102,7 @@ class EffectInfo(TypedDict):
     contains: list[str]
     parts: list[str]
     usual: list[str]
+    twins: list[str]
     stands_for: tuple[str, str] | None
     linear: str
     inverse_dynamics: bool

@@ -11,9 +11,9 @@ from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
-from axisight.gap.layout import Layout
+from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, Linearized
-from axisight.gap.screening import Bench, Screen, loudest_logs
+from axisight.gap.screening import Bench, Screen, loudest_logs, thinned
 from gap_data import bare_axis, linear_evidence, logs_of, scattered
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -329,6 +329,35 @@ def test_the_screen_takes_the_logs_with_most_to_explain_on_every_axis():
     few = log < 4
     layout = Layout(axis[few], log[few], log[few], size[few])
     assert loudest_logs(above[few], layout) == [0, 1, 2, 3]
+
+
+def test_the_beginnings_of_logs_screen_as_the_whole():
+    true = Effect("coulomb_friction", 1, {"coulomb_nm": 0.4, "smoothing_rad_s": 0.3})
+    logs = logs_of(scattered(bare_axis(), 4), [true], PLAN, seconds=8.2)
+    view = ClosedLoopView(bare_axis(), logs, Settings())
+    whole = model(view.fitter, steps=4)
+    above = whole.loss - view.floor.expected[whole.axis] * whole.samples
+    screen = thinned(Bench(view.fitter, whole), above, layout_of(whole))
+    half = screen.model
+    assert [len(p) for p, _ in screen.fitter.records] == [len(log.time_s) // 2 for log in logs]
+    # Blocks before the cut are those of the whole, but for what the weights smear over it.
+    places = list(zip(whole.log.tolist(), whole.axis.tolist(), strict=True))
+    for log in range(len(logs)):
+        mine, all_of_it = half.loss[half.log == log], whole.loss[whole.log == log]
+        np.testing.assert_allclose(mine[:-1], all_of_it[: len(mine) - 1], rtol=0.05)
+        assert len(mine) == -(-places.count((log, 0)) // 2)
+    # Gains are those of the whole, up to where on the logs the friction shows.
+    option = next(o for o in idle(view, whole) if o.effect.label == true.label)
+    (of_half,) = screen.starts([option])
+    (of_all,) = Screen(Bench(view.fitter, whole)).starts([option])
+    assert of_half.gain == pytest.approx(of_all.gain, rel=0.3)
+    # A fit from there takes the sensitivities of the whole model, and none of its own.
+    assert of_half.robot_values is whole.robot_values
+    # Short logs are not cut.
+    assert view.fitter.part([0]).begun(whole.part([0])) is not None
+    short = copy(view.fitter)
+    short.records = [(p[:8000], t[:8000]) for p, t in view.fitter.records]
+    assert short.begun(whole) is None
 
 
 def turns_of(losses: Sequence[float]) -> int:

@@ -60,6 +60,7 @@ def test_a_filter_is_the_low_pass_that_it_says():
     [
         Effect("controller_gain", 1, GAINS),
         Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
+        Effect("feedforward_missing", 1, {"acceleration_nm_s2_rad": 0.2, "speed_nm_s_rad": 0.3}),
     ],
     ids=lambda e: e.name,
 )
@@ -71,6 +72,30 @@ def test_another_controller_is_found_whatever_the_machine_has_besides(effect):
     for name, value in effect.parameters.items():
         # The law is exact; a filter is written in several ways.
         assert found.values[name].value == pytest.approx(value, abs=0.002 * max(abs(value), 1e-2))
+        assert found.values[name].low <= value <= found.values[name].high
+
+
+FORWARD = {"acceleration_nm_s2_rad": 0.006, "speed_nm_s_rad": 0.01}
+
+
+def test_torque_is_fed_forward_for_the_reference_and_its_rate():
+    """On a machine that is far too heavy to move, the command is what is fed forward alone."""
+    robot = bare_axis()
+    heavy = robot.with_parameters({"axis1.motor_inertia": 1e9})
+    ref = reference("multisine", 1, 500, robot.sample_time_s)
+    forward = Effect("feedforward_missing", 1, FORWARD)
+    with_it = simulate(heavy, ref, effects=[forward]).torque_cmd_nm.values[:, 0]
+    without = simulate(heavy, ref).torque_cmd_nm.values[:, 0]
+    rate = np.diff(ref[:, 0], prepend=ref[0, 0]) / robot.sample_time_s
+    expected = 0.006 * rate + 0.01 * ref[:, 0]
+    np.testing.assert_allclose(with_it - without, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_a_gain_is_no_feedforward_and_feedforward_no_gain():
+    (found,) = shown([Effect("feedforward_missing", 1, FORWARD)])
+    assert found.effect.label == "feedforward_missing@1"
+    for name, value in FORWARD.items():
+        assert found.values[name].value == pytest.approx(value, rel=0.02)
         assert found.values[name].low <= value <= found.values[name].high
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from axisight import Effect, Settings
-from axisight.gap import search
+from axisight.errors import InputError
+from axisight.gap import search, trials
 from axisight.gap.layout import Layout
 from axisight.gap.model import FreeEffect
 from axisight.gap.screening import Start
@@ -90,3 +91,31 @@ def test_a_cause_less_likely_than_something_unknown_needs_the_rest_explained(
     monkeypatch.setattr(search, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
     search._withdraw_doubtful(None, state, Settings())  # type: ignore[arg-type]
     assert [f.effect.label for f in state.model.free] == kept
+
+
+def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monkeypatch):
+    """A stiff law may be fitted along a run of another model and break down by itself."""
+    whole = SimpleNamespace(candidate=free("gear_hysteresis@1"), label="gear_hysteresis@1")
+    whole.evidence = SimpleNamespace(free=())
+    other = SimpleNamespace(candidate=free("backlash@1"), label="backlash@1")
+    other.evidence = SimpleNamespace(free=(1,))
+
+    class Field(Round):
+        def _crooked(self, trials):
+            return set()
+
+        def _worth_refining(self, trials, done, crooked):
+            return [t for t in trials if t.label not in done]
+
+    def settled(fitter, free_, start):
+        if start is whole.evidence:
+            raise InputError("the simulation failed")
+        return start
+
+    field = Field({})
+    field.bench = SimpleNamespace(skipped={})
+    field.fitter = None
+    monkeypatch.setattr(trials, "settled", settled)
+    monkeypatch.setattr(trials, "trial", lambda candidate, evidence: other)
+    assert Trials.refined(field, [whole, other], 1) == [other]
+    assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}

@@ -62,6 +62,7 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("contains", info.contains.to_vec())?;
     out.set_item("parts", info.parts.to_vec())?;
     out.set_item("usual", info.usual.to_vec())?;
+    out.set_item("twins", info.twins.to_vec())?;
     let stands_for = info.stands_for.map(|s| (s.quantity, word(&s.change)));
     out.set_item("stands_for", stands_for)?;
     let linear = match info.linear {

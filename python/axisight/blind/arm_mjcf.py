@@ -21,7 +21,8 @@ class Native:
     to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
     ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
     added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
-    ``zero_rad``: angle of the joint where it counts zero.
+    ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
+    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad].
     """
 
     half_width_rad: float = 0.0
@@ -36,6 +37,8 @@ class Native:
     ki: float = 0.0
     filter_s: float = 0.0
     zero_rad: float = 0.0
+    for_rate: float = 0.0
+    for_speed: float = 0.0
 
 
 NOTHING = Native()

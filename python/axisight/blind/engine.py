@@ -77,6 +77,9 @@ class _Loop:
         # Of a first-order lag between samples, exactly; all of a new speed without.
         self.fresh = -np.expm1(-self.sample_s / np.maximum(lags, 1e-12))
         self.speed = np.zeros(self.n)
+        self.for_rate = np.array([x.for_rate for x in own])
+        self.for_speed = np.array([x.for_speed for x in own])
+        self.wanted = np.zeros(self.n)
         self.laws = [(axis, law) for axis, laws in machine.laws.items() for law in laws]
         for _, law in self.laws:
             law.begin(self.step_s)
@@ -111,6 +114,9 @@ class _Loop:
             self.behind -= moved
             self.speed += self.fresh * (moved / self.sample_s - self.speed)
             command = self.kp * (wanted - self.speed) + self.ki * self.behind
+            command += self.for_rate * (wanted - self.wanted) / self.sample_s
+            command += self.for_speed * wanted
+            self.wanted = np.array(wanted)
             self.behind += wanted * self.sample_s
             angle[k] = measured
             torque[k] = command

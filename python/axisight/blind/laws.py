@@ -239,6 +239,35 @@ class Delay(Law):
         return self.line[0]
 
 
+class LateSensor(Law):
+    """A sensor that says where the motor was some samples ago; it is asked once a sample."""
+
+    def __init__(self, samples: int) -> None:
+        self.samples = samples
+        self.line: deque[float] = deque()
+
+    def begin(self, step_s: float) -> None:
+        """Empty the line."""
+        del step_s
+        self.line = deque(maxlen=self.samples + 1)
+
+    def sensor(self, motor: float) -> float:
+        """Return by how much it is off."""
+        self.line.append(motor)
+        return self.line[0] - motor
+
+
+@dataclass
+class ReportedLess(Law):
+    """A drive that reports its torque less a constant."""
+
+    offset_nm: float
+
+    def reported(self, torque: float) -> float:
+        """Return what it says."""
+        return torque - self.offset_nm
+
+
 @dataclass
 class Reported(Law):
     """A drive that reports a share of its torque."""

@@ -13,6 +13,7 @@ import scipy
 
 from axisight.blind.sealed import SEAL, seal_of
 from axisight.blind.withheld import KINDS
+from axisight.effects import effect_info, effect_table
 from axisight.errors import InputError
 
 # Change of the torque over its noise from which an effect counts as there to be found.
@@ -132,14 +133,23 @@ def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
     return out
 
 
+def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
+    """Return a withheld effect as its twin where that is named: their logs are the same."""
+    kind = effect["effect"]
+    twins = effect_info(kind).twins if kind in effect_table() else ()
+    as_twins = [{**effect, "effect": name} for name in twins]
+    return next((t for t in as_twins if _label(t) in named), effect)
+
+
 def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
     causes = verdict["causes"]
+    withheld = [_as_named(e, {_label(c) for c in causes}) for e in truth["effects"]]
     likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]
     allowed = {_label(x) for x in (*causes, *likely)}
     allowed |= {label for group in verdict["equivalent"] for label in group}
     by_label = {_label(c): c["parameters"] for c in causes}
     ratios, covered = [], []
-    for effect in truth["effects"]:
+    for effect in withheld:
         found = comparable(by_label.get(_label(effect), {}))
         for key, value in sizes(effect["parameters"]).items():
             if key in found and value:
@@ -148,8 +158,8 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
                 covered.append(low <= value <= high)
     return Judged(
         name=name,
-        truth=tuple(_label(e) for e in truth["effects"]),
-        in_library=all(KINDS[e["effect"]].in_library for e in truth["effects"]),
+        truth=tuple(_label(e) for e in withheld),
+        in_library=all(KINDS[e["effect"]].in_library for e in withheld),
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
         named=tuple(_label(c) for c in causes),

@@ -167,6 +167,12 @@ def _delay(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
 
 
+def _late_sensor(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    samples = int(rng.integers(1, 4))
+    delay = samples * robot.sample_time_s
+    return Drawn("sensor_delay", axis, {"delay_s": delay}, laws=[laws.LateSensor(samples)])
+
+
 def _lag(rng: Rng, robot: Robot, axis: int) -> Drawn:
     lag = _between(rng, 0.6e-3, 3e-3)
     # The engine holds an activation over its step: torque is late by half of it, too.
@@ -188,6 +194,12 @@ def _reported(rng: Rng, _robot: Robot, axis: int) -> Drawn:
 def _offset(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     size = _sign(rng) * _between(rng, 0.3, 1.0)
     return Drawn("torque_offset", axis, {"offset_nm": size}, laws=[laws.Offset(size)])
+
+
+def _reported_less(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+    size = _sign(rng) * _between(rng, 0.3, 1.0)
+    law = laws.ReportedLess(size)
+    return Drawn("torque_sensor_offset", axis, {"offset_nm": size}, laws=[law])
 
 
 def _inertia(rng: Rng, _robot: Robot, axis: int) -> Drawn:
@@ -257,6 +269,15 @@ def _speed_filter(rng: Rng, robot: Robot, axis: int) -> Drawn:
     return Drawn("velocity_filter", axis, {"time_constant_s": stated}, Native(filter_s=lag))
 
 
+def _fed_forward(rng: Rng, robot: Robot, axis: int) -> Drawn:
+    name = robot.axis_names[axis - 1]
+    own = robot.parameters()
+    rate = _between(rng, 0.2, 1.0) * own[f"{name}.motor_inertia"]
+    speed = _between(rng, 0.3, 1.0) * own[f"{name}.viscous_friction"]
+    values = {"acceleration_nm_s2_rad": rate, "speed_nm_s_rad": speed}
+    return Drawn("feedforward_missing", axis, values, Native(for_rate=rate, for_speed=speed))
+
+
 # Of the largest torque of the arm's logs, as the caller knows it.
 _LARGEST_NM = np.array([20.0, 46.0, 40.0])
 
@@ -324,6 +345,9 @@ KINDS: Mapping[str, Kind] = {
     "piecewise_stiffness": Kind(_knee),
     "joint_zero_offset": Kind(_zero),
     "torque_sensor_gain": Kind(_reported),
+    "sensor_delay": Kind(_late_sensor),
+    "torque_sensor_offset": Kind(_reported_less),
+    "feedforward_missing": Kind(_fed_forward),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),

@@ -91,6 +91,9 @@ OTHER_GAINS = ("controller_gain", ("relative_proportional", "relative_integral")
 SPEED_FILTER = ("velocity_filter", "time_constant_s")
 """What a filter on the controller's speed is, and its parameter."""
 
+FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad"))
+"""What torque fed forward is, and its parameters: for the rate of the reference, for the reference."""
+
 TORQUE_CONSTANT = ("torque_constant", "relative_error")
 """What a motor with another torque constant is, and its parameter."""
 

@@ -37,7 +37,8 @@ class EffectInfo:
 
     ``family`` is the kind of cause. ``contains`` names the effects that this one becomes at some
     value of its parameters, ``parts`` simpler ones that together do what it does. ``usual``: effects
-    met more often that this one looks like where speed or load hardly change.
+    met more often that this one looks like where speed or load hardly change. ``twins``: effects of
+    which a machine gives the very same logs of commands and motor angles.
     ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first
     parameter is the change itself or a share. ``linear``: how a linear model holds it.
     ``inverse_dynamics``: whether torque predicted from measured motion can hold it. ``stiff``:
@@ -67,6 +68,7 @@ class EffectInfo:
     contains: tuple[str, ...]
     parts: tuple[str, ...]
     usual: tuple[str, ...]
+    twins: tuple[str, ...]
     stands_for: tuple[str, Literal["absolute", "relative"]] | None
     linear: Literal["parameters", "slope", "path", "waves", "no"]
     inverse_dynamics: bool
@@ -88,7 +90,7 @@ class EffectInfo:
         return {k: (order, cosine, sine) for k, (order, cosine, sine) in waves.items()}
 
 
-_TUPLES = ("contains", "parts", "usual", "absorbed_by", "shown_by")
+_TUPLES = ("contains", "parts", "usual", "twins", "absorbed_by", "shown_by")
 
 
 @cache

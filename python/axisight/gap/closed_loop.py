@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.feedback import loop_responses
 from axisight.gap.limits import missing, reported, torque_limits
-from axisight.gap.model import ModelFitter
+from axisight.gap.model import Evidence, ModelFitter
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.own_controller import other_controllers
 from axisight.gap.settings import Settings
@@ -112,6 +114,10 @@ def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
+# Seconds that a log is not cut below.
+_LEAST_S = 4.0
+
+
 class ClosedLoopFitter(ModelFitter):
     """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
 
@@ -135,6 +141,18 @@ class ClosedLoopFitter(ModelFitter):
 
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
+
+    def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
+        """Return the same for the first halves of the logs, if they are long enough, with a model."""
+        other = copy(self)
+        other.records = [(p[: len(p) // 2], t[: len(t) // 2]) for p, t in self.records]
+        least = _LEAST_S / self.robot.sample_time_s
+        if min(len(p) for p, _ in other.records) < least:
+            return None
+        found = other.fit(model.free, model, max_iterations=0)
+        # The very same values: fits of what this model screens begin at those of the whole.
+        same = replace(found, robot_values=model.robot_values, log=np.unique(model.log)[found.log])
+        return other, same
 
     def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:
         """Return the problem as the core takes it."""

@@ -240,6 +240,11 @@ class ModelFitter(ABC):
         other._keep(logs)
         return other
 
+    def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
+        """Return the same for the beginnings of the logs, with a model as it is; None to take the whole."""
+        del model
+        return None
+
     def counted(self) -> Array | None:
         """Return what every residual counts for (n_residuals,), from 0 to 1; None where all are one."""
         return None

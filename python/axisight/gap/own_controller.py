@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from axisight.effects.stated import OTHER_GAINS, SPEED_FILTER
+from axisight.effects.stated import FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
 from axisight.gap.feedback import before, gain_shares
 from axisight.gap.gate.control_law import free_of_limits
 from axisight.gap.result import Interval
@@ -72,6 +72,11 @@ class _Piece:
         both = gain_shares(self._robot, error, angle, self._axis)
         return np.column_stack([self._seen(x) for x in both])
 
+    def forward(self) -> Array:
+        """Return the rate of the reference and the reference (n, 2) [rad/s^2, rad/s]."""
+        rate = np.diff(self._reference, prepend=self._reference[:1]) / self._time
+        return np.column_stack([self._seen(rate), self._seen(self._reference)])
+
     def _seen(self, x: Array) -> Array:
         """Return a torque below the band, where no limit cuts it, without its mean."""
         low = lowpass(np.ascontiguousarray(x), self._time, self._band_hz)[self._kept]
@@ -86,12 +91,14 @@ def _later(x: Array, samples: int) -> Array:
 class _Law:
     """A controller and the squares (n_logs,) that it leaves of the torque in every log.
 
-    ``factors``: of the two gains; ``lag_s``: of the filter.
+    ``factors``: of the two gains; ``lag_s``: of the filter; ``forward``: torque for the rate of the
+    reference and for the reference.
     """
 
     factors: Array
     lag_s: float
     left: Array
+    forward: Array
 
     @property
     def total(self) -> float:
@@ -100,7 +107,8 @@ class _Law:
 
 def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
     """Return what is different about the controller, axis by axis, where logs show it."""
-    known = {e.axis for e in robot.effects if e.name in (OTHER_GAINS[0], SPEED_FILTER[0])}
+    controllers = (OTHER_GAINS[0], SPEED_FILTER[0], FEEDFORWARD[0])
+    known = {e.axis for e in robot.effects if e.name in controllers}
     axes = [i for i in range(robot.n_axes) if i + 1 not in known]
     found = (_of_axis(i, [_Piece(robot, log, i) for log in logs]) for i in axes)
     return tuple(cause for causes in found for cause in causes)
@@ -124,11 +132,25 @@ def _others(pieces: Sequence[_Piece]) -> Iterator[_Law]:
     yield _law(pieces, np.ones(2), lag)
     lag = _best_lag(pieces, lambda lag: _factors(pieces, lag))
     yield _law(pieces, _factors(pieces, lag), lag)
+    yield _law(pieces, np.ones(2), 0.0, _fed_forward(pieces))
 
 
-def _law(pieces: Sequence[_Piece], factors: Array, lag_s: float) -> _Law:
-    left = [float(np.sum((p.torque - p.shares(lag_s) @ factors) ** 2)) for p in pieces]
-    return _Law(factors, lag_s, np.array(left))
+def _law(
+    pieces: Sequence[_Piece], factors: Array, lag_s: float, forward: Array | None = None
+) -> _Law:
+    errors = [p.torque - p.shares(lag_s) @ factors for p in pieces]
+    if forward is not None:
+        errors = [e - p.forward() @ forward for e, p in zip(errors, pieces, strict=True)]
+    left = np.array([float(e @ e) for e in errors])
+    return _Law(factors, lag_s, left, np.zeros(2) if forward is None else forward)
+
+
+def _fed_forward(pieces: Sequence[_Piece]) -> Array:
+    """Return the torque for rate and speed of the reference that leaves least of the command."""
+    missed = np.concatenate([p.torque - p.shares().sum(axis=1) for p in pieces])
+    columns = np.concatenate([p.forward() for p in pieces])
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(columns / size, missed, rcond=1e-12)[0] / size)
 
 
 def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
@@ -159,13 +181,15 @@ def _best_lag(pieces: Sequence[_Piece], factors: Callable[[float], Array]) -> fl
 def _holds(law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> bool:
     """Whether a controller gives nearly all that the stated one misses, in every log that shows it.
 
-    A filter resembles positions that are read a sample late, which it is not.
+    A filter resembles positions that are read a sample late, which it is not; so does feedforward
+    where the machine keeps to its reference.
     """
     power = np.array([float(p.torque @ p.torque) for p in pieces])
     shows = stated.left > _NOTHING * power
     if np.any(law.left[shows] > _LEFT * stated.left[shows]):
         return False
-    late = [p.torque - p.shares(late=1).sum(axis=1) for p in pieces] if law.lag_s else []
+    resembles = law.lag_s > 0 or bool(law.forward.any())
+    late = [p.torque - p.shares(late=1).sum(axis=1) for p in pieces] if resembles else []
     return not late or sum(float(x @ x) for x in late) > law.total
 
 
@@ -186,6 +210,18 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
             f"which misses {100 * explained:.4g} % less so."
         )
         out.append(ShownCause(OTHER_GAINS[0], axis + 1, values, samples, explained, says))
+    if law.forward.any():
+        each = np.array([_fed_forward([p]) for p in pieces])
+        spread = each.std(axis=0) * 2 / np.sqrt(len(pieces)) + _FORMULA * np.abs(law.forward)
+        values = {
+            name: Interval(float(f), float(f - s), float(f + s))
+            for name, f, s in zip(FEEDFORWARD[1], law.forward, spread, strict=True)
+        }
+        says = (
+            f"Axis {axis + 1}: with {law.forward[0]:.4g} Nm per rad/s^2 and {law.forward[1]:.4g} Nm per rad/s "
+            f"of the reference the stated controller misses {100 * explained:.4g} % less of the logged torque."
+        )
+        out.append(ShownCause(FEEDFORWARD[0], axis + 1, values, samples, explained, says))
     if law.lag_s:
         lag = law.lag_s
         value = {SPEED_FILTER[1]: Interval(lag, lag * (1 - _OF_A_LAG), lag * (1 + _OF_A_LAG))}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -267,7 +268,7 @@ class KeptScreen(Screen):
 
 
 def thinned(bench: Bench, above: Array, layout: Layout, kept: KeptColumns | None = None) -> Screen:
-    """Return the screen of a model on the logs of a bench that have most to explain.
+    """Return the screen of a model on part of what a bench has: beginnings of the loudest logs.
 
     ``above`` (n_blocks,): loss above the floor; ``kept``: what models before it have left.
     """
@@ -275,12 +276,27 @@ def thinned(bench: Bench, above: Array, layout: Layout, kept: KeptColumns | None
     if kept is not None:
         kept.begin(logs)
     here = np.isin(layout.log, logs)
-    if here.all():
+    part = bench if here.all() else Bench(bench.fitter.part(logs), bench.model.part(logs))
+    begun = part.fitter.begun(part.model)
+    if begun is not None:
+        here[here] = _beginnings(part.model, begun[1])
+        part = Bench(*begun)
+    if part is bench:
         return Screen(bench, kept=kept)
     scale = float(above.sum() / max(above[here].sum(), 1e-300))
     more = float(layout.counted.sum() / max(layout.counted[here].sum(), 1e-300))
-    part = Bench(bench.fitter.part(logs), bench.model.part(logs))
     return Screen(part, max(scale, 1.0), more, kept)
+
+
+def _beginnings(whole: Evidence, begun: Evidence) -> NDArray[np.bool_]:
+    """Return which blocks of a model (n_blocks,) lie in the beginnings of its logs."""
+    left = Counter(zip(begun.log.tolist(), begun.axis.tolist(), strict=True))
+    first = []
+    # Those of an axis of a log stand in the order of time.
+    for place in zip(whole.log.tolist(), whole.axis.tolist(), strict=True):
+        first.append(left[place] > 0)
+        left[place] -= 1
+    return np.array(first)
 
 
 def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> list[int]:

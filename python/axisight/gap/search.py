@@ -140,7 +140,13 @@ def search(
         out.rounds.append(Round(standings, taken, out.left()))
         if not taken:
             break
-        _take_in(fitter, out, taken, progress)
+        try:
+            _take_in(fitter, out, taken, progress)
+        except InputError as error:
+            # Together they cannot be simulated: what promised most was none of it.
+            refused.add(taken[0][0].trial.label)
+            out.skipped[taken[0][0].trial.label] = str(error)
+            continue
         refused |= _drop_idle(fitter, out, settings)
         refused |= _merge(fitter, out, settings, offered)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:

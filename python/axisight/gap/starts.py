@@ -355,6 +355,10 @@ def _shown_by_logs(_trial: Trial) -> None:
     """Offer nothing: what the controller does is algebra of the logs, no fit of a machine."""
 
 
+def _as_its_twin(_trial: Trial) -> None:
+    """Offer nothing: an effect that is tried gives the very same logs."""
+
+
 STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "viscous_friction": _neutral,
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
@@ -394,5 +398,8 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "piecewise_stiffness": _knee,
     "joint_zero_offset": _neutral,
     "torque_sensor_gain": _shown_by_logs,
+    "sensor_delay": _as_its_twin,
+    "torque_sensor_offset": _as_its_twin,
+    "feedforward_missing": _shown_by_logs,
 }
 """By effect."""

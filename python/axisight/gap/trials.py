@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.errors import InputError
 from axisight.gap.decide import Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.kept import KeptColumns
@@ -226,10 +227,20 @@ class Trials:
         while todo := next(iter(self._worth_refining(trials, done, crooked)), None):
             self.progress(label, len(done), len(done) + 1)
             done.add(todo.label)
-            better = trial(todo.candidate, settled(self.fitter, todo.evidence.free, todo.evidence))
-            trials = [better if t is todo else t for t in trials]
+            better = self._refined(todo)
+            with_it = (better if t is todo else t for t in trials)
+            trials = [t for t in with_it if t is not None]
         self.progress(label, 1, 1)
         return trials
+
+    def _refined(self, one: Trial) -> Trial | None:
+        """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
+        try:
+            evidence = settled(self.fitter, one.evidence.free, one.evidence)
+        except InputError as error:
+            self.skipped[one.label] = str(error)
+            return None
+        return trial(one.candidate, evidence)
 
     def _crooked(self, trials: Sequence[Trial]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""

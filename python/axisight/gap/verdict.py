@@ -19,6 +19,7 @@ from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
 from axisight.gap.torque_sensor import with_torque_sensors
+from axisight.gap.twins import about_twins, less_their_twins, open_twins, with_twins
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ def conclude(
     if shown and not accepted:
         ranking = (_candidate_shown(shown[0]),)
         p_none, p_unknown = 0.0, 1.0 - _SHOWN
+    ranking = with_twins(ranking)
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
     gap = stands_out and _significant(found, settings)
@@ -90,15 +92,19 @@ def conclude(
     named = {c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in causes}
     return Conclusion(
         verdict=verdict,
-        causes=causes,
+        causes=less_their_twins(causes),
         alternatives=tuple(c for c in ranking if c.label not in named)[:5],
-        equivalent=open_groups if believed else (),
+        equivalent=(*open_groups, *open_twins(causes)) if believed else (),
         next_experiment=advice,
         ranking=ranking,
         p_none=p_none,
         p_unknown=p_unknown,
         axes=_axes(found, settings, causes, gap=gap),
-        checks=(*(x.says for x in shown), *_checks(found, settings, explained)),
+        checks=(
+            *(x.says for x in shown),
+            *about_twins(causes),
+            *_checks(found, settings, explained),
+        ),
         effects=effects,
     )
 

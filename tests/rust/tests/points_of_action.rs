@@ -28,6 +28,7 @@ const fn info(scope: Scope, acts: Acts) -> EffectInfo {
         contains: &[],
         parts: &[],
         usual: &[],
+        twins: &[],
         stands_for: None,
         linear: Linear::No,
         inverse_dynamics: false,

@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,

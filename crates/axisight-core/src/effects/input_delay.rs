@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &["sensor_delay"],
     stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: false,

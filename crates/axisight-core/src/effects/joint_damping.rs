@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: Some(StandsFor { quantity: "damping", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: false,

@@ -15,6 +15,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &["coulomb_friction"],
+    twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,

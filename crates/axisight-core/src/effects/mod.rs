@@ -105,6 +105,9 @@ effect_table!(
     piecewise_stiffness,
     joint_zero_offset,
     torque_sensor_gain,
+    sensor_delay,
+    torque_sensor_offset,
+    feedforward_missing,
 );
 
 /// Description of effect `name`.

@@ -27,6 +27,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: None,
     linear: Linear::Parameters,
     inverse_dynamics: true,

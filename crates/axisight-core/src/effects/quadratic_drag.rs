@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &["viscous_friction"],
+    twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,

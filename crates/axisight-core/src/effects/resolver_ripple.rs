@@ -15,6 +15,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: None,
     linear: Linear::Waves { constant: 0, proportional: 0, reading: 12 },
     inverse_dynamics: false,

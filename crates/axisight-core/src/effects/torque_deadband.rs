@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &["torque_offset"],
+    twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,

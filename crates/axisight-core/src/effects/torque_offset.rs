@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &["torque_sensor_offset"],
     stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: true,

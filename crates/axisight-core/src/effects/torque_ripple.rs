@@ -15,6 +15,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: None,
     linear: Linear::Waves { constant: 9, proportional: 3, reading: 0 },
     inverse_dynamics: true,

@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &[],
     parts: &[],
     usual: &[],
+    twins: &[],
     stands_for: Some(StandsFor { quantity: "viscous_friction", change: Change::Absolute }),
     linear: Linear::Slope,
     inverse_dynamics: true,

@@ -196,6 +196,8 @@ pub struct EffectInfo {
     /// Effects met more often, of the same family, that this one looks like where speed or load
     /// hardly change.
     pub usual: &'static [&'static str],
+    /// Effects of which a machine gives the very same logs of commands and motor angles.
+    pub twins: &'static [&'static str],
     /// Parameter of the robot it is a change of.
     pub stands_for: Option<StandsFor>,
     /// How a linear model holds it.

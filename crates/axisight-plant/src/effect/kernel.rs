@@ -243,6 +243,11 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn controller_gains(&self) -> Option<[S; 2]> {
         None
     }
+    /// What the controller adds to its command for the rate of the reference [Nm s^2/rad] and for the
+    /// reference itself [Nm s/rad].
+    fn feedforward(&self) -> Option<[S; 2]> {
+        None
+    }
     /// Time constant of the filter through which the controller takes the speed [s]; `None` at zero.
     fn speed_filter(&self) -> Option<S> {
         None

@@ -9,6 +9,8 @@ use axisight_scalar::Scalar;
 pub struct OwnLaw<S> {
     /// Factors of the proportional and the integral gain.
     gains: [S; 2],
+    /// Torque for the rate of the reference, and for the reference; `None` without.
+    forward: Option<[S; 2]>,
     /// Share of a new speed in the filtered one; `None` without a filter.
     filter: Option<S>,
 }
@@ -19,12 +21,14 @@ impl<S: Scalar> OwnLaw<S> {
         let one = |axis: &Axis<S>| {
             let mut own = Self {
                 gains: [S::one(); 2],
+                forward: None,
                 filter: None,
             };
             for kernel in &axis.kernels {
                 if let Some([kp, ki]) = kernel.controller_gains() {
                     own.gains = [own.gains[0] * kp, own.gains[1] * ki];
                 }
+                own.forward = kernel.feedforward().or(own.forward);
                 if let Some(lag) = kernel.speed_filter() {
                     // Backward difference: without a lag the speed is what it was.
                     own.filter = Some((lag + sample_time).recip() * sample_time);
@@ -43,6 +47,7 @@ pub struct ControlLoop<S> {
     feed_forward: Vec<S>,
     reference_angle: Vec<S>,
     previous: Option<Vec<S>>,
+    previous_reference: Vec<S>,
     integral: Vec<S>,
     own: Vec<OwnLaw<S>>,
     filtered: Vec<S>,
@@ -68,6 +73,7 @@ impl<S: Scalar> ControlLoop<S> {
             feed_forward: feed_forward.to_vec(),
             reference_angle: angle.to_vec(),
             previous: None,
+            previous_reference: Vec::with_capacity(angle.len()),
             integral: vec![S::zero(); angle.len()],
             first_lag: Vec::with_capacity(angle.len()),
             last_lag: Vec::with_capacity(angle.len()),
@@ -77,6 +83,9 @@ impl<S: Scalar> ControlLoop<S> {
     /// Commands for measured motor angles `measured` and velocity references `reference`.
     pub fn command(&mut self, measured: &[S], reference: &[S], out: &mut [S]) {
         let rate = 1.0 / self.sample_time;
+        if self.previous_reference.is_empty() {
+            self.previous_reference.extend_from_slice(reference);
+        }
         for i in 0..measured.len() {
             let speed = match &self.previous {
                 Some(previous) => (measured[i] - previous[i]) * rate,
@@ -87,7 +96,7 @@ impl<S: Scalar> ControlLoop<S> {
             let angle_error = self.reference_angle[i] - measured[i];
             let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
             let feedback = self.feedback(i, speed_error, angle_error, gains);
-            out[i] = self.feed_forward[i] + feedback;
+            out[i] = self.feed_forward[i] + feedback + self.forward(i, reference[i]);
             self.reference_angle[i] += reference[i] * self.sample_time;
         }
         match &mut self.previous {
@@ -114,6 +123,17 @@ impl<S: Scalar> ControlLoop<S> {
             self.last_lag[i] = lag;
             command[i] += self.feedback(i, -speed, -behind, [S::one(); 2]);
         }
+    }
+
+    /// Torque for the reference of axis `i` and its rate; none at the first sample.
+    #[inline(always)]
+    fn forward(&mut self, i: usize, reference: S) -> S {
+        let Some([for_rate, for_itself]) = self.own.get(i).and_then(|own| own.forward) else {
+            return S::zero();
+        };
+        let before = self.previous_reference[i];
+        self.previous_reference[i] = reference;
+        for_rate * ((reference - before) * (1.0 / self.sample_time)) + for_itself * reference
     }
 
     /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.

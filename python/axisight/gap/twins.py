@@ -1,0 +1,56 @@
+"""Effects that nobody can tell apart by the logs of commands and motor angles: said, not hidden.
+
+A position that is read late gives the very logs of a torque that is applied late. The usual one of
+such twins is tried and named; the others stand beside it with a share of its probability.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from axisight.effects import Effect, effect_info, phrase
+from axisight.gap.named import NamedCause
+from axisight.gap.result import Candidate
+
+# How often it is the twin, of machines that give such logs: as nothing tells, what is usual has the
+# odds of four to one.
+_SHARE = 0.2
+
+
+def with_twins(ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return the ranking with twins beside those they are twins of, each with its share."""
+    out = []
+    for one in ranking:
+        names = effect_info(one.effect).twins
+        out.append(replace(one, probability=one.probability * (1 - _SHARE * len(names))))
+        out += [replace(one, effect=n, probability=one.probability * _SHARE) for n in names]
+    return tuple(sorted(out, key=lambda c: -c.probability))
+
+
+def less_their_twins(causes: Sequence[NamedCause]) -> tuple[NamedCause, ...]:
+    """Return the causes without the share of probability that their twins have."""
+    return tuple(
+        replace(c, probability=c.probability * (1 - _SHARE * len(effect_info(c.effect).twins)))
+        for c in causes
+    )
+
+
+def open_twins(causes: Sequence[NamedCause]) -> tuple[tuple[str, ...], ...]:
+    """Return the sets of labels that stay open, one for each cause that has twins."""
+    named = [(c, (c.effect, *effect_info(c.effect).twins)) for c in causes]
+    return tuple(tuple(Effect(n, c.axis).label for n in s) for c, s in named if len(s) > 1)
+
+
+def about_twins(causes: Sequence[NamedCause]) -> tuple[str, ...]:
+    """Return a sentence for each cause that has twins."""
+    out = []
+    for c in causes:
+        there = "" if c.axis is None else f" on axis {c.axis}"
+        others = " or ".join(phrase(n) for n in effect_info(c.effect).twins)
+        if others:
+            out.append(
+                f"The logs of {phrase(c.effect)}{there} are those of {others}: what is met more "
+                "often is named. A second sensor, on the joint or of the torque, would tell."
+            )
+    return tuple(out)
