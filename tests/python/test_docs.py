@@ -72,7 +72,7 @@ def test_table_cells_cannot_break_the_effects_page(repository: Path) -> None:
     )
     effect = {"name": "e", "summary": "s|t", "equation": "x", "source": "y"}
     effect |= {"scope": "arm", "acts": "arm", "parameters": [parameter]}
-    effect |= {"family": "arm", "contains": [], "parts": [], "usual": []}
+    effect |= {"family": "arm", "contains": [], "parts": [], "usual": [], "twins": []}
     effect |= {"stands_for": None, "linear": "no", "inverse_dynamics": False}
     rows = [line for line in script.render([effect]).splitlines() if line.startswith("| ")]
     for row, columns in zip(rows, (3, 3, 6, 6), strict=True):
