@@ -78,6 +78,13 @@ def diagnose_command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
     effect: GivenEffects = None,
+    next_experiment: Annotated[
+        Path | None,
+        typer.Option(
+            help="Design the experiment that tells the causes apart which stay open, and write its "
+            "references into this folder.",
+        ),
+    ] = None,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -106,6 +113,7 @@ def diagnose_command(
             "--tolerance": tolerance,
             "--threads": threads,
             "--effect": effect,
+            "--next-experiment": next_experiment,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -136,8 +144,24 @@ def diagnose_command(
                 validation=inputs.validation,
                 settings=settings,
                 progress=progress,
+                separate=next_experiment is not None,
             )
         write_diagnosis(found, json, report)
+        if next_experiment is not None:
+            _write_experiment(found, next_experiment)
+
+
+def _write_experiment(found: Diagnosis, folder: Path) -> None:
+    """Write the designed experiment where there is one that decides; say it where there is none."""
+    made = found.experiment
+    if made is None:
+        why = "needs references in every log" if found.mode != "closed_loop" else "nothing is open"
+        OUT.print(f"no experiment: {why}")
+    elif not made.decides:
+        OUT.print("no experiment was written: none of those tried decides")
+    else:
+        for path in made.write(folder):
+            OUT.print(f"experiment: {path}", soft_wrap=True)
 
 
 def write_diagnosis(found: Diagnosis, json: Path | None, report: Path | None) -> None:

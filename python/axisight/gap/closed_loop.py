@@ -50,6 +50,8 @@ _Problem = tuple[
 class ClosedLoopView(View):
     """Simulator and machine driven by the same references."""
 
+    fitter: ClosedLoopFitter
+
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         self.tracking = robot.with_controller_speed(TRACKING_SPEED)
         limits = torque_limits(robot, logs)
@@ -142,10 +144,15 @@ class ClosedLoopFitter(ModelFitter):
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
 
+    def along(self, records: list[tuple[Array, Array]]) -> ClosedLoopFitter:
+        """Return the same for other runs, as ``records`` are."""
+        other = copy(self)
+        other.records = records
+        return other
+
     def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
         """Return the same for the first halves of the logs, if they are long enough, with a model."""
-        other = copy(self)
-        other.records = [(p[: len(p) // 2], t[: len(t) // 2]) for p, t in self.records]
+        other = self.along([(p[: len(p) // 2], t[: len(t) // 2]) for p, t in self.records])
         least = _LEAST_S / self.robot.sample_time_s
         if min(len(p) for p, _ in other.records) < least:
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -29,6 +29,7 @@ from axisight.gap.modes import view_of
 from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
+from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
@@ -55,6 +56,7 @@ def diagnose(
     name: str | None = None,
     settings: Settings | None = None,
     progress: Progress = _silent,
+    separate: bool = False,
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
@@ -66,6 +68,8 @@ def diagnose(
     name : what to call the case.
     settings : tolerances of the simulator's parameters, thresholds, seed.
     progress : called with (what, done, total).
+    separate : also design the experiment that tells the causes apart which stay open,
+        ``Diagnosis.experiment`` (closed loop only).
 
     Returns
     -------
@@ -95,6 +99,12 @@ def diagnose(
     seen = _seen(view, held_logs, found, said, chosen)
     out = _assemble(name or found_name, machine, view, held_logs, seen, error_logs, chosen, noted)
     progress("measuring the gap", 1, 1)
+    if separate:
+        progress("designing an experiment", 0, 1)
+        experiment = separating_experiment_of(view, seen.found)
+        progress("designing an experiment", 1, 1)
+        if experiment is not None:
+            out = replace(out, experiment=experiment, next_experiment=str(experiment))
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
 

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.gap.faults import Finding
+from axisight.gap.separate.experiment import Experiment
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
@@ -192,7 +193,8 @@ class Diagnosis:
     ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
     the names of `Settings`.
     ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
-    parameters that the re-fit took to the edge of their tolerance.
+    parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
+    causes apart that stay open, where it was asked for.
     """
 
     name: str
@@ -219,6 +221,7 @@ class Diagnosis:
     findings: tuple[Finding, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
+    experiment: Experiment | None = None
 
     def to_verdict(self) -> dict[str, Any]:
         """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.

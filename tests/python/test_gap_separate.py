@@ -1,0 +1,166 @@
+"""The experiment that separates two causes: within what was seen, decisive, and honest where none is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from axisight import Diagnosis, Effect, Log, Robot, Settings, diagnose, simulate
+from axisight.blind.case_files import CaseFolder
+from axisight.cli import app
+from axisight.excitation import read_references
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.model import FreeEffect
+from axisight.gap.separate.design import separating
+from axisight.gap.separate.rivals import Rivals
+from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
+from gap_data import bare_axis, scattered
+
+
+def one_way(seed: int, n: int, sample_time_s: float) -> np.ndarray:
+    """A motor that turns one way, not quite evenly: friction and an offset look alike."""
+    time = np.arange(n) * sample_time_s
+    lines = np.arange(1.0, 12.0, 0.5)
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+    wave = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
+    return (np.minimum(time / 0.1, 1.0) * (10.0 + 2.0 * wave / np.abs(wave).max()))[:, None]
+
+
+def log_of(machine: Robot, effects: list[Effect], reference: np.ndarray, run: int) -> Log:
+    data = simulate(machine, reference, effects=effects, noise_seed=5, run=run)
+    assert data.attrs["status"] == "completed"
+    return Log(
+        name=f"run{run}",
+        source=Path(f"run{run}.parquet"),
+        sample_time_s=machine.sample_time_s,
+        time_s=data.time.values,
+        velocity_ref_rad_s=reference,
+        torque_nm=data.torque_cmd_nm.values,
+        position_rad=data.position_rad.values,
+    )
+
+
+FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.05, "smoothing_rad_s": 0.1})
+OFFSET = Effect("torque_offset", 1, {"offset_nm": -0.05})
+MACHINE = scattered(bare_axis(), 4)
+
+
+@pytest.fixture(scope="module")
+def logs() -> list[Log]:
+    n = round(3 / MACHINE.sample_time_s)
+    references = [one_way(s, n, MACHINE.sample_time_s) for s in (1, 2, 3)]
+    return [log_of(MACHINE, [FRICTION], r, k) for k, r in enumerate(references)]
+
+
+@pytest.fixture(scope="module")
+def open_case(logs: list[Log]) -> Diagnosis:
+    return diagnose(robot=bare_axis(), estimation=logs[:2], validation=logs[2:], separate=True)
+
+
+@pytest.fixture(scope="module")
+def view(logs: list[Log]) -> ClosedLoopView:
+    return ClosedLoopView(bare_axis(), logs[:2], Settings())
+
+
+def rivals(view: ClosedLoopView, one: Effect, other: Effect) -> Rivals:
+    free = [FreeEffect(e, (next(iter(e.parameters or {})),)) for e in (one, other)]
+    return Rivals((one.label, other.label), (view.fitter.fit(free[:1]), view.fitter.fit(free[1:])))
+
+
+def test_what_is_open_is_decided_by_the_experiment(open_case: Diagnosis, logs: list[Log]):
+    """Recovery from known truth: undecidable before, the truth and nothing else after."""
+    assert open_case.verdict == "undecidable"
+    assert set(open_case.equivalent[0]) >= {"coulomb_friction@1", "torque_offset@1"}
+    made = open_case.experiment
+    assert made is not None and made.decides
+    assert made.rivals == ("coulomb_friction@1", "torque_offset@1")
+    assert open_case.next_experiment == str(made)
+    new = log_of(MACHINE, [FRICTION], made.references.period[0], 7)
+    after = diagnose(robot=bare_axis(), estimation=[*logs[:2], new], validation=logs[2:])
+    assert (after.verdict, [c.effect for c in after.causes]) == ("explained", ["coulomb_friction"])
+    assert after.causes[0].probability > 0.95
+
+
+def test_friction_and_an_offset_differ_where_a_motor_turns_round(view: ClosedLoopView):
+    """Closed form: one way they are the same torque; of a square of both ways each misses the other's
+    by all of it for half of the time at the least."""
+    made = separating(view, rivals(view, FRICTION, OFFSET))
+    assert made is not None
+    # The motor turns both ways for as long.
+    way = np.sign(made.references.period[0, :, 0])
+    assert abs(way.mean()) < 0.2
+    # A torque of 0.05 Nm, in units of the noise that the logs have between 1 and 100 Hz.
+    assert made.evidence > 1.0
+
+
+def test_a_cause_is_not_told_from_itself(view: ClosedLoopView):
+    made = separating(view, rivals(view, FRICTION, FRICTION))
+    assert made is None or made.evidence < 1e-4
+
+
+def test_what_no_motion_tells_is_said(view: ClosedLoopView):
+    """On one stiff axis all torque is inertia: a motor that gives less is one that weighs more."""
+    weak = Effect("torque_constant", 1, {"relative_error": -0.05})
+    heavy = Effect("motor_inertia", 1, {"relative_change": 0.05})
+    logs = [log_of(MACHINE, [heavy], log.velocity_ref_rad_s, k) for k, log in enumerate(view.logs)]
+    seen = ClosedLoopView(bare_axis(), logs, Settings())
+    made = separating(seen, rivals(seen, heavy, weak))
+    assert made is not None
+    assert not made.decides
+    assert str(made).startswith("No motion within")
+
+
+def test_motions_stay_within_what_was_seen(logs: list[Log]):
+    seen = seen_range(logs)
+    step = MACHINE.sample_time_s
+    tried = [standard(seen, step, 0), *motions(seen, (1,), step, 100.0, 0)]
+    assert len({m.words for m in tried}) > 15
+    for motion in tried:
+        speed, turned = motion.reference[:, 0], np.cumsum(motion.reference[:, 0]) * step
+        assert np.abs(speed).max() <= seen.speed[0] * (1 + 1e-9)
+        # The drift of rounding, and the motor behind its reference, aside.
+        assert turned.max() <= seen.forth[0] * (1 + 1e-6) + 1e-9, motion.words
+        assert turned.min() >= seen.back[0] * (1 + 1e-6) - 1e-9, motion.words
+        assert abs(len(speed) * step - SECONDS) < 8 * step
+
+
+def test_a_motion_begins_and_ends_at_rest_where_it_began(logs: list[Log]):
+    seen = seen_range(logs)
+    for motion in motions(seen, (1,), MACHINE.sample_time_s, 100.0, 0):
+        speed = motion.reference[:, 0]
+        assert abs(speed[0]) <= 1e-12
+        assert abs(speed.sum()) <= 1e-9 * np.abs(speed).sum()
+
+
+def test_the_design_is_a_function_of_the_seed(view: ClosedLoopView):
+    both = rivals(view, FRICTION, OFFSET)
+    one, other = separating(view, both), separating(view, both)
+    assert one is not None and other is not None
+    np.testing.assert_array_equal(one.references.period, other.references.period)
+    assert one.evidence == other.evidence
+
+
+def test_the_command_writes_references_that_can_be_run(tmp_path: Path, logs: list[Log]):
+    case = CaseFolder(tmp_path / "case", "open")
+    for log, role in zip(logs, ("estimation", "estimation", "validation"), strict=True):
+        reference = log.velocity_ref_rad_s
+        case.add(log.name, role, log.time_s, reference, log.torque_nm, log.position_rad)
+    case.finish("two_mass_axis")
+    robot = tmp_path / "case" / "robot.toml"
+    robot.write_text(robot.read_text("utf-8").split("[[effects]]")[0], "utf-8")
+    out = tmp_path / "next"
+    done = CliRunner().invoke(
+        app, ["diagnose", str(tmp_path / "case"), "--next-experiment", str(out)]
+    )
+    assert done.exit_code == 0, done.output
+    found = read_references(out / "references.parquet")
+    assert found.period.shape == (1, round(SECONDS / found.sample_time_s), 1)
+    says = " ".join((out / "experiment.txt").read_text("utf-8").split())
+    assert says in " ".join(done.output.split())
+
+
+def test_a_clear_case_asks_for_no_experiment(tmp_path: Path, logs: list[Log]):
+    clear = [log_of(MACHINE, [], log.velocity_ref_rad_s, k) for k, log in enumerate(logs)]
+    found = diagnose(robot=bare_axis(), estimation=clear[:2], validation=clear[2:], separate=True)
+    assert (found.verdict, found.experiment, found.next_experiment) == ("none", None, None)
