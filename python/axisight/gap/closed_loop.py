@@ -100,6 +100,16 @@ class ClosedLoopView(View):
         effects = {e.label: e for e in (*self.robot.effects, *variant.effects)}.values()
         return [reported(torque, self.limits, effects) for torque in out]
 
+    def weighting_with(self, torque_nm: Array) -> Weighting:
+        """Return the weights that there would be with one more log, of this torque (n, n_axes)."""
+        torques = [*(log.torque_nm for log in self.logs), torque_nm]
+        torque = _mean_density(torques, self.logs[0])
+        floor = self.floor
+        total = _total_density(
+            self.tracking, self._noisy, floor.frequency_hz, floor.noise, torque, self.settings
+        )
+        return replace(self.floor.weighting, weight=1.0 / np.sqrt(total))
+
     def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
         return noise_torques(
@@ -275,16 +285,34 @@ def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Setti
     (noise,) = noise_torques(tracking, [log], std, settings.seed)
     rate, segment = 1.0 / log.sample_time_s, segment_of(log)
     f, noise_density = torque_density(noise, rate, segment)
-    torque = np.mean([torque_density(x.torque_nm, rate, segment)[1] for x in logs], axis=0)
-    passed = _passed(tracking, f) / _passed(own, f)
-    total = noise_density + settings.model_error**2 * torque * passed**2
-    # A noise-free simulated log still needs a finite weight.
-    total = np.maximum(total, 1e-12 * torque.max())
+    torque = _mean_density([x.torque_nm for x in logs], log)
+    total = _total_density(tracking, own, f, noise_density, torque, settings)
     decimation = max(1, int(rate / (2 * settings.bandwidth_hz)))
     weighting = Weighting(f, 1.0 / np.sqrt(total), decimation)
     band = f <= rate / (2 * decimation)
     expected = np.mean((noise_density / total)[:, band], axis=1)
     return Floor(std, f, noise_density, weighting, expected)
+
+
+def _mean_density(torques: Sequence[Array], like: Log) -> Array:
+    """Return the mean density of torques (n_axes, n_freq), averaged over segments as those of a log."""
+    rate, segment = 1.0 / like.sample_time_s, segment_of(like)
+    return np.asarray(np.mean([torque_density(x, rate, segment)[1] for x in torques], axis=0))
+
+
+def _total_density(
+    tracking: Robot,
+    own: Robot,
+    frequency_hz: Array,
+    noise: Array,
+    torque: Array,
+    settings: Settings,
+) -> Array:
+    """Return the density of noise and of errors of formulas (n_axes, n_freq) at a density of torque."""
+    passed = _passed(tracking, frequency_hz) / _passed(own, frequency_hz)
+    total = noise + settings.model_error**2 * torque * passed**2
+    # A noise-free simulated log still needs a finite weight.
+    return np.asarray(np.maximum(total, 1e-12 * torque.max()))
 
 
 def _passed(robot: Robot, frequency_hz: Array) -> Array:

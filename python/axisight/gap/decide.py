@@ -208,6 +208,18 @@ def smallest_likely_fall(loss: Array, cost: float) -> Array:
     return np.asarray(loss * -np.expm1(-2 * _PARAMETER_COST * cost / _INDEPENDENT_BLOCKS))
 
 
+def log_ratio(left: Array, explained: Array, samples: Array) -> Array:
+    """Return how much likelier a true cause is than one that leaves more, as `stand` counts.
+
+    In each of several parts of the data, with ``samples`` residuals each: ``left``, mean square that
+    the wrong one leaves above the noise, and ``explained``, that there is without either. The last
+    dimension is that of the parts.
+    """
+    least = (samples * (1.0 + _FORMULA_ERROR * explained)).sum(axis=-1)
+    more = (samples * left).sum(axis=-1)
+    return np.asarray(0.5 * _INDEPENDENT_BLOCKS * np.log1p(more / least))
+
+
 def clearly_worse(loss: float, than: float) -> bool:
     """Whether a held-out loss is worse by more than a likelihood ratio of e^2."""
     return bool(0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from axisight.gap.gate.control_law import ControlLaw, LawFit
 
 # Looked for up to here, or a tenth of the log.
@@ -31,9 +33,14 @@ def best_shift(law: ControlLaw, axis: int, believed: Callable[[LawFit], bool]) -
     ``believed``: whether a fit is as good as that of a law that holds.
     """
     reach = min(int(_REACH_S / law.sample_time_s), len(law.torque) // 10)
-    most_left = _LEFT * (1.0 - law.fit(axis, axis, axis).explained)
+    given = law.fit(axis, axis, axis)
+    most_left = _LEFT * (1.0 - given.explained)
+    moves = (True, np.isfinite(given.reference), np.isfinite(given.position))
     best: Shift | None = None
     for place, field in enumerate(("torque", "velocity_ref", "position")):
+        if not moves[place]:
+            # A channel that stands is nowhere late: the law holds once the start is left out.
+            continue
         lag, fit = _best_lag(law, axis, place, range(-reach, reach + 1, law.step))
         lag, fit = _best_lag(law, axis, place, range(lag - law.step, lag + law.step + 1))
         holds = believed(fit) and 1.0 - fit.explained < most_left

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.excitation import References
-from axisight.gap.closed_loop import ClosedLoopView
-from axisight.gap.model import Evidence
+from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
+from axisight.gap.decide import log_ratio
+from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.search import Search
-from axisight.gap.separate.experiment import Experiment
+from axisight.gap.separate.experiment import ENOUGH, Experiment
 from axisight.gap.separate.rivals import Rivals, rivals_of
 from axisight.gap.separate.waves import Motion, motions, seen_range, standard
 from axisight.gap.view import View
@@ -22,14 +23,31 @@ Array = NDArray[np.float64]
 
 # Torque beyond what was seen by this share is too much.
 _MARGIN = 1.05
+# Motions that are looked at again, one by one.
+_FINALISTS = 6
+# How often a motion is run, at least and at most, and a standard one to compare with at most. A
+# diagnosis leaves each log out in turn: what one run alone tells, it does not believe.
+_TWICE, _REPEATS, _FOR_EVER = 2, 10, 1000
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
-    """A rival's machine on every motion: motor angles and torques, each (n, n_axes)."""
+class _Runs:
+    """A machine on every motion: motor angles and torques, (n, n_axes) each; whether it stands them."""
 
     records: list[tuple[Array, Array]]
     possible: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What a wrong rival leaves of a run and what there is without either, mean squares (n_axes,) each.
+
+    ``samples``: residuals of an axis.
+    """
+
+    left: Array
+    there: Array
+    samples: float
 
 
 def separating_experiment_of(view: View, found: Search) -> Experiment | None:
@@ -43,30 +61,31 @@ def separating_experiment_of(view: View, found: Search) -> Experiment | None:
     return separating(view, rivals)
 
 
-def separating(view: ClosedLoopView, rivals: Rivals) -> Experiment | None:
-    """Return the motion on which two rivals differ most; None where none can be run.
+def separating(view: ClosedLoopView, rivals: Rivals) -> Experiment:
+    """Return the motion on which two rivals differ most.
 
     Each rival in turn is the machine: its simulated run along a motion is fitted by the other, in one
-    linear step, held by what the logs say of its parameters. What is left is what tells them apart
-    (with weights of noise and model error, in units of which a log-likelihood ratio is half of it).
-    The motion counts for the worse of the two.
+    linear step, held by what the logs say of its parameters. What that leaves is the log-likelihood
+    ratio to expect once the run is among the logs, by the rules of a diagnosis. The motion counts for
+    the worse of the two.
     """
-    seen = seen_range(view.logs)
+    limits = seen_range(view.logs)
     widest = 0.8 * min(view.settings.bandwidth_hz, 0.5 / view.robot.sample_time_s)
     time, seed = view.robot.sample_time_s, view.settings.seed
     axes = rivals.axes or tuple(view.robot.axis_numbers())
-    tried = [standard(seen, time, seed), *motions(seen, axes, time, widest, seed)]
-    left = np.full((2, len(tried)), np.inf)
-    for k, (machine, other) in enumerate((rivals.models, rivals.models[::-1])):
-        run = _runs(view, machine, tried, seen.torque)
-        left[k, ~run.possible] = 0.0
-        here = np.flatnonzero(run.possible)
-        if len(here):
-            left[k, here] = _left(view, other, [run.records[i] for i in here])
-    worth = left.min(axis=0)
-    best = int(np.argmax(worth[1:])) + 1
-    if not worth[best] > 0:
-        return None
+    usual = standard(limits, time, seed)
+    tried = [*usual, *motions(limits, axes, time, widest, seed)]
+    runs = [_runs(view, machine, tried, limits.torque) for machine in rivals.models]
+    rough = _seen(view, rivals, runs, range(len(tried)), alone=False)
+    worth = np.array([_expected(rivals, rough[k]) for k in range(len(tried))])
+    best_usual = int(np.argmax(worth[: len(usual)]))
+    order = np.argsort(-worth, kind="stable")[:_FINALISTS]
+    # Weights as they will be with the new log decide between the best.
+    finalists = list(dict.fromkeys([best_usual, *order.tolist()]))
+    exact = _seen(view, rivals, runs, finalists, alone=True)
+    best = max(finalists, key=lambda k: _expected(rivals, exact[k]))
+    repeats = _repeats(rivals, exact[best], ENOUGH, _REPEATS)
+    expected = _expected(rivals, exact[best], repeats)
     chosen = tried[best]
     design = {"motion": chosen.words, "rivals": list(rivals.labels), "seed": seed}
     return Experiment(
@@ -74,12 +93,32 @@ def separating(view: ClosedLoopView, rivals: Rivals) -> Experiment | None:
         chosen.words,
         chosen.axes,
         References(time, chosen.reference[None], design=design),
-        float(worth[best]),
-        float(worth[0]),
+        repeats,
+        expected,
+        _repeats(rivals, exact[best_usual], min(expected, ENOUGH), _FOR_EVER) / repeats,
     )
 
 
-def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most: Array) -> _Run:
+def _expected(rivals: Rivals, seen: Sequence[_Seen], repeats: int = 1) -> float:
+    """Return the log-likelihood ratio to expect, on the axis that shows most, of the worse rival."""
+    ratios = []
+    for one in seen:
+        samples = np.stack(
+            [rivals.samples, np.full_like(rivals.samples, repeats * one.samples)], -1
+        )
+        explained = np.stack([rivals.to_explain, one.there], -1)
+        left = np.stack([np.zeros_like(one.left), one.left], -1)
+        ratios.append(float(log_ratio(left, explained, samples).max()))
+    return min(ratios)
+
+
+def _repeats(rivals: Rivals, seen: Sequence[_Seen], enough: float, most: int) -> int:
+    """Return how often a motion has to be run for enough, at most ``most`` times."""
+    tried = (r for r in range(_TWICE, most) if _expected(rivals, seen, r) >= enough)
+    return next(tried, most)
+
+
+def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most: Array) -> _Runs:
     robot = view.robot.with_parameters(machine.robot_values)
     out = simulate_batch(
         robot,
@@ -89,33 +128,65 @@ def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most
         threads=view.settings.threads,
     )
     angle, torque = out["position_rad"].values, out["torque_cmd_nm"].values
-    sound = np.isfinite(torque).all(axis=(1, 2)) & np.isfinite(angle).all(axis=(1, 2))
-    gentle = (
-        np.abs(np.where(np.isfinite(torque), torque, np.inf)).max(axis=1) <= _MARGIN * most
-    ).all(axis=1)
+    # One that broke off is NaN, and larger than anything.
+    size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
     records = [
         (np.ascontiguousarray(q), np.ascontiguousarray(u))
         for q, u in zip(angle, torque, strict=True)
     ]
-    return _Run(records, sound & gentle)
+    return _Runs(records, (size <= _MARGIN * most).all(axis=1))
 
 
-def _left(view: ClosedLoopView, model: Evidence, records: list[tuple[Array, Array]]) -> Array:
-    """Return what a model leaves of each run (n_runs,), as a mean square on the axis where it is most."""
-    fitter = view.fitter.along(records)
+def _seen(
+    view: ClosedLoopView,
+    rivals: Rivals,
+    runs: Sequence[_Runs],
+    which: Sequence[int],
+    *,
+    alone: bool,
+) -> dict[int, list[_Seen]]:
+    """Return what each rival sees of the other's run along each motion; nothing where it cannot be run.
+
+    ``alone``: each with the weights that its own torque brings.
+    """
+    n_axes = view.robot.n_axes
+    nothing = _Seen(np.zeros(n_axes), np.zeros(n_axes), 0.0)
+    out = {k: [nothing, nothing] for k in which}
+    for turn, (run, other) in enumerate(zip(runs, rivals.models[::-1], strict=True)):
+        here = [k for k in which if all(r.possible[k] for r in runs)]
+        for group in [[k] for k in here] if alone else [here][: len(here)]:
+            fitter = view.fitter.along([run.records[k] for k in group])
+            if alone:
+                fitter.weighting = view.weighting_with(run.records[group[0]][1])
+            left, samples = _left(fitter, other, other.free, n_axes)
+            there, _ = _left(fitter, other, other.free[:-1], n_axes)
+            for k, a, b in zip(group, left, there, strict=True):
+                out[k][turn] = _Seen(a, b, samples)
+    return out
+
+
+def _left(
+    fitter: ClosedLoopFitter, model: Evidence, free: Sequence[FreeEffect], n_axes: int
+) -> tuple[Array, float]:
+    """Return what a model with the effects ``free`` leaves of each run, mean squares (n_runs, n_axes).
+
+    And the number of residuals of an axis.
+    """
     # Sensitivities of other logs are of no use here.
     start = replace(model, columns={})
-    found = fitter.fit(model.free, start, robot_values=model.robot_values, max_iterations=0)
+    found = fitter.fit(free, start, robot_values=model.robot_values, max_iterations=0)
     known = model.matrix.sum(axis=0) + model.prior_matrix
-    order = [model.parameters.index(p) for p in found.parameters]
-    known = known[np.ix_(order, order)] + 1e-12 * np.diag(np.diag(known)[order])
-    n_axes = view.robot.n_axes
-    out = np.zeros(len(records))
-    for i in range(len(records)):
-        here = found.log == i
+    names = [p for p in found.parameters if p in model.parameters]
+    mine = [found.parameters.index(p) for p in names]
+    order = [model.parameters.index(p) for p in names]
+    held = found.prior_matrix.copy()
+    held[np.ix_(mine, mine)] = known[np.ix_(order, order)]
+    out = []
+    for run in range(int(found.log.max()) + 1):
+        here = found.log == run
         matrix, gradient = found.matrix[here], found.gradient[here]
-        step = -np.linalg.lstsq(matrix.sum(axis=0) + known, gradient.sum(axis=0), rcond=1e-12)[0]
+        step = -np.linalg.lstsq(matrix.sum(axis=0) + held, gradient.sum(axis=0), rcond=1e-12)[0]
         loss = found.loss[here] + 2 * gradient @ step + np.einsum("bij,i,j->b", matrix, step, step)
         samples = np.bincount(found.axis[here], found.samples[here], n_axes)
-        out[i] = float((np.bincount(found.axis[here], loss, n_axes) / samples).max())
-    return np.maximum(out, 0.0)
+        out.append(np.maximum(np.bincount(found.axis[here], loss, n_axes) / samples, 0.0))
+    return np.array(out), float(samples.min())

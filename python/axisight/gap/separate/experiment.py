@@ -5,61 +5,65 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from axisight.effects import phrase
 from axisight.excitation import References, write_references
 from axisight.storage import write_whole
 
-# A mean square left by the wrong rival that makes it less likely than one in twenty, by the sixty
-# independent blocks that a diagnosis counts.
-_ENOUGH = 0.1
+# Log-likelihood ratio at which the wrong rival is less likely than one in twenty.
+ENOUGH = float(np.log(19.0))
+# How many times longer is as long, and how many are for ever.
+_AS_WELL, _NEVER = 1.5, 90.0
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """References that tell two rivals apart.
 
-    ``rivals``: labels ``effect@axis``; ``motion``: what moves, in words; ``axes`` (from 1) that move.
-    ``evidence``: what the worse of the two would leave of the other's run, re-fitted within what the
-    logs allow, as a mean square of the weighted residual (1 is noise and model error) on the axis where
-    it leaves most; ``standard``: the same of a multisine of that length on all axes.
+    ``rivals``: labels ``effect@axis``; ``motion``: what moves, in words; ``axes`` (from 1) that move;
+    ``repeats``: how often to run it; ``log_ratio``: log-likelihood ratio of the true rival to the other to
+    expect once these runs are among the logs, of the worse of the two; ``times_shorter``: how many times
+    as long a standard multisine on all axes would have to be.
     """
 
     rivals: tuple[str, str]
     motion: str
     axes: tuple[int, ...]
     references: References
-    evidence: float
-    standard: float
-
-    @property
-    def times_shorter(self) -> float:
-        """How many times as long a standard multisine would have to be for as much."""
-        return self.evidence / max(self.standard, 1e-300)
+    repeats: int
+    log_ratio: float
+    times_shorter: float
 
     @property
     def decides(self) -> bool:
         """Whether the wrong rival would be seen to be wrong."""
-        return self.evidence > _ENOUGH
+        return self.log_ratio >= ENOUGH
 
     def __str__(self) -> str:
-        """What to do, in a sentence."""
+        """What to do, in a sentence or two."""
         one, other = (_placed(label) for label in self.rivals)
+        moved = ", ".join(str(a) for a in self.axes)
+        where = f"axis {moved} alone" if len(self.axes) == 1 else f"axes {moved}"
+        often = "" if self.repeats == 1 else f", {self.repeats} times"
+        what = f"{self.motion}, {where}, {self.references.period_s:g} s{often}"
         if not self.decides:
             return (
                 f"No motion within the speeds, travel and torques of these logs tells {one} from {other}: "
-                f"the best of those tried leaves {self.evidence:.2g} of the noise between them."
+                f"the best of those tried ({what[0].lower()}{what[1:]}) makes the true one "
+                f"{np.exp(self.log_ratio):.2g} times as likely."
             )
-        moved = ", ".join(str(a) for a in self.axes)
-        where = f"axis {moved} alone" if len(self.axes) == 1 else f"axes {moved}"
-        longer = (
-            f"a multisine on all axes would have to be {self.times_shorter:.3g} times as long"
-            if self.times_shorter > 1.5
-            else "a multisine on all axes does as well"
-        )
         return (
-            f"{self.motion}, {where}, {self.references.period_s:g} s: it leaves {self.evidence:.3g} times the "
-            f"noise between {one} and {other}; {longer}."
+            f"{what}, tells {one} from {other}: the true one is then at least "
+            f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely. {self._beside_a_multisine()}"
         )
+
+    def _beside_a_multisine(self) -> str:
+        if self.times_shorter > _NEVER:
+            return "A multisine on all axes would not show it."
+        if self.times_shorter < _AS_WELL:
+            return "A multisine on all axes does as well."
+        return f"A multisine on all axes would have to be {self.times_shorter:.2g} times as long."
 
     def write(self, folder: Path | str) -> list[Path]:
         """Write ``references.parquet`` and ``experiment.txt`` into a folder; return their paths.

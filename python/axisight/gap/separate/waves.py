@@ -20,7 +20,7 @@ SECONDS = 8.0
 # Of a standard multisine, and of one as wide as residuals are looked at.
 _BAND_HZ = (1.0, 40.0)
 # Shares of the largest speed that a motion is tried at.
-_LEVELS = (1.0, 0.3, 0.1)
+_LEVELS = (1.0, 0.6, 0.3, 0.1)
 # Of the ends, over which a motion fades in and out.
 _FADE_S = 0.1
 
@@ -59,12 +59,16 @@ def seen_range(logs: Sequence[Log]) -> Range:
     )
 
 
-def standard(seen: Range, sample_time_s: float, seed: int) -> Motion:
-    """Return the multisine on a square wave, on all axes, as an identification would take it."""
+def standard(seen: Range, sample_time_s: float, seed: int) -> list[Motion]:
+    """Return the multisine on a square wave, on all axes, as an identification would take it.
+
+    At several levels: the loudest takes too much torque of some machines.
+    """
     n_axes = len(seen.speed)
     waves = [_shapes(sample_time_s, seed + 1 + i, 0.0)["a multisine"] for i in range(n_axes)]
     shape = np.stack(waves, axis=1)
-    return Motion("A multisine", tuple(range(1, n_axes + 1)), _within(shape, seen, sample_time_s))
+    full, every = _within(shape, seen, sample_time_s), tuple(range(1, n_axes + 1))
+    return [Motion("A multisine", every, level * full) for level in _LEVELS]
 
 
 def motions(
@@ -102,6 +106,7 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     if not widest_hz:
         return out
     wide = multisine(period, sample_time_s, band_hz=(1.0, widest_hz), seed=seed).period
+    high = multisine(period, sample_time_s, band_hz=(0.6 * widest_hz, widest_hz), seed=seed).period
     slow = np.interp(time / period, [0, 0.02, 0.48, 0.52, 0.98, 1], [0, 1, 1, -1, -1, 0])
     speeds = np.repeat([1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.1, -0.1], n // 8)
     swing = np.sin(2 * np.pi * time / period * 2) * np.abs(np.sin(np.pi * time / period))
@@ -109,6 +114,7 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     louder = np.repeat([0.1, 0.1, 0.3, 0.3, 0.3, 1.0, 1.0, 1.0], n // 8) * out["a multisine"]
     out |= {
         "a wide multisine": _unit(wide),
+        "a multisine of high frequencies": _unit(high),
         "a multisine that grows": _unit(louder),
         "one turn each way at constant speed": slow,
         "constant speeds both ways": _smooth(speeds, sample_time_s),
