@@ -249,6 +249,22 @@ def test_a_machine_with_other_gains_is_not_refused(kp, ki):
     assert not [str(f) for f in findings if f.severity == "refuse"]
 
 
+def test_an_axis_that_stands_is_nowhere_late():
+    """What settles at the start of a log leaves the law once a shift has cut the start off."""
+
+    def rerun(log):
+        reference = log.velocity_ref_rad_s.copy()
+        reference[:, 0] = 0.0
+        out = simulate(clean_loop().robot, reference, noise_seed=1, method="rk4")
+        torque = out.torque_cmd_nm.values.copy()
+        n = round(0.02 / log.sample_time_s)
+        torque[:n, 0] += 3 * torque[:, 0].std() * np.linspace(1, 0, n)
+        position = out.position_rad.values
+        return replace(log, velocity_ref_rad_s=reference, torque_nm=torque, position_rad=position)
+
+    assert not [f for f in found(each(clean_loop(), rerun)) if f.name == "axis_delayed"]
+
+
 def test_a_cascade_has_its_own_law():
     case = clean_loop()
     gains = case.robot.controller_gains
