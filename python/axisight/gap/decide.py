@@ -13,6 +13,7 @@ from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss
+from axisight.gap.terms import idle_terms
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,10 @@ _FORMULA_ERROR = 0.02
 _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
 
 
+# Fitted values of a term of a series: cosine, sine and order.
+_OF_A_TERM = 3.0
+
+
 def numbers(effect: FreeEffect) -> float:
     """Return the number of fitted values of an effect; the order of a harmonic counts too."""
     harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in effect.free)
@@ -35,11 +40,15 @@ def numbers(effect: FreeEffect) -> float:
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,)."""
+    """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,).
+
+    ``idle``: terms of its series that it does not need.
+    """
 
     candidate: FreeEffect
     evidence: Evidence
     held_out: Array
+    idle: int = 0
 
     @property
     def label(self) -> str:
@@ -48,8 +57,8 @@ class Trial:
 
     @property
     def cost(self) -> float:
-        """Number of fitted values; the order of a harmonic counts too."""
-        return numbers(self.candidate)
+        """Number of fitted values that it needs; the order of a harmonic counts too."""
+        return numbers(self.candidate) - _OF_A_TERM * self.idle
 
 
 @dataclass(frozen=True)
@@ -127,7 +136,11 @@ _RIVAL = 0.2
 
 def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
     """Score a fitted candidate on held-out data."""
-    return Trial(candidate, evidence, held_out_loss(evidence))
+
+    def pays(loss: float, without: float) -> bool:
+        return likelier(loss, _OF_A_TERM, than=(without, 0.0))
+
+    return Trial(candidate, evidence, held_out_loss(evidence), idle_terms(evidence, pays))
 
 
 def falls(trials: Sequence[Trial], current: Array, layout: Layout) -> Array:

@@ -1,0 +1,71 @@
+"""Terms of a series that a fit does not need are no cost of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from axisight import Effect
+from axisight.gap.decide import trial
+from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.terms import idle_terms
+from gap_data import linear_evidence
+
+NAMES = ("cosine_1_rad", "sine_1_rad", "cosine_2_rad", "sine_2_rad")
+ORDERS = {"order_1": 2.0, "order_2": 5.0}
+
+
+def series(sizes: tuple[float, float]) -> Evidence:
+    """A fit of two orders to a residual that has them in these sizes, and noise of one."""
+    rng = np.random.default_rng(7)
+    angle = rng.uniform(0, 2 * np.pi, 4000)
+    x = np.column_stack([f(n * angle) for n in ORDERS.values() for f in (np.cos, np.sin)])
+    truth = np.array([sizes[0], 0.0, 0.0, sizes[1]])
+    y = x @ truth + rng.standard_normal(len(angle))
+    log = np.repeat([0, 1], 2000)
+    found = linear_evidence(x, y, log)
+    theta = np.linalg.lstsq(x, y, rcond=None)[0]
+    effect = Effect("resolver_ripple", 1, {**ORDERS, **dict(zip(NAMES, theta, strict=True))})
+    return replace(
+        found,
+        effects=(effect,),
+        free=(FreeEffect(effect, NAMES),),
+        parameters=tuple((0, n) for n in NAMES),
+    )
+
+
+def by_a_twentieth(loss: float, without: float) -> bool:
+    return without > 1.05 * loss
+
+
+@pytest.mark.parametrize(
+    ("sizes", "idle"), [((1.0, 1.0), 0), ((1.0, 0.02), 1), ((0.02, 1.0), 1), ((0.0, 0.0), 1)]
+)
+def test_a_term_that_is_not_there_is_idle_and_one_stays(sizes, idle):
+    assert idle_terms(series(sizes), by_a_twentieth) == idle
+
+
+def test_without_a_term_the_loss_grows_by_what_a_fit_without_it_leaves():
+    """Closed form: the least squares of the other columns."""
+    found = series((0.4, 0.3))
+    asked = []
+
+    def pays(loss: float, without: float) -> bool:
+        asked.append((loss, without))
+        return True
+
+    idle_terms(found, pays)
+    rng = np.random.default_rng(7)
+    angle = rng.uniform(0, 2 * np.pi, 4000)
+    x = np.column_stack([f(n * angle) for n in ORDERS.values() for f in (np.cos, np.sin)])
+    y = x @ np.array([0.4, 0.0, 0.0, 0.3]) + rng.standard_normal(len(angle))
+    for columns, (loss, without) in zip(([2, 3], [0, 1]), asked, strict=True):
+        left = y - x[:, columns] @ np.linalg.lstsq(x[:, columns], y, rcond=None)[0]
+        assert loss == pytest.approx(found.total)
+        assert without == pytest.approx(left @ left, rel=1e-6)
+
+
+def test_an_effect_does_not_pay_for_it():
+    free = FreeEffect(series((1.0, 0.0)).effects[0], NAMES)
+    assert trial(free, series((1.0, 1.0))).cost == 6.0
+    assert trial(free, series((1.0, 0.0))).cost == 3.0
