@@ -54,6 +54,11 @@ class Judged:
         return "single" if len(self.truth) == 1 else "pair"
 
     @property
+    def severe(self) -> bool:
+        """Whether it is there to be found."""
+        return self.severity >= SEVERE
+
+    @property
     def right(self) -> bool:
         """Whether the verdict says what is true, and nothing else."""
         if self.kind in ("nothing", "unknown"):
@@ -171,21 +176,37 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
     )
 
 
-def calibration_error(judged: Sequence[Judged]) -> float:
-    """Return the expected calibration error of the causes named (Naeini 2015), ten bins; NaN without."""
+def calibration_bins(judged: Sequence[Judged]) -> list[dict[str, float]]:
+    """Return by probability said: causes named (``count``), mean said and share right; empty bins left out."""
     pairs = [
         (p, label in j.truth)
         for j in judged
         for p, label in zip(j.probabilities, j.named, strict=True)
     ]
-    if not pairs:
-        return float("nan")
-    p, right = (np.array(x, dtype=np.float64) for x in zip(*pairs, strict=True))
-    bins = np.minimum((p * _BINS).astype(int), _BINS - 1)
-    gaps = [
-        abs(p[bins == b].mean() - right[bins == b].mean()) * np.mean(bins == b) for b in set(bins)
+    said, right = (
+        (np.array(x, dtype=np.float64) for x in zip(*pairs, strict=True))
+        if pairs
+        else (np.empty(0), np.empty(0))
+    )
+    bins = np.minimum((said * _BINS).astype(int), _BINS - 1)
+    return [
+        {
+            "from": float(b / _BINS),
+            "to": float((b + 1) / _BINS),
+            "count": int(np.sum(bins == b)),
+            "probability": float(said[bins == b].mean()),
+            "right": float(right[bins == b].mean()),
+        }
+        for b in np.unique(bins)
     ]
-    return float(sum(gaps))
+
+
+def calibration_error(judged: Sequence[Judged]) -> float:
+    """Return the expected calibration error of the causes named (Naeini 2015), ten bins; NaN without."""
+    bins = calibration_bins(judged)
+    whole = sum(b["count"] for b in bins)
+    off = (b["count"] * abs(b["probability"] - b["right"]) for b in bins)
+    return sum(off) / whole if whole else float("nan")
 
 
 def figures(judged: Sequence[Judged]) -> dict[str, Share]:
@@ -194,7 +215,7 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
     def share(among: Sequence[Judged], good: Sequence[bool]) -> Share:
         return Share(sum(good), len(among))
 
-    severe = [j for j in judged if j.severity >= SEVERE]
+    severe = [j for j in judged if j.severe]
     single = [j for j in severe if j.kind == "single"]
     pairs = [j for j in severe if j.kind == "pair"]
     nothing = [j for j in judged if j.kind == "nothing"]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from json import dumps
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from axisight.blind import judged_cases, markdown, solve_cases
+from axisight.blind.page import render_score
+from axisight.blind.summary import summary
 from axisight.cli.common import OUT, bars, errors
 from axisight.gap import Settings
 from axisight.storage import write_whole
@@ -65,10 +68,17 @@ def score_command(
     truth: Annotated[Path, typer.Option(help="Folder of what was withheld.")],
     verdicts: Annotated[Path, typer.Option(help="Folder of verdicts.")],
     out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write all of it here.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write it here as a page.")] = None,
 ) -> None:
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
     with errors():
-        text = markdown(judged_cases(cases, truth, verdicts))
+        judged = judged_cases(cases, truth, verdicts)
+        text, score = markdown(judged), summary(judged)
         if out is not None:
             write_whole(out, text)
+        if json is not None:
+            write_whole(json, dumps(score, indent=1) + "\n")
+        if html is not None:
+            write_whole(html, render_score(cases.resolve().name, score))
     OUT.print(text, markup=False, soft_wrap=True)

@@ -1,0 +1,113 @@
+"""What a benchmark says in files and on a page: every count from cases made by hand."""
+
+import json
+from html.parser import HTMLParser
+
+import pytest
+
+from axisight.blind.page import render_score
+from axisight.blind.score import Judged, calibration_bins
+from axisight.blind.summary import summary
+
+
+def judged(
+    truth: tuple[str, ...], named: tuple[str, ...], verdict: str, severity: float, p=0.9, **more
+) -> Judged:
+    values = {
+        "name": f"case_{len(truth)}_{severity:g}",
+        "truth": truth,
+        "in_library": True,
+        "severity": severity,
+        "verdict": verdict,
+        "named": named,
+        "probabilities": (p,) * len(named),
+        "allowed": frozenset(named),
+        "where": frozenset(),
+        "ratios": (),
+        "covered": (),
+    }
+    return Judged(**{**values, **more})
+
+
+CASES = [
+    judged(("backlash@1",), ("backlash@1",), "explained", 12.0, 0.95, ratios=(1.1, 0.98)),
+    judged(("backlash@2",), ("nonlinear_stiffness@2",), "explained", 5.0, 0.6),
+    judged(("backlash@3",), (), "none", 0.1),
+    judged(("coulomb_friction@1",), ("coulomb_friction@1",), "explained", 3.0, 0.95),
+    judged((), (), "none", 0.0),
+    judged(("outside_tone@1",), (), "unknown", 9.0, in_library=False),
+    judged(("backlash@1", "payload"), ("payload", "backlash@1"), "explained", 8.0, 0.95),
+]
+
+
+def test_all_is_counted():
+    found = summary(CASES)
+    assert found["cases"] == 7
+    assert found["effects"]["backlash"]["all"]["hits"] == 1
+    assert found["effects"]["backlash"]["all"]["of"] == 3
+    assert found["effects"]["backlash"]["severe"]["of"] == 2
+    families = found["families"]
+    assert {k: v["all"]["of"] for k, v in families.items()} == {"friction": 1, "transmission": 3}
+    # Of one effect or none; pairs are no confusion of one with another.
+    assert found["confusion"] == {
+        "backlash": {"backlash": 1, "none": 1, "nonlinear_stiffness": 1},
+        "coulomb_friction": {"coulomb_friction": 1},
+        "nothing": {"none": 1},
+        "outside_tone": {"unknown": 1},
+    }
+    curve = {(d["from"], d["to"]): (d["hits"], d["of"]) for d in found["detection"]}
+    assert curve[0.0, 0.3] == (0, 1)
+    assert curve[3.0, 10.0] == (1, 2)
+    assert curve[10.0, 30.0] == (1, 1)
+    assert curve[30.0, None] == (0, 0)
+    assert sum(of for _, of in curve.values()) == 4
+    assert found["unknown"]["hits"] == 1
+    assert found["parameters_median_error"] == pytest.approx(0.06)
+    assert [m["truth"] for m in found["misses"]] == [["backlash@2"], ["backlash@3"]]
+
+
+def test_calibration_is_by_tenths():
+    low, high = calibration_bins(CASES)
+    assert (low["from"], low["count"], low["right"]) == (0.6, 1, 0.0)
+    assert (high["count"], high["probability"], high["right"]) == (4, pytest.approx(0.95), 1.0)
+    error = (1 * 0.6 + 4 * 0.05) / 5
+    assert summary(CASES)["calibration"]["error"] == pytest.approx(error)
+
+
+def test_it_is_json_and_nothing_is_no_number():
+    assert json.loads(json.dumps(summary(CASES), allow_nan=False)) == summary(CASES)
+    bare = summary([judged((), (), "none", 0.0)])
+    json.dumps(bare, allow_nan=False)
+    assert bare["calibration"] == {"error": None, "bins": []}
+    assert bare["parameters_median_error"] is None
+
+
+class Cells(HTMLParser):
+    """Cells of a page by class."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.classes: list[str] = []
+        self.opened: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "td":
+            self.classes.append(dict(attrs).get("class") or "")
+        if tag not in ("meta", "br"):
+            self.opened.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.opened.pop() == tag
+
+
+def test_the_page_marks_what_is_right_and_wrong():
+    page = render_score("<b>mine</b>", summary(CASES))
+    assert "<b>mine</b>" not in page and "&lt;b&gt;mine" in page
+    cells = Cells()
+    cells.feed(page)
+    assert cells.opened == []
+    # Right: play, friction, nothing and the tone that is unknown; wrong: the two others.
+    assert cells.classes.count("right") == 4
+    assert cells.classes.count("wrong") == 2
+    assert page == render_score("<b>mine</b>", summary(CASES))
+    assert "Nothing." in render_score("x", summary(CASES[:1]))
