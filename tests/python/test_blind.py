@@ -202,6 +202,13 @@ def test_from_machine_to_score(tmp_path: Path, robot: Robot):
     scored = shell.invoke(app, ["blind", "score", str(cases), *arguments])
     assert scored.exit_code == 0, scored.output
     assert "| false alarms on nothing withheld | 0/1 = 0 %" in table.read_text("utf-8")
+    # What cannot be diagnosed counts, and stops nothing else.
+    (case / "robot.toml").write_text("schema = 1", "utf-8")
+    again = shell.invoke(app, ["blind", "run", str(cases), "--out", str(out), "--workers", "1"])
+    assert again.exit_code == 1
+    assert f"{case.name}: " in again.output and "robot.toml" in again.output
+    (lost,) = judged_cases(cases, truth, out)
+    assert (lost.verdict, lost.named, lost.right) == ("failed", (), False)
     # A truth that was changed later is no truth.
     path = truth / f"{case.name}.json"
     path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), "seed": 5}), "utf-8")

@@ -4,7 +4,6 @@
 """
 
 from axisight.blind.score import Judged, Share, calibration_error, figures, judged_cases, markdown
-from axisight.blind.solve import solve_cases
 
 __all__ = [
     "Judged",
@@ -13,5 +12,4 @@ __all__ = [
     "figures",
     "judged_cases",
     "markdown",
-    "solve_cases",
 ]

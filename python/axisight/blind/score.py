@@ -138,6 +138,15 @@ def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
     return out
 
 
+_FAILED: dict[str, Any] = {
+    "verdict": "failed",
+    "causes": [],
+    "alternatives": [],
+    "equivalent": [],
+    "where": [],
+}
+
+
 def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
     """Return a withheld effect as its twin where that is named: their logs are the same."""
     kind = effect["effect"]
@@ -147,6 +156,9 @@ def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
 
 
 def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
+    if "error" in verdict:
+        # What could not be diagnosed counts, and is not right.
+        verdict = _FAILED
     causes = verdict["causes"]
     withheld = [_as_named(e, {_label(c) for c in causes}) for e in truth["effects"]]
     likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]

@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from axisight.blind import judged_cases, markdown, solve_cases
+from axisight.blind import judged_cases, markdown
 from axisight.blind.page import render_score
 from axisight.blind.summary import summary
 from axisight.cli.common import OUT, bars, errors
+from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
 from axisight.storage import write_whole
 
@@ -51,10 +52,21 @@ def run_command(
     cases: Annotated[Path, typer.Argument(help="Folder of cases.")],
     out: Annotated[Path, typer.Option(help="Folder for the verdicts; those there already stay.")],
     workers: _Workers = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler whose workers diagnose the cases.")
+    ] = None,
 ) -> None:
     """Diagnose every case of a folder that has no verdict yet."""
     with errors("stopped; finished verdicts stay, run again to go on"), bars() as progress:
-        failed = solve_cases(cases, out, Settings(), workers or os.cpu_count() or 1, progress)
+        found = diagnose_fleet(
+            cases,
+            out,
+            Settings(),
+            workers=workers or os.cpu_count() or 1,
+            scheduler=scheduler,
+            progress=progress,
+        )
+    failed = {name: verdict["error"] for name, verdict in found.items() if "error" in verdict}
     for name, reason in failed.items():
         OUT.print(f"{name}: {reason}", markup=False, soft_wrap=True)
     OUT.print(f"verdicts: {out}", soft_wrap=True)
