@@ -41,8 +41,11 @@ def test_an_effect_states_all_of_itself(info: EffectInfo) -> None:
     assert info.parameters
     assert any(p.role == "amplitude" for p in info.parameters)
     # Effects that it names are effects, of the same scope, and other ones.
-    for name in (*info.contains, *info.parts, *info.usual):
-        assert TABLE[name].scope == info.scope
+    for name in (*info.contains, *info.parts, *info.usual, *info.twins):
+        # What is usual instead of one link may be of the whole arm.
+        assert TABLE[name].scope == info.scope or (
+            name in info.usual and TABLE[name].scope == "arm"
+        )
         assert name != info.name
     assert all(info.name in TABLE[name].contained_in for name in info.contains)
     assert all(info.name not in TABLE[name].contains for name in info.contains)

@@ -278,6 +278,23 @@ def test_the_usual_law_leads_where_the_special_one_cannot_be_told_from_it(behind
     assert len(led.ranked) == 2
 
 
+def test_a_load_is_more_usual_than_a_link_that_is_not_as_it_was_drawn():
+    link = a_trial("link_com", 1, np.full(40, 1.5))
+    load = a_trial("payload", 1, np.full(40, 1.5 * 1.05))
+    load = replace(load, candidate=replace(load.candidate, effect=Effect("payload", None)))
+    found = standing([link, load])
+    assert found.best.trial is link
+    before = {r.trial.candidate.effect.name: r.probability for r in found.ranked}
+    led = found.usual_first()
+    after = {r.trial.candidate.effect.name: r.probability for r in led.ranked}
+    assert led.best.trial is load
+    odds = after["payload"] / after["link_com"]
+    assert odds == pytest.approx(10 * before["payload"] / before["link_com"])
+    # A payload has no rival that is more usual.
+    assert led.usual_first() is not led
+    assert led.usual_first().ranked == led.ranked
+
+
 def test_clearly_worse_needs_a_likelihood_ratio():
     assert not clearly_worse(1.01, 1.0)
     assert clearly_worse(1.2, 1.0)

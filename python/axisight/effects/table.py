@@ -37,7 +37,7 @@ class EffectInfo:
 
     ``family`` is the kind of cause. ``contains`` names the effects that this one becomes at some
     value of its parameters, ``parts`` simpler ones that together do what it does. ``usual``: effects
-    met more often that this one looks like where speed or load hardly change. ``twins``: effects of
+    met more often that this one looks like where speed, load or pose hardly change. ``twins``: effects of
     which a machine gives the very same logs of commands and motor angles.
     ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first
     parameter is the change itself or a share. ``linear``: how a linear model holds it.

@@ -245,7 +245,7 @@ def _led_by_a_cause(
     for k, r in enumerate(standing.ranked):
         near = r.score >= _NEARLY * standing.best.score
         if near and _is_cause(r, standing, state, settings, tried):
-            return standing.without_first(k).usual_first()
+            return standing.without_first(k)
     return None
 
 

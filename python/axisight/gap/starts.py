@@ -226,7 +226,10 @@ def _limit(trial: Trial) -> FreeEffect:
 
 
 def _point_mass(trial: Trial) -> FreeEffect | None:
-    """Begin at the centre of mass of the last link that has one; a single axis shows none."""
+    """Begin at the centre of mass of the last link that has one, or beside it; a single axis shows none.
+
+    There a mass is one of the link, which the re-fit may have all of; beside it, it is not.
+    """
     joints = trial.robot.joints
     if len(joints) == 1:
         return None
@@ -238,11 +241,17 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
     # What is taken off a link leaves some of it, re-fitted or not.
     last = next(j.link.mass_kg for j in reversed(joints) if j.link is not None)
     top = next(p.upper for p in trial.info.parameters if p.name == "mass_kg")
+    beside = [
+        {**centre, name: value + side * 0.5 * spread}
+        for name, value in centre.items()
+        for side in (-1.0, 1.0)
+    ]
     return FreeEffect(
         trial.effect({"mass_kg": 0.0, **centre}),
         ("mass_kg", "x_m", "y_m", "z_m"),
         {name: (value, spread) for name, value in centre.items()},
         {"mass_kg": (-0.8 * float(last), top)},
+        tuple(beside),
     )
 
 

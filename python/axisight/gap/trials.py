@@ -213,7 +213,7 @@ class Trials:
             )
             for axis in range(self.layout.n_axes)
         ]
-        return [s for s in found if s is not None]
+        return [s.usual_first() for s in found if s is not None]
 
     def refined(self, trials: list[Trial], number: int) -> list[Trial]:
         """Fit the leaders of each axis again with the simulator's sensitivities renewed.

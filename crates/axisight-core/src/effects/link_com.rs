@@ -25,7 +25,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
-    usual: &[],
+    usual: &["payload"],
     twins: &[],
     stands_for: None,
     linear: Linear::Parameters,

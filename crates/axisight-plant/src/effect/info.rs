@@ -193,8 +193,8 @@ pub struct EffectInfo {
     pub contains: &'static [&'static str],
     /// Simpler effects that together do what this one does.
     pub parts: &'static [&'static str],
-    /// Effects met more often, of the same family, that this one looks like where speed or load
-    /// hardly change.
+    /// Effects met more often, of the same family, that this one looks like where speed, load or
+    /// pose hardly change.
     pub usual: &'static [&'static str],
     /// Effects of which a machine gives the very same logs of commands and motor angles.
     pub twins: &'static [&'static str],
