@@ -13,7 +13,7 @@ from axisight.errors import InputError
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, Linearized
-from axisight.gap.screening import Bench, Screen, loudest_logs, thinned
+from axisight.gap.screening import Bench, Screen, _first_halves, _tell, loudest_logs, thinned
 from gap_data import bare_axis, linear_evidence, logs_of, scattered
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -358,6 +358,24 @@ def test_the_beginnings_of_logs_screen_as_the_whole():
     short = copy(view.fitter)
     short.records = [(p[:8000], t[:8000]) for p, t in view.fitter.records]
     assert short.begun(whole) is None
+
+
+def test_beginnings_do_only_where_they_have_their_part_of_every_axis():
+    """A play that gravity closes until the last moves is not in the first halves of the logs."""
+    log, axis, block = (
+        x.ravel() for x in np.meshgrid(range(4), range(2), range(10), indexing="ij")
+    )
+    layout = Layout(axis, block, log, np.full(len(log), 1000))
+    here = np.isin(log, [0, 1, 2, 3])
+    first = _first_halves(layout)
+    np.testing.assert_array_equal(first, block < 5)
+    even = np.full(len(log), 100.0)
+    assert _tell(even, here, first, layout)
+    late = np.where((axis == 1) & (block < 8), 1.0, even)
+    assert not _tell(late, here, first, layout)
+    # An axis that has nothing has no say.
+    nothing = np.where(axis == 1, np.where(block < 8, 0.0, 10.0), even)
+    assert _tell(nothing, here, first, layout)
 
 
 def turns_of(losses: Sequence[float]) -> int:

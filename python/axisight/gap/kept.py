@@ -23,12 +23,13 @@ class KeptColumns:
 
     def __init__(self) -> None:
         self.logs: list[int] = []
+        self._halved = False
         self._rows: dict[_Key, Array] = {}
 
-    def begin(self, logs: Sequence[int]) -> None:
-        """Get ready for some logs; what is known of others is of no use."""
-        if list(logs) != self.logs:
-            self.logs = list(logs)
+    def begin(self, logs: Sequence[int], *, halved: bool = False) -> None:
+        """Get ready for some logs, or the first halves of them; what is known of others is of no use."""
+        if (list(logs), halved) != (self.logs, self._halved):
+            self.logs, self._halved = list(logs), halved
             self._rows.clear()
 
     def keep(self, option: FreeEffect, found: Linearized) -> None:

@@ -23,6 +23,7 @@ from axisight.gap.score import linear_falls, linear_gain
 from axisight.gap.sensitivity import Sensitivity, sensitivity
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 A = TypeVar("A")
 
 # Parameters of candidates that are screened together: the core takes so many derivatives at once.
@@ -33,6 +34,10 @@ _SCANS = 10
 _LEAST_GAIN = 0.002
 # Share of the most that there is to explain in as many logs, where others stay the ones to screen on.
 _NEARLY = 0.8
+# Beginnings of logs do for a screen where they have this share of what there is on every axis that
+# has anything, a mean square of so much.
+_THEIR_PART = 0.35
+_SOMETHING = 0.05
 # Logs that the core runs in lock-step: fewer cost as much.
 _LOCK_STEP = 4
 
@@ -273,14 +278,14 @@ def thinned(bench: Bench, above: Array, layout: Layout, kept: KeptColumns | None
     ``above`` (n_blocks,): loss above the floor; ``kept``: what models before it have left.
     """
     logs = loudest_logs(above, layout, [] if kept is None else kept.logs)
-    if kept is not None:
-        kept.begin(logs)
     here = np.isin(layout.log, logs)
     part = bench if here.all() else Bench(bench.fitter.part(logs), bench.model.part(logs))
-    begun = part.fitter.begun(part.model)
+    first = here & _first_halves(layout)
+    begun = part.fitter.begun(part.model) if _tell(above, here, first, layout) else None
     if begun is not None:
-        here[here] = _beginnings(part.model, begun[1])
-        part = Bench(*begun)
+        part, here = Bench(*begun), first
+    if kept is not None:
+        kept.begin(logs, halved=begun is not None)
     if part is bench:
         return Screen(bench, kept=kept)
     scale = float(above.sum() / max(above[here].sum(), 1e-300))
@@ -288,15 +293,26 @@ def thinned(bench: Bench, above: Array, layout: Layout, kept: KeptColumns | None
     return Screen(part, max(scale, 1.0), more, kept)
 
 
-def _beginnings(whole: Evidence, begun: Evidence) -> NDArray[np.bool_]:
-    """Return which blocks of a model (n_blocks,) lie in the beginnings of its logs."""
-    left = Counter(zip(begun.log.tolist(), begun.axis.tolist(), strict=True))
+def _first_halves(layout: Layout) -> Mask:
+    """Return which blocks (n_blocks,) lie in the first halves of their logs."""
+    places = list(zip(layout.log.tolist(), layout.axis.tolist(), strict=True))
+    left = {place: -(-count // 2) for place, count in Counter(places).items()}
     first = []
     # Those of an axis of a log stand in the order of time.
-    for place in zip(whole.log.tolist(), whole.axis.tolist(), strict=True):
+    for place in places:
         first.append(left[place] > 0)
         left[place] -= 1
     return np.array(first)
+
+
+def _tell(above: Array, here: Mask, first: Mask, layout: Layout) -> bool:
+    """Whether the blocks ``first`` of those ``here`` have their part of what there is on every axis.
+
+    What opens, stalls or warms up late is not in them.
+    """
+    whole, part = (layout.by_axis(np.where(mask, above, 0.0)) for mask in (here, first))
+    counts = whole > _SOMETHING * layout.by_axis(np.where(here, layout.counted, 0.0))
+    return bool(np.all(part[counts] > _THEIR_PART * whole[counts]))
 
 
 def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> list[int]:

@@ -22,7 +22,7 @@ from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.screening import kept_beside
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
-from axisight.gap.swaps import straightened
+from axisight.gap.swaps import straightened, weighed_again
 from axisight.gap.trials import Progress, Trials, fresh, interact, settled
 
 Array = NDArray[np.float64]
@@ -151,6 +151,8 @@ def search(
         refused |= _merge(fitter, out, settings, offered)
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
+    if not fitter.adds_up:
+        _weigh_again(fitter, out, settings)
     _straighten(fitter, out)
     if not fitter.adds_up:
         _withdraw_doubtful(fitter, out, settings)
@@ -302,6 +304,27 @@ def _straighten(fitter: ModelFitter, state: Search) -> None:
     if found is not None:
         state.model, _, rival = found
         state.rounds.append(Round((rival[1],), (rival,), state.left()))
+
+
+def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:
+    """Judge causes anew that came in beside others which turned out to be none."""
+    final = {f.effect.label for f in state.model.free}
+    for cause, standing in state.accepted:
+        if {f.effect.label for f in cause.trial.evidence.free} <= final:
+            continue
+        found = weighed_again(
+            fitter,
+            state.model,
+            cause,
+            standing,
+            state.floor,
+            state.layout,
+            settings.explained_share,
+        )
+        if found is not None:
+            left = state.left()
+            state.model, taken = found
+            state.rounds.append(Round((taken[1],), (taken,), left))
 
 
 def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[str]:

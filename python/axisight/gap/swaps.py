@@ -9,18 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Standing
+from axisight.gap.decide import Ranked, Standing, stand, trial
 from axisight.gap.edge import BENT, bent
+from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.score import held_out_loss
 from axisight.gap.screening import kept_beside
 from axisight.gap.trials import settled
 
+Array = NDArray[np.float64]
 Found = tuple[Ranked, Standing]
 
 # Rivals that are tried, and what they explain of what the cause does.
 _RIVALS = 3
 _AS_MUCH = 0.95
+# The same where a cause was judged beside one that is none.
+_AGAIN = 2
+_NEARLY = 0.8
 
 
 def straightened(
@@ -39,6 +48,50 @@ def straightened(
             if other is not None and other.total < least and bent(fitter, other) < BENT:
                 best = other, cause, rival
     return best
+
+
+def weighed_again(
+    fitter: ModelFitter,
+    model: Evidence,
+    cause: Ranked,
+    entered: Standing,
+    floor: Array,
+    layout: Layout,
+    explained_share: float,
+) -> tuple[Evidence, Found] | None:
+    """Return a model with a rival in the place of a cause, where beside the others it is likelier.
+
+    A cause is judged beside what was in the model then. Where that turned out to be none, those
+    that explained nearly as much are judged anew.
+    """
+    free, label = model.free, cause.trial.label
+    rest = [f for f in free if f.effect.label != label]
+    rivals = [
+        r
+        for r in entered.ranked
+        if r is not cause
+        and r.score >= _NEARLY * cause.score
+        and r.trial.candidate.effect.axis == cause.trial.candidate.effect.axis
+        and all(r.trial.label != f.effect.label for f in rest)
+    ][:_AGAIN]
+    if not rivals:
+        return None
+    mine = next(f for f in free if f.effect.label == label)
+    # A trial is of the last effect of its model.
+    fits = {label: fitter.fit([*rest, mine], model, lazy=True)}
+    for r in rivals:
+        other = _with(fitter, model, cause, r)
+        if other is not None and len(other.free) == len(free):
+            fits[r.trial.label] = other
+    without = fitter.fit(rest, model, lazy=True)
+    tried = [trial(fit.free[-1], fit) for fit in fits.values()]
+    standing = stand(
+        tried, held_out_loss(without), floor, layout, entered.axis, explained_share=explained_share
+    )
+    if standing is None or standing.best.trial.label == label:
+        return None
+    found = standing.usual_first()
+    return fits[found.best.trial.label], (found.best, found)
 
 
 def _rivals(cause: Ranked, standings: Sequence[Standing]) -> list[Found]:
