@@ -369,9 +369,9 @@ def test_beginnings_do_only_where_they_have_their_part_of_every_axis():
     here = np.isin(log, [0, 1, 2, 3])
     first = _first_halves(layout)
     np.testing.assert_array_equal(first, block < 5)
-    even = np.full(len(log), 100.0)
+    even = np.full(len(log), 1e4)
     assert _tell(even, here, first, layout)
-    late = np.where((axis == 1) & (block < 8), 1.0, even)
+    late = np.where((axis == 1) & (block < 8), 100.0, even)
     assert not _tell(late, here, first, layout)
     # An axis that has nothing has no say.
     nothing = np.where(axis == 1, np.where(block < 8, 0.0, 10.0), even)
