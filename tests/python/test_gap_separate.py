@@ -133,6 +133,14 @@ def test_motions_stay_within_what_was_seen(logs: list[Log]):
         assert abs(len(speed) * step - SECONDS) < 8 * step
 
 
+def test_slow_sampling_has_its_motions(logs: list[Log]):
+    """At 40 Hz a multisine of 40 Hz is no signal."""
+    seen = seen_range(logs)
+    for motion in [*standard(seen, 0.025, 0), *motions(seen, (1,), 0.025, 16.0, 0)]:
+        assert np.isfinite(motion.reference).all()
+        assert len(motion.reference) == SECONDS / 0.025
+
+
 def test_a_motion_begins_and_ends_at_rest_where_it_began(logs: list[Log]):
     seen = seen_range(logs)
     for motion in motions(seen, (1,), MACHINE.sample_time_s, 100.0, 0):

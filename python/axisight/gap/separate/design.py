@@ -154,7 +154,8 @@ def _seen(
     out = {k: [nothing, nothing] for k in which}
     for turn, (run, other) in enumerate(zip(runs, rivals.models[::-1], strict=True)):
         here = [k for k in which if all(r.possible[k] for r in runs)]
-        for group in [[k] for k in here] if alone else [here][: len(here)]:
+        together = [here] if here else []
+        for group in [[k] for k in here] if alone else together:
             fitter = view.fitter.along([run.records[k] for k in group])
             if alone:
                 fitter.weighting = view.weighting_with(run.records[group[0]][1])

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 SECONDS = 8.0
 # Of a standard multisine, and of one as wide as residuals are looked at.
 _BAND_HZ = (1.0, 40.0)
+_SHARE_OF_NYQUIST = 0.8
 # Shares of the largest speed that a motion is tried at.
 _LEVELS = (1.0, 0.6, 0.3, 0.1)
 # Of the ends, over which a motion fades in and out.
@@ -101,7 +102,9 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     time = np.arange(n) * sample_time_s
     period = n * sample_time_s
     flat = square(period, sample_time_s).period
-    sine = multisine(period, sample_time_s, band_hz=_BAND_HZ, seed=seed).period
+    low, top = _BAND_HZ
+    band = (low, min(top, _SHARE_OF_NYQUIST * 0.5 / sample_time_s))
+    sine = multisine(period, sample_time_s, band_hz=band, seed=seed).period
     out = {"a multisine": _unit(_unit(sine) + flat)}
     if not widest_hz:
         return out
