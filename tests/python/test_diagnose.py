@@ -67,7 +67,9 @@ def test_a_withheld_effect_is_named(effect):
     assert found.verdict == "explained", found.headline
     assert [(c.effect, c.axis) for c in found.causes] == [(effect.name, 1)]
     cause = found.causes[0]
-    assert cause.probability > 0.8
+    # An effect that gives the very same logs has its share.
+    twins = [a for a in found.alternatives if a.effect in effect_info(effect.name).twins]
+    assert cause.probability + sum(a.probability for a in twins) > 0.8
     assert cause.gap_reduction.value > 0.9
     assert found.gap.after < 1.2 * found.gap.floor
     # With the cause in nothing stands out of the floor any more.
