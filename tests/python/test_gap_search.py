@@ -1,6 +1,7 @@
 """The search: what waits for the next round, what is withdrawn in the end."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from axisight.gap.layout import Layout
 from axisight.gap.model import FreeEffect
 from axisight.gap.screening import Start
 from axisight.gap.trials import Trials
+from gap_data import linear_evidence
 
 
 def free(label: str) -> FreeEffect:
@@ -119,3 +121,29 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     monkeypatch.setattr(trials, "trial", lambda candidate, evidence: other)
     assert Trials.refined(field, [whole, other], 1) == [other]
     assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}
+
+
+def finished(pull: float) -> list[dict[str, object]]:
+    """What a search asks a fitter for at its end, where the slope of its model is ``pull``."""
+    asked: list[dict[str, object]] = []
+
+    class Fitter:
+        def fit(self, free, start, **options):
+            asked.append(options)
+            return replace(start, gradient=0 * start.gradient)
+
+    x = np.ones((40, 1))
+    model = linear_evidence(x, x[:, 0], np.repeat([0, 1], 20))
+    effect = FreeEffect(Effect("payload", None), ("mass_kg",))
+    model = replace(model, free=(effect,), effects=(effect.effect,), gradient=model.gradient + pull)
+    state = search.Search(model, model, np.zeros(2), Layout(*[np.zeros(2, int)] * 3, np.ones(2)))
+    search._finish(Fitter(), state)
+    assert (state.model is model) == (not asked)
+    return asked
+
+
+def test_a_model_short_of_its_best_is_fitted_on():
+    # Two blocks of twenty samples and a unit column: a slope s promises (2 s)^2 / 40.
+    assert finished(3.0) == []
+    (options,) = finished(3.3)
+    assert options["fine"] is True

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 # Share of the loss that another step of a fit has to be worth.
 _TOLERANCE = 1e-4
 _TRIAL_TOLERANCE = 1e-3
+# The same where what noise leaves open counts, which is a share of no loss.
+_FINE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -282,6 +284,7 @@ class ModelFitter(ABC):
         max_iterations: int = 15,
         refreshes: int = 0,
         fresh: bool = False,
+        fine: bool = False,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
@@ -291,7 +294,7 @@ class ModelFitter(ABC):
         sensitivities from ``start``; else they are computed where the fit begins, and
         ``refreshes`` times anew where it has settled: small changes of masses and stiffness
         hardly bend them. ``fresh`` computes them at every step, for effects that do bend them.
-        ``near`` are `runs` of a model close by.
+        ``near`` are `runs` of a model close by. ``fine`` follows flat valleys to their lowest place.
         """
         # What a candidate changes of the sensitivities of effects elsewhere can wait.
         here = free[-1].effect.axis if free else None
@@ -300,6 +303,7 @@ class ModelFitter(ABC):
         # What is to be compared with others is fitted to less than the formulas agree; so is what
         # others are to be compared with.
         tolerance = _TRIAL_TOLERANCE if lazy or not free else _TOLERANCE
+        tolerance = _FINE_TOLERANCE if fine else tolerance
         options = self._options(max_iterations, refreshes, tolerance)
         result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         renewed = not lazy and near is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -156,6 +157,7 @@ def search(
     _straighten(fitter, out)
     if not fitter.adds_up:
         _withdraw_doubtful(fitter, out, settings)
+    _finish(fitter, out)
     return out
 
 
@@ -304,6 +306,27 @@ def _straighten(fitter: ModelFitter, state: Search) -> None:
     if found is not None:
         state.model, _, rival = found
         state.rounds.append(Round((rival[1],), (rival,), state.left()))
+
+
+# Loss that a step may still promise: half of it is a log-likelihood ratio.
+_OPEN = 1.0
+
+
+def _finish(fitter: ModelFitter, state: Search) -> None:
+    """Fit on where a step still promises more than noise leaves open.
+
+    A share of a large loss, at which fits end, may be many standard deviations along a flat valley, such
+    as that of a load and the mass of the link that carries it.
+    """
+    model = state.model
+    if not model.free or linear_gain(model) < _OPEN:
+        return
+    with suppress(InputError):
+        state.model = fitter.fit(model.free, model, max_iterations=_FINISHING, fine=True)
+
+
+# Steps of the last fit.
+_FINISHING = 12
 
 
 def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:
