@@ -310,6 +310,8 @@ def _straighten(fitter: ModelFitter, state: Search) -> None:
 
 # Loss that a step may still promise: half of it is a log-likelihood ratio.
 _OPEN = 1.0
+# Steps of the last fit.
+_FINISHING = 12
 
 
 def _finish(fitter: ModelFitter, state: Search) -> None:
@@ -323,10 +325,6 @@ def _finish(fitter: ModelFitter, state: Search) -> None:
         return
     with suppress(InputError):
         state.model = fitter.fit(model.free, model, max_iterations=_FINISHING, fine=True)
-
-
-# Steps of the last fit.
-_FINISHING = 12
 
 
 def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:

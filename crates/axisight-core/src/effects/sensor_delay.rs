@@ -1,7 +1,6 @@
 //! Transport delay of the position that the controller reads.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
-use axisight_scalar::Scalar;
+use super::{Acts, EffectInfo, Experiment, Family, Linear, Scope, input_delay};
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "sensor_delay",
@@ -21,26 +20,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
-    parameters: &[ParameterInfo {
-        name: "delay_s",
-        unit: "s",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: 0.0,
-        upper: 0.05,
-        typical: 1e-3,
-    }],
+    parameters: input_delay::INFO.parameters,
 };
 
-struct Delay<S>(S);
-
-pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Delay(p[0]))
-}
-
-impl<S: Scalar> Kernel<S> for Delay<S> {
-    /// The machine does not know the time: driven late it is where one read late seems to be.
-    fn delay(&self) -> Option<S> {
-        Some(self.0)
-    }
-}
+/// The machine does not know the time: driven late it is where one read late seems to be.
+pub(super) use super::input_delay::kernel;

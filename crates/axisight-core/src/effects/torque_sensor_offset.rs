@@ -1,7 +1,6 @@
 //! Constant error of the torque that the drive reports.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
-use axisight_scalar::Scalar;
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Linear, Scope, torque_offset};
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_sensor_offset",
@@ -21,29 +20,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stiff: false,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
-    parameters: &[ParameterInfo {
-        name: "offset_nm",
-        unit: "Nm",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: -1e4,
-        upper: 1e4,
-        typical: 0.5,
-    }],
+    parameters: torque_offset::INFO.parameters,
 };
 
-struct Offset<S>(S);
-
-pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Offset(p[0]))
-}
-
-impl<S: Scalar> Kernel<S> for Offset<S> {
-    /// Of a torque as it is reported, which is what logs hold.
-    fn drive(&self, torque: S) -> S {
-        torque + self.0
-    }
-    fn drive_inverse(&self, torque: S) -> S {
-        torque - self.0
-    }
-}
+/// Of a torque as it is reported, which is what logs hold.
+pub(super) use super::torque_offset::kernel;
