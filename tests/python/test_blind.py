@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,23 @@ import scipy.stats
 from typer.testing import CliRunner
 
 from axisight import InputError, Robot, load_robot, simulate
-from axisight.blind import Judged, Share, calibration_error, figures, judged_cases
-from axisight.blind.drawing import draw, machine_of, references, scattered
-from axisight.blind.engine import Machine, run
+from axisight.blind import (
+    Judged,
+    Share,
+    calibration_error,
+    figures,
+    judged_cases,
+    mujoco_engine,
+    pinocchio_engine,
+)
+from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
+from axisight.blind.machine import Machine, Native
 from axisight.blind.make import make_cases
+from axisight.blind.motions import MOTIONS, multisines
+from axisight.blind.scene import Scene
 from axisight.blind.score import comparable, sizes
 from axisight.blind.sealed import SEAL
-from axisight.blind.withheld import KINDS
 from axisight.cli import app
 
 
@@ -26,38 +36,89 @@ def robot() -> Robot:
     return load_robot("irb6600_like").with_effects([])
 
 
+RUN = {"mujoco": mujoco_engine.run, "pinocchio": pinocchio_engine.run}
+KINDS = [(engine, name) for engine, kinds in ENGINES.items() for name in kinds]
+
+
 def short(robot: Robot, seconds: float = 1.0) -> np.ndarray:
     """A second of a multisine on all axes, (n, n_axes)."""
-    _, reference = references(np.random.default_rng(3), robot)["multisine_fresh"]
+    _, reference = multisines(np.random.default_rng(3), robot)["multisine_fresh"]
     return reference[: round(seconds / robot.sample_time_s)]
 
 
-def test_without_effects_the_other_engine_agrees_with_ours(robot: Robot):
-    machine = scattered(np.random.default_rng(1), robot)
-    reference = short(robot)
-    torque, angle = run(Machine(machine), reference, np.zeros_like(reference))
+def torque_of(engine: str, machine: Machine, reference: np.ndarray) -> np.ndarray:
+    """Torque (n, n_axes) without noise."""
+    ((torque, _),) = RUN[engine](machine, [reference], [np.zeros_like(reference)])
+    return torque
+
+
+@cache
+def bare_torque(engine: str) -> np.ndarray:
+    """Torque of the preset without effects along the reference that all kinds are tried on."""
+    robot = load_robot("irb6600_like")
+    return torque_of(engine, Machine(robot), 1.5 * short(robot, 0.5))
+
+
+# MuJoCo holds a mass of a milligram in bodies that have none, and settles before it begins: its slowest
+# mode has a tenth of that as its time constant. Without such bodies the engines differ by rounding
+# of their steps only.
+@pytest.mark.parametrize(
+    ("engine", "arm", "apart"),
+    [
+        ("mujoco", "irb6600_like", 1e-3),
+        ("pinocchio", "irb6600_like", 1e-5),
+        ("mujoco", "scara_like", 1e-5),
+        ("pinocchio", "scara_like", 1e-5),
+        ("mujoco", "cobot_like", 1e-4),
+        ("pinocchio", "cobot_like", 1e-4),
+        ("pinocchio", "lever_like", 1e-5),
+    ],
+)
+def test_without_effects_the_other_engines_agree_with_ours(engine: str, arm: str, apart: float):
+    machine = scattered(np.random.default_rng(1), load_robot(arm))
+    reference = short(machine)
+    ((torque, angle),) = RUN[engine](Machine(machine), [reference], [np.zeros_like(reference)])
     ours = simulate(machine, reference)
-    # It stood four seconds before; its slowest mode has a tenth of that as its time constant.
     spread = np.std(ours["torque_cmd_nm"].values, axis=0)
-    assert (np.abs(torque - ours["torque_cmd_nm"].values).max(axis=0) / spread < 1e-3).all()
+    assert (np.abs(torque - ours["torque_cmd_nm"].values).max(axis=0) / spread < apart).all()
     moved = angle - angle[0] - (ours["position_rad"].values - ours["position_rad"].values[0])
-    assert np.abs(moved).max() < 1e-4
+    assert np.abs(moved).max() < 0.1 * apart
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_every_kind_changes_the_torque(name: str, robot: Robot):
+@pytest.mark.parametrize(("engine", "name"), KINDS)
+def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
     reference = 1.5 * short(robot, 0.5)
-    quiet = np.zeros_like(reference)
-    drawn = KINDS[name].draw(np.random.default_rng(5), robot, 2)
-    bare = run(Machine(robot), reference, quiet)[0]
-    # A limit bites where the torque is large; friction that comes late, comes at five seconds.
-    expected = name not in ("torque_saturation", "friction_step")
-    changed = run(machine_of(robot, [drawn]), reference, quiet)[0]
+    drawn = ENGINES[engine][name].draw(np.random.default_rng(5), Scene(robot, [reference]), 2)
+    bare = bare_torque(engine)
+    changed = torque_of(engine, machine_of(robot, [drawn]), reference)
+    # Friction that comes late, and somebody who pushes, come after the first second.
+    expected = name not in ("friction_step", "push")
     assert (np.abs(changed - bare).max() > 0.01) == expected
 
 
-def test_a_case_is_a_function_of_seed_and_number(robot: Robot):
-    a, b, c = draw(1, 7, robot), draw(1, 7, robot), draw(1, 9, robot)
+def test_runs_of_a_machine_do_not_feel_one_another(robot: Robot):
+    reference = short(robot, 0.2)
+    others = [0.5 * reference, reference, -reference]
+    drawn = ENGINES["pinocchio"]["coulomb_friction"].draw(
+        np.random.default_rng(5), Scene(robot, others), 1
+    )
+    machine = machine_of(robot, [drawn])
+    together = RUN["pinocchio"](machine, others, [np.zeros_like(reference)] * 3)
+    np.testing.assert_array_equal(together[1][0], torque_of("pinocchio", machine, reference))
+    assert np.abs(together[1][0] - together[0][0]).max() > 0.1
+
+
+def test_an_engine_refuses_what_it_has_no_formula_for(robot: Robot):
+    reference = short(robot, 0.1)
+    with pytest.raises(InputError, match="play and dry friction as formulas"):
+        torque_of("pinocchio", Machine(robot, {0: Native(friction_nm=0.3)}), reference)
+    with pytest.raises(InputError, match="expected a Formula of this engine, got Delay"):
+        torque_of("pinocchio", Machine(robot, laws={0: [Delay(1e-3)]}), reference)
+
+
+def test_a_case_is_a_function_of_seed_and_number():
+    fixed = Choice("pinocchio", "irb6600_like", "multisines")
+    a, b, c = draw(1, 7, fixed), draw(1, 7, fixed), draw(1, 9, fixed)
     assert [(e.effect, e.axis, e.parameters) for e in a.effects] == [
         (e.effect, e.axis, e.parameters) for e in b.effects
     ]
@@ -66,9 +127,19 @@ def test_a_case_is_a_function_of_seed_and_number(robot: Robot):
     for name, (role, reference) in a.references.items():
         assert b.references[name][0] == role
         np.testing.assert_array_equal(b.references[name][1], reference)
-    assert draw(1, 8, robot).effects == ()
-    pair = draw(1, 13, robot).effects
-    assert len({e.axis for e in pair}) == len(pair)
+    assert draw(1, 8).effects == ()
+    pairs = [draw(1, number).effects for number in range(1, 60, 6)]
+    assert all(len({e.axis for e in pair}) == len(pair) for pair in pairs)
+    assert any(len(pair) == 2 for pair in pairs)
+
+
+def test_engines_arms_and_motions_are_drawn_unless_they_are_chosen():
+    drawn = [draw(2, number) for number in range(60)]
+    assert {d.engine for d in drawn} == set(ENGINES)
+    assert {d.motions for d in drawn} == set(MOTIONS)
+    assert {d.arm for d in drawn} == {"irb6600_like", "scara_like", "lever_like", "cobot_like"}
+    with pytest.raises(InputError, match="arm: expected one of irb6600_like, "):
+        Choice(arm="nothing")
 
 
 def at(motor_speed: float = 0.0, deflection: float = 0.0) -> Axis:
@@ -129,6 +200,7 @@ def judged(
         "where": frozenset(),
         "ratios": (),
         "covered": (),
+        "setting": {"engine": "mujoco", "arm": "irb6600_like", "motions": "multisines"},
     }
     return Judged(**{**values, **more})  # type: ignore[arg-type]
 
@@ -178,25 +250,27 @@ def test_waves_are_compared_by_their_order():
     assert (value, low, high) == pytest.approx((0.1, 0.09, 0.11))
 
 
-def test_from_machine_to_score(tmp_path: Path, robot: Robot):
+def test_from_machine_to_score(tmp_path: Path):
     cases, truth, out = tmp_path / "cases", tmp_path / "truth", tmp_path / "out"
     shell = CliRunner()
-    made = shell.invoke(
-        app, ["blind", "make", str(cases), "--truth", str(truth), "--count", "1", "--workers", "1"]
-    )
+    fixed = Choice("mujoco", "lever_like", "multisines")
+    choice = ["--engine", "mujoco", "--arm", "lever_like", "--motions", "multisines"]
+    count = ["--count", "1", "--workers", "1"]
+    made = shell.invoke(app, ["blind", "make", str(cases), "--truth", str(truth), *count, *choice])
     assert made.exit_code == 0, made.output
     (case,) = cases.iterdir()
     assert not list(case.rglob("*truth*.json"))
     before = (case / "logs" / "moves.parquet").read_bytes()
     # What is there stays, and would come out the same.
-    make_cases(cases, truth, [0], 0, 1, lambda *_: None)
+    make_cases(cases, truth, [0], 0, 1, lambda *_: None, fixed)
     (case / SEAL).unlink()
-    make_cases(cases, truth, [0], 0, 1, lambda *_: None)
+    make_cases(cases, truth, [0], 0, 1, lambda *_: None, fixed)
     assert (case / "logs" / "moves.parquet").read_bytes() == before
     solved = shell.invoke(app, ["blind", "run", str(cases), "--out", str(out), "--workers", "1"])
     assert solved.exit_code == 0, solved.output
     (found,) = judged_cases(cases, truth, out)
     assert (found.kind, found.verdict, found.right) == ("nothing", "none", True)
+    assert found.setting == {"engine": "mujoco", "arm": "lever_like", "motions": "multisines"}
     table = tmp_path / "score.md"
     arguments = ["--truth", str(truth), "--verdicts", str(out), "--out", str(table)]
     scored = shell.invoke(app, ["blind", "score", str(cases), *arguments])

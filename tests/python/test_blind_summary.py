@@ -25,14 +25,16 @@ def judged(
         "where": frozenset(),
         "ratios": (),
         "covered": (),
+        "setting": {"engine": "mujoco", "arm": "lever_like", "motions": "moves"},
     }
     return Judged(**{**values, **more})
 
 
+OTHER = {"engine": "pinocchio", "arm": "lever_like", "motions": "moves"}
 CASES = [
     judged(("backlash@1",), ("backlash@1",), "explained", 12.0, 0.95, ratios=(1.1, 0.98)),
     judged(("backlash@2",), ("nonlinear_stiffness@2",), "explained", 5.0, 0.6),
-    judged(("backlash@3",), (), "none", 0.1),
+    judged(("backlash@3",), (), "none", 0.1, setting=OTHER),
     judged(("coulomb_friction@1",), ("coulomb_friction@1",), "explained", 3.0, 0.95),
     judged((), (), "none", 0.0),
     judged(("outside_tone@1",), (), "unknown", 9.0, in_library=False),
@@ -64,6 +66,14 @@ def test_all_is_counted():
     assert found["unknown"]["hits"] == 1
     assert found["parameters_median_error"] == pytest.approx(0.06)
     assert [m["truth"] for m in found["misses"]] == [["backlash@2"], ["backlash@3"]]
+
+
+def test_figures_are_told_by_engine_arm_and_motions():
+    found = summary(CASES)["settings"]
+    assert {k: v["cases"] for k, v in found["engine"].items()} == {"mujoco": 6, "pinocchio": 1}
+    assert found["arm"]["lever_like"]["figures"] == summary(CASES)["figures"]
+    pairs = found["engine"]["mujoco"]["figures"]["pairs: both"]
+    assert (pairs["hits"], pairs["of"]) == (1, 1)
 
 
 def test_calibration_is_by_tenths():

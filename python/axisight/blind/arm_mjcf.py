@@ -5,66 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from axisight.blind.machine import NOTHING, Ends, Native
 from axisight.robot import Robot
 from axisight.robot.description import Joint
 
 STEPS_PER_SAMPLE = 2
 """Of the engine's integrator."""
-
-
-@dataclass(frozen=True)
-class Native:
-    """What MuJoCo changes by itself on one axis, or at the tip.
-
-    ``half_width_rad``: the gear's tendon is slack within; ``friction_nm``: dry friction of the motor by
-    the constraint solver; ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
-    to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
-    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
-    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
-    ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
-    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad].
-    """
-
-    half_width_rad: float = 0.0
-    friction_nm: float = 0.0
-    armature: float = 0.0
-    spring: float = 0.0
-    damper: float = 0.0
-    viscous: float = 0.0
-    gear: float = 0.0
-    lag_s: float = 0.0
-    kp: float = 0.0
-    ki: float = 0.0
-    filter_s: float = 0.0
-    zero_rad: float = 0.0
-    for_rate: float = 0.0
-    for_speed: float = 0.0
-
-
-NOTHING = Native()
-
-
-@dataclass(frozen=True)
-class Ends:
-    """What MuJoCo changes at both ends of the arm.
-
-    ``tip_kg`` at ``tip_m`` in the frame of the last link; ``rocks_rad_nm``: compliance of the base about
-    x and y, none where it is zero, ``rocks_s`` their damping over stiffness.
-    """
-
-    tip_kg: float = 0.0
-    tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rocks_rad_nm: tuple[float, float] = (0.0, 0.0)
-    rocks_s: float = 0.0
-
-    @property
-    def springs(self) -> list[tuple[str, float]]:
-        """Axis and stiffness of each spring of the base, ground to arm."""
-        named = zip(("1 0 0", "0 1 0"), self.rocks_rad_nm, strict=True)
-        return [(axis, 1 / c) for axis, c in named if c]
-
-
-PLAIN = Ends()
 
 
 # MuJoCo wants mass in every moving body; this much changes nothing visible.
@@ -92,7 +38,7 @@ def mjcf(robot: Robot, native: Mapping[int, Native], ends: Ends, step_s: float) 
     parts = _Parts()
     for axis, stiffness in ends.springs:
         parts.bodies += (
-            f'<body><joint axis="{axis}" stiffness="{stiffness!r}" damping="{stiffness * ends.rocks_s!r}"/>'
+            f'<body><joint axis="{_vector(axis)}" stiffness="{stiffness!r}" damping="{stiffness * ends.rocks_s!r}"/>'
             f"{_NEARLY_MASSLESS}"
         )
         parts.close += "</body>"
@@ -117,8 +63,11 @@ def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> Non
     parts.bodies += f'<body pos="{_vector(joint.origin_m)}">'
     change = native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
     # A position counts from where the bodies stand as they are written.
+    kind = "slide" if joint.prismatic else "hinge"
     zero = f'ref="{-change.zero_rad!r}"' if change.zero_rad else ""
-    parts.bodies += f'<joint name="{joint.name}" axis="{_vector(joint.axis)}" {spring} {zero}/>'
+    parts.bodies += (
+        f'<joint name="{joint.name}" type="{kind}" axis="{_vector(joint.axis)}" {spring} {zero}/>'
+    )
     if joint.link is None:
         parts.bodies += _NEARLY_MASSLESS
     else:

@@ -1,17 +1,20 @@
-"""Draws of a benchmark: which machine, which effects, which motions; a function of (seed, number)."""
+"""Draws of a benchmark: which engine, arm, motions, effects; a function of (seed, number)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.blind.case_files import moves
-from axisight.blind.engine import Machine
-from axisight.blind.withheld import KINDS, Drawn
-from axisight.robot import Robot
+from axisight.blind.machine import Machine
+from axisight.blind.motions import MOTIONS
+from axisight.blind.scene import Drawn, Kind, Scene
+from axisight.blind.withheld import KINDS
+from axisight.blind.withheld_formulas import KINDS_BY_FORMULA
+from axisight.errors import InputError
+from axisight.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 
@@ -33,40 +36,92 @@ _CHANGES = (
 )
 # Of so many cases one has nothing withheld, and one a pair.
 _ONE_IN = {"nothing": 8, "pair": 6}
-_SECONDS = 10.0
+ENGINES: Mapping[str, Mapping[str, Kind]] = {"mujoco": KINDS, "pinocchio": KINDS_BY_FORMULA}
+"""Kinds of effects by engine."""
+# Share of the cases by engine, arm and motions.
+_ENGINES = {"mujoco": 0.5, "pinocchio": 0.5}
+_ARMS = {"irb6600_like": 0.6, "scara_like": 0.15, "lever_like": 0.15, "cobot_like": 0.1}
+_MOTIONS = {"multisines": 0.6, "moves": 0.2, "slow_and_short": 0.2}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is not drawn by chance: names of an engine, an arm and motions; None is drawn."""
+
+    engine: str | None = None
+    arm: str | None = None
+    motions: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse names that nothing has."""
+        for name, known in (("engine", _ENGINES), ("arm", _ARMS), ("motions", _MOTIONS)):
+            value = getattr(self, name)
+            if value is not None and value not in known:
+                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role."""
+    """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role.
+
+    ``robot``: the simulator that the case gets.
+    """
 
     number: int
+    engine: str
+    arm: str
+    motions: str
+    robot: Robot
     effects: tuple[Drawn, ...]
     machine: Machine
     bare: Machine
     references: dict[str, tuple[str, Array]]
 
 
-def draw(seed: int, number: int, robot: Robot) -> Draw:
+DRAWN = Choice()
+"""All by chance."""
+
+
+def draw(seed: int, number: int, choice: Choice = DRAWN) -> Draw:
     """Return case ``number`` of a benchmark."""
     rng = np.random.default_rng([seed, number])
-    effects = _effects(rng, number, robot)
+    engine, arm, motions = (
+        chosen or drawn
+        for chosen, drawn in zip(
+            (choice.engine, choice.arm, choice.motions),
+            (_one_of(rng, shares) for shares in (_ENGINES, _ARMS, _MOTIONS)),
+            strict=True,
+        )
+    )
+    robot = load_robot(arm)
+    references = MOTIONS[motions](rng, robot)
+    scene = Scene(robot, [reference for _, reference in references.values()])
+    effects = _effects(rng, number, scene, ENGINES[engine])
     machine = _without_scatter_of(effects, scattered(rng, robot), robot)
-    bare = machine_of(machine, ())
-    return Draw(number, effects, machine_of(machine, effects), bare, references(rng, robot))
+    with_effects, bare = machine_of(machine, effects), machine_of(machine, ())
+    return Draw(number, engine, arm, motions, robot, effects, with_effects, bare, references)
 
 
-def _effects(rng: np.random.Generator, number: int, robot: Robot) -> tuple[Drawn, ...]:
+def _one_of(rng: np.random.Generator, shares: Mapping[str, float]) -> str:
+    return str(rng.choice(list(shares), p=list(shares.values())))
+
+
+def _effects(
+    rng: np.random.Generator, number: int, scene: Scene, kinds: Mapping[str, Kind]
+) -> tuple[Drawn, ...]:
     if number % _ONE_IN["nothing"] == 0:
         return ()
-    names = list(KINDS)
+    names, count = list(kinds), scene.robot.n_axes
     first = names[int(rng.integers(len(names)))]
-    axes = rng.permutation(robot.n_axes) + 1
-    out = [KINDS[first].draw(rng, robot, int(axes[0]))]
-    if number % _ONE_IN["pair"] == 1 and KINDS[first].in_library and robot.n_axes > 1:
-        others = [n for n, k in KINDS.items() if k.in_library and n != first]
+    axes = rng.permutation(count) + 1
+    out = [kinds[first].draw(rng, scene, int(axes[0]))]
+    if number % _ONE_IN["pair"] == 1 and kinds[first].in_library and count > 1:
+        others = [n for n, k in kinds.items() if k.in_library and n != first]
         second = others[int(rng.integers(len(others)))]
-        out.append(KINDS[second].draw(rng, robot, int(axes[1])))
+        # Some kinds have an axis of their own: the other is not there.
+        place = next(int(a) for a in axes if a != out[0].axis)
+        both = kinds[second].draw(rng, scene, place)
+        out += [both] if both.axis is None or both.axis != out[0].axis else []
     return tuple(out)
 
 
@@ -108,41 +163,3 @@ def machine_of(robot: Robot, effects: Sequence[Drawn]) -> Machine:
             laws={**out.laws, axis: effect.laws},
         )
     return out
-
-
-def references(rng: np.random.Generator, robot: Robot) -> dict[str, tuple[str, Array]]:
-    """Return role and velocity reference (n, n_axes) [rad/s] of every log, by name."""
-    n = round(_SECONDS / robot.sample_time_s)
-    time: Array = np.arange(n, dtype=np.float64) * robot.sample_time_s
-    axes = robot.n_axes
-    sign = np.array([-1.0, 1.0])
-    top: Array = rng.uniform(40.0, 55.0, axes) * rng.choice(sign, axes)
-    fresh: Array = rng.uniform(30.0, 55.0, axes) * rng.choice(sign, axes)
-    out: dict[str, tuple[str, Array]] = {}
-    for axis in range(axes):
-        loud: Array = 8.0 * np.eye(axes)[axis]
-        out[f"multisine_axis{axis + 1}"] = ("estimation", _multisine(rng, time, loud))
-    out["multisine_half"] = ("estimation", _multisine(rng, time, np.full(axes, 4.0), 0.5))
-    out["triangle"] = ("estimation", _triangle(time, 0.55 * np.abs(top)))
-    out["moves"] = ("estimation", moves(time, _SECONDS, top))
-    out["multisine_fresh"] = ("validation", _multisine(rng, time, np.full(axes, 4.0), 0.7))
-    out["moves_fresh"] = ("validation", moves(time, _SECONDS, fresh))
-    return out
-
-
-def _multisine(rng: np.random.Generator, time: Array, loud: Array, share: float = 1.0) -> Array:
-    """Return random-phase multisines from 1 to 40 Hz on square waves that keep the motors turning."""
-    lines = np.arange(1.0, 40.0, 1.0 / _SECONDS)
-    out = np.empty((len(time), len(loud)))
-    square = np.tanh(20 * np.sin(2 * np.pi * time / 5.0))
-    for axis, size in enumerate(loud):
-        phases = rng.uniform(0, 2 * np.pi, len(lines))
-        wave = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
-        out[:, axis] = share * 9.6 * square + size * wave / np.abs(wave).max()
-    return np.asarray(out * np.minimum(time / 0.1, 1.0)[:, None])
-
-
-def _triangle(time: Array, top: Array) -> Array:
-    phase = (time / 5.0 + 0.25) % 1.0
-    wave = 4 * np.abs(phase - 0.5) - 1
-    return np.asarray(-wave[:, None] * top)

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.blind.case_files import CaseFolder
-from axisight.blind.drawing import Draw, draw
-from axisight.blind.engine import run
+from axisight.blind.drawing import DRAWN, Choice, Draw, draw
+from axisight.blind.machine import Machine
 from axisight.blind.processes import Progress, shared_out
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.errors import InputError
-from axisight.robot import Robot, load_robot
 from axisight.storage import write_whole
 
-_PRESET = "irb6600_like"
+Array = NDArray[np.float64]
+# Of an engine: machine, references and noises of its runs to torques and angles.
+Run = Callable[[Machine, Sequence[Array], Sequence[Array]], list[tuple[Array, Array]]]
 
 
 def make_cases(
@@ -29,68 +32,78 @@ def make_cases(
     seed: int,
     workers: int,
     progress: Progress,
+    choice: Choice = DRAWN,
 ) -> None:
     """Write the cases of ``numbers`` to a folder, and their truths to another.
 
-    A case is a function of (seed, number). Cases that are there already stay as they are. Raises
+    A case is a function of (seed, number, choice). Cases that are there already stay as they are. Raises
     InputError where the folders are one.
     """
     if cases.resolve() == truths.resolve():
         raise InputError("truth: expected another folder than that of the cases")
-    make = partial(_make, cases, truths, seed)
+    make = partial(_make, cases, truths, seed, choice)
     shared_out(make, numbers, workers, "simulating machines", progress)
 
 
-def _make(cases: Path, truths: Path, seed: int, number: int) -> None:
+def _make(cases: Path, truths: Path, seed: int, choice: Choice, number: int) -> None:
     name = f"case_{seed:04d}_{number:04d}"
     if not (cases / name / SEAL).is_file():
-        robot = load_robot(_PRESET).with_effects([])
-        _write(cases / name, truths / f"{name}.json", draw(seed, number, robot), seed, robot)
+        _write(cases / name, truths / f"{name}.json", draw(seed, number, choice), seed)
 
 
-def _write(folder: Path, truth: Path, drawn: Draw, seed: int, robot: Robot) -> None:
+def _engine(name: str) -> Run:
+    """Return what makes machines move, and load only its library."""
+    return import_module(f"axisight.blind.{name}_engine").run  # type: ignore[no-any-return]
+
+
+def _write(folder: Path, truth: Path, drawn: Draw, seed: int) -> None:
     rng = np.random.default_rng([seed, drawn.number, 1])
+    run, robot = _engine(drawn.engine), drawn.robot
+    references = [reference for _, reference in drawn.references.values()]
+    noises = [robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
     case = CaseFolder(folder, folder.name)
-    for name, (role, reference) in drawn.references.items():
-        noise = robot.position_noise_std * rng.standard_normal(reference.shape)
+    logs = run(drawn.machine, references, noises)
+    for (name, (role, reference)), log in zip(drawn.references.items(), logs, strict=True):
         time_s = np.arange(len(reference), dtype=np.float64) * robot.sample_time_s
-        case.add(name, role, time_s, reference, *run(drawn.machine, reference, noise))
-    case.finish(_PRESET)
-    text = json.dumps(_truth(drawn, seed), indent=1)
+        case.add(name, role, time_s, reference, *log)
+    case.finish(drawn.arm)
+    text = json.dumps(_truth(drawn, seed, _severity(drawn, run)), indent=1)
     write_whole(truth, text)
     # Last: a case with its seal is whole.
     write_whole(folder / SEAL, seal_of(text) + "\n")
 
 
-def _truth(drawn: Draw, seed: int) -> dict[str, Any]:
+def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
     return {
         "schema": TRUTH_SCHEMA,
-        "engine": "mujoco",
+        "engine": drawn.engine,
+        "arm": drawn.arm,
+        "motions": drawn.motions,
         "seed": seed,
         "number": drawn.number,
         "effects": [
             {"effect": e.effect, "axis": e.axis, "parameters": dict(e.parameters)}
             for e in drawn.effects
         ],
-        "severity": _severity(drawn),
+        "severity": severity,
     }
 
 
-def _severity(drawn: Draw) -> list[float]:
+def _severity(drawn: Draw, run: Run) -> list[float]:
     """Return rms torque change by all effects over rms torque noise, largest validation log, by axis."""
+    robot = drawn.robot
     if not drawn.effects:
-        return [0.0] * drawn.machine.robot.n_axes
+        return [0.0] * robot.n_axes
     rng = np.random.default_rng(0)
-    out = np.zeros(drawn.machine.robot.n_axes)
-    for role, reference in drawn.references.values():
-        if role != "validation":
-            continue
-        quiet = np.zeros_like(reference)
-        noise = drawn.machine.robot.position_noise_std * rng.standard_normal(reference.shape)
-        with_it, without, noisy = (
-            run(machine, reference, added)[0]
-            for machine, added in ((drawn.machine, quiet), (drawn.bare, quiet), (drawn.bare, noise))
-        )
-        change, floor = (np.sqrt(np.mean((x - without) ** 2, axis=0)) for x in (with_it, noisy))
-        out = np.maximum(out, change / floor)
-    return [float(x) for x in out]
+    references = [x for role, x in drawn.references.values() if role == "validation"]
+    quiet = [np.zeros_like(x) for x in references]
+    noise = [robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    count = len(references)
+    with_it = [torque for torque, _ in run(drawn.machine, references, quiet)]
+    bare = [torque for torque, _ in run(drawn.bare, references * 2, quiet + noise)]
+    without, noisy = bare[:count], bare[count:]
+    shares = [
+        np.sqrt(np.mean((a - b) ** 2, axis=0) / np.mean((c - b) ** 2, axis=0))
+        for a, b, c in zip(with_it, without, noisy, strict=True)
+    ]
+    return [float(x) for x in np.max(shares, axis=0)]

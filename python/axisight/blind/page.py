@@ -34,6 +34,21 @@ def render_score(name: str, score: dict[str, Any]) -> str:
             {"title": title, "rows": [_class(k, v) for k, v in score[key].items()]}
             for title, key in (("By family", "families"), ("By effect", "effects"))
         ],
+        "settings": [
+            {
+                "title": f"By {key}",
+                "columns": list(score["figures"]),
+                "rows": [
+                    {
+                        "name": value,
+                        "cases": row["cases"],
+                        "shares": [_share(x)["count"] for x in row["figures"].values()],
+                    }
+                    for value, row in rows.items()
+                ],
+            }
+            for key, rows in score["settings"].items()
+        ],
         "columns": [_word(n) for n in named],
         "confusion": [
             {"truth": _word(t), "cells": [_cell(t, n, row.get(n, 0)) for n in named]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,13 @@ import numpy as np
 import scipy
 
 from axisight.blind.sealed import SEAL, seal_of
-from axisight.blind.withheld import KINDS
 from axisight.effects import effect_info, effect_table
 from axisight.errors import InputError
 
-# Change of the torque over its noise from which an effect counts as there to be found.
 SEVERE = 3.0
+"""Change of the torque over its noise from which an effect counts as there to be found."""
+SETTING = ("engine", "arm", "motions")
+"""What a case is drawn with, as its truth says."""
 # Alternatives this likely belong to what a verdict allows.
 _ALTERNATIVE = 0.05
 _BINS = 10
@@ -29,7 +30,8 @@ class Judged:
 
     Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
     ``where``: the axis on which the gap mainly lies. ``ratios``: named value over true value of the
-    parameters that both state; ``covered``: whether their intervals hold the true value.
+    parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
+    names of engine, arm and motions.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Judged:
     where: frozenset[int]
     ratios: tuple[float, ...]
     covered: tuple[bool, ...]
+    setting: Mapping[str, str]
 
     @property
     def kind(self) -> str:
@@ -176,7 +179,8 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
     return Judged(
         name=name,
         truth=tuple(_label(e) for e in withheld),
-        in_library=all(KINDS[e["effect"]].in_library for e in withheld),
+        in_library=all(e["effect"] in effect_table() for e in withheld),
+        setting={key: truth.get(key, "-") for key in SETTING},
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
         named=tuple(_label(c) for c in causes),

@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from axisight.blind.score import Judged, Share, calibration_bins, calibration_error, figures
+from axisight.blind.score import (
+    SETTING,
+    Judged,
+    Share,
+    calibration_bins,
+    calibration_error,
+    figures,
+)
 from axisight.effects import effect_info, effect_table
 
 SCHEMA = "axisight.score/1"
@@ -20,8 +27,9 @@ _SEVERITIES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, float("inf"))
 def summary(judged: Sequence[Judged]) -> dict[str, Any]:
     """Return figures, classes, confusion, calibration, a curve of detection and what is not right.
 
-    ``confusion``: of single effects and of nothing withheld, how often each was named as what; a verdict
-    without a cause counts by its word. Twins count as one another. Shares have Wilson's interval.
+    ``settings``: the figures by engine, arm and motions. ``confusion``: of single effects and of
+    nothing withheld, how often each was named as what; a verdict without a cause counts by its word.
+    Twins count as one another. Shares have Wilson's interval.
     """
     single = [j for j in judged if j.kind == "single"]
     off = [abs(r - 1) for j in judged for r in j.ratios]
@@ -39,6 +47,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
         "families": _by_class(single, _family),
         "confusion": _confusion([j for j in judged if len(j.truth) < 2]),
         "detection": _detection(single),
+        "settings": {key: _by_setting(judged, key) for key in SETTING},
         "misses": [
             {
                 "case": j.name,
@@ -85,6 +94,16 @@ def _by_class(single: Sequence[Judged], of: Callable[[str], str]) -> dict[str, A
             "all": _share(Share(sum(map(_first, mine)), len(mine))),
             "severe": _share(Share(sum(map(_first, severe)), len(severe))),
         }
+    return out
+
+
+def _by_setting(judged: Sequence[Judged], key: str) -> dict[str, Any]:
+    """Return the figures of the cases of every engine, arm or plan of motions."""
+    out = {}
+    for value in sorted({j.setting[key] for j in judged}):
+        mine = [j for j in judged if j.setting[key] == value]
+        shares = {name: _share(share) for name, share in figures(mine).items()}
+        out[value] = {"cases": len(mine), "figures": shares}
     return out
 
 

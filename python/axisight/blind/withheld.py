@@ -1,72 +1,30 @@
 """What is withheld from simulators: effects by name, the ranges they are drawn from, their laws.
 
-Ranges are those of industrial robots of this size: friction of a tenth to a half of the rated torque
-(Armstrong-Helouvry 1991), lost motion of harmonic and cycloidal gears of one arc minute and less,
+Ranges are those of industrial robots: of the three-axis preset friction of a tenth to a half of the rated
+torque (Armstrong-Helouvry 1991), lost motion of harmonic and cycloidal gears of one arc minute and less,
 transmission errors of half an arc minute, ripple of a few per cent of the rated torque, delays of one
-to three samples.
+to three samples; of other arms the same in the units of their motors and gears (`Scene`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
 import numpy as np
 
 from axisight.blind import laws
-from axisight.blind.arm_mjcf import NOTHING, PLAIN, STEPS_PER_SAMPLE, Ends, Native
-from axisight.robot import Robot
-
-Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """One effect as drawn: parameters as the library states them, and what makes it.
-
-    ``axis`` from 1; None for the arm, which ``ends`` is of. ``changed``: parameters of the robot.
-    """
-
-    effect: str
-    axis: int | None
-    parameters: Mapping[str, float]
-    native: Native = NOTHING
-    laws: Sequence[laws.Law] = field(default_factory=tuple)
-    ends: Ends = PLAIN
-    changed: Mapping[str, float] = field(default_factory=dict)
+from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE
+from axisight.blind.machine import Ends, Native
+from axisight.blind.scene import Draw, Drawn, Kind, Rng, Scene, between, sign
 
 
-Draw = Callable[[Rng, Robot, int], Drawn]
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of effect. ``in_library``: the diagnosis can name it."""
-
-    draw: Draw
-    in_library: bool = True
-
-
-def _sign(rng: Rng) -> float:
-    return float(rng.choice([-1.0, 1.0]))
-
-
-def _between(rng: Rng, low: float, high: float) -> float:
-    """Draw evenly by factors."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def _stiffness(robot: Robot, axis: int) -> float:
-    return robot.parameters()[f"{robot.axis_names[axis - 1]}.stiffness"]
-
-
-def _coulomb(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size = _between(rng, 0.2, 0.7)
+def _coulomb(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = between(rng, 0.2, 0.7) * scene.torque(axis)
     return Drawn("coulomb_friction", axis, {"coulomb_nm": size}, Native(friction_nm=size))
 
 
-def _stribeck(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    dry, speed = _between(rng, 0.25, 0.6), _between(rng, 2.0, 8.0)
+def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    dry, speed = between(rng, 0.25, 0.6) * scene.torque(axis), between(rng, 2.0, 8.0)
     excess = dry * float(rng.uniform(0.5, 1.3))
     # The excess falls exponentially, in the library like a bell: the two state it in other numbers.
     values = {"coulomb_nm": dry, "exponential_excess_nm": excess, "decay_speed_rad_s": speed}
@@ -74,55 +32,56 @@ def _stribeck(rng: Rng, _robot: Robot, axis: int) -> Drawn:
     return Drawn("stribeck_friction", axis, values, laws=[law])
 
 
-def _viscous(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    share = _between(rng, 0.4, 1.5)
-    own = robot.parameters()[f"{robot.axis_names[axis - 1]}.viscous_friction"]
+def _viscous(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    share = between(rng, 0.4, 1.5)
+    own = scene.of_joint(axis, "viscous_friction")
     values = {"viscous_nm_s_rad": share * own}
     return Drawn("viscous_friction", axis, values, Native(viscous=share))
 
 
-def _load_friction(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _between(rng, 0.03, 0.1)
+def _load_friction(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = between(rng, 0.03, 0.1)
     law = laws.LoadFriction(share, 0.05)
     return Drawn("load_dependent_friction", axis, {"coefficient": share}, laws=[law])
 
 
-def _backlash(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    width = _between(rng, 0.8e-4, 4e-4)
+def _backlash(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    width = between(rng, 0.8e-4, 4e-4)
     return Drawn("backlash", axis, {"half_width_rad": width}, Native(half_width_rad=width))
 
 
-def _cubic(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    cubic = _between(rng, 2e11, 1.5e12)
+def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    unit = scene.stiffness(axis) / scene.deflection(axis) ** 2
+    cubic = between(rng, 1.1e5, 8e5) * unit
     law = laws.CubicSpring(cubic)
     return Drawn("nonlinear_stiffness", axis, {"cubic_nm_rad3": cubic}, laws=[law])
 
 
-def _knee(rng: Rng, robot: Robot, _axis: int) -> Drawn:
-    step, knee = _between(rng, 0.4, 1.2), _between(rng, 1e-4, 5e-4)
+def _knee(rng: Rng, scene: Scene, _axis: int) -> Drawn:
+    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(1)
     # Where the gear carries weight it stays beyond its knee, and is another spring altogether.
-    law = laws.KneeSpring(step * _stiffness(robot, 1), knee)
+    law = laws.KneeSpring(step * scene.stiffness(1), knee)
     return Drawn("piecewise_stiffness", 1, {"step": step, "knee_rad": knee}, laws=[law])
 
 
-def _zero(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    offset = _sign(rng) * _between(rng, 0.02, 0.1)
+def _zero(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    offset = sign(rng) * between(rng, 0.02, 0.1)
     return Drawn("joint_zero_offset", axis, {"offset_rad": offset}, Native(zero_rad=offset))
 
 
-def _softer(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _sign(rng) * _between(rng, 0.08, 0.25)
+def _softer(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = sign(rng) * between(rng, 0.08, 0.25)
     return Drawn("joint_stiffness", axis, {"relative_change": share}, Native(spring=share))
 
 
-def _damping(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _between(rng, 0.5, 2.0)
+def _damping(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = between(rng, 0.5, 2.0)
     return Drawn("joint_damping", axis, {"relative_change": share}, Native(damper=share))
 
 
-def _hysteresis(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    share, slip = _between(rng, 0.15, 0.4), _between(rng, 1e-4, 4e-4)
-    stiff = share * _stiffness(robot, axis)
+def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    share, slip = between(rng, 0.15, 0.4), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
+    stiff = share * scene.stiffness(axis)
     slips = slip * np.array([0.4, 0.8, 1.2, 1.6])
     law = laws.MaxwellSlip([stiff / 4] * 4, list(slips))
     # What slips was part of the spring.
@@ -130,17 +89,17 @@ def _hysteresis(rng: Rng, robot: Robot, axis: int) -> Drawn:
     return Drawn("gear_hysteresis", axis, {"share": share, "deflection_rad": slip}, native, [law])
 
 
-def _transmission(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    size, phase = _between(rng, 0.7e-4, 2e-4), float(rng.uniform(0, 2 * np.pi))
+def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size, phase = between(rng, 0.7e-4, 2e-4), float(rng.uniform(0, 2 * np.pi))
     conserves = bool(rng.integers(2))
-    law = laws.GearWave(_stiffness(robot, axis), 2.0, size, phase, conserves)
+    law = laws.GearWave(scene.stiffness(axis), 2.0, size, phase, conserves)
     return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
 
 
 def _waves(rng: Rng, low: float, high: float) -> tuple[list[float], list[float], list[float]]:
     count = int(rng.integers(1, 4))
     orders = sorted(rng.choice([1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 24.0], count, replace=False))
-    sizes = [_between(rng, low, high) for _ in orders]
+    sizes = [between(rng, low, high) for _ in orders]
     phases = rng.uniform(0, 2 * np.pi, count).tolist()
     return [float(n) for n in orders], sizes, phases
 
@@ -152,164 +111,164 @@ def _terms(waves: tuple[list[float], list[float], list[float]], unit: str) -> di
     return out
 
 
-def _torque_ripple(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    waves = _waves(rng, 0.08, 0.3)
+def _torque_ripple(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    waves = _waves(rng, 0.08 * scene.torque(axis), 0.3 * scene.torque(axis))
     return Drawn("torque_ripple", axis, _terms(waves, "nm"), laws=[laws.MotorWave(*waves)])
 
 
-def _resolver_ripple(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+def _resolver_ripple(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     waves = _waves(rng, 1.5e-4, 6e-4)
     return Drawn("resolver_ripple", axis, _terms(waves, "rad"), laws=[laws.SensorWave(*waves)])
 
 
-def _delay(rng: Rng, _robot: Robot, axis: int) -> Drawn:
+def _delay(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     delay = 0.25e-3 * float(rng.integers(2, 7))
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
 
 
-def _late_sensor(rng: Rng, robot: Robot, axis: int) -> Drawn:
+def _late_sensor(rng: Rng, scene: Scene, axis: int) -> Drawn:
     samples = int(rng.integers(1, 4))
-    delay = samples * robot.sample_time_s
+    delay = samples * scene.robot.sample_time_s
     return Drawn("sensor_delay", axis, {"delay_s": delay}, laws=[laws.LateSensor(samples)])
 
 
-def _lag(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    lag = _between(rng, 0.6e-3, 3e-3)
+def _lag(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    lag = between(rng, 0.6e-3, 3e-3)
     # The engine holds an activation over its step: torque is late by half of it, too.
-    held = 0.5 * robot.sample_time_s / STEPS_PER_SAMPLE
+    held = 0.5 * scene.robot.sample_time_s / STEPS_PER_SAMPLE
     return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag + held}, Native(lag_s=lag))
 
 
-def _constant(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _sign(rng) * _between(rng, 0.03, 0.1)
+def _constant(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = sign(rng) * between(rng, 0.03, 0.1)
     return Drawn("torque_constant", axis, {"relative_error": share}, Native(gear=share))
 
 
-def _reported(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _sign(rng) * _between(rng, 0.03, 0.1)
+def _reported(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = sign(rng) * between(rng, 0.03, 0.1)
     law = laws.Reported(1 + share)
     return Drawn("torque_sensor_gain", axis, {"relative_error": share}, laws=[law])
 
 
-def _offset(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size = _sign(rng) * _between(rng, 0.3, 1.0)
+def _offset(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = sign(rng) * between(rng, 0.3, 1.0) * scene.torque(axis)
     return Drawn("torque_offset", axis, {"offset_nm": size}, laws=[laws.Offset(size)])
 
 
-def _reported_less(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size = _sign(rng) * _between(rng, 0.3, 1.0)
+def _reported_less(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = sign(rng) * between(rng, 0.3, 1.0) * scene.torque(axis)
     law = laws.ReportedLess(size)
     return Drawn("torque_sensor_offset", axis, {"offset_nm": size}, laws=[law])
 
 
-def _inertia(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    share = _between(rng, 0.08, 0.25)
+def _inertia(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = between(rng, 0.08, 0.25)
     return Drawn("motor_inertia", axis, {"relative_change": share}, Native(armature=share))
 
 
-def _payload(rng: Rng, robot: Robot, _axis: int) -> Drawn:
+def _payload(rng: Rng, scene: Scene, _axis: int) -> Drawn:
     # Beyond the tolerance of the last link, 680 kg to 1.5 %: less is production scatter.
-    mass = _between(rng, 50.0, 150.0)
-    link = next(j.link for j in reversed(robot.joints) if j.link is not None)
-    x, y, z = (float(c + rng.uniform(-0.3, 0.3)) for c in link.com_m)
+    mass = between(rng, 0.075, 0.22) * scene.last_kg
+    link = next(j.link for j in reversed(scene.robot.joints) if j.link is not None)
+    x, y, z = (float(c + rng.uniform(-0.3, 0.3) * scene.reach) for c in link.com_m)
     values = {"mass_kg": mass, "x_m": x, "y_m": y, "z_m": z}
     return Drawn("payload", None, values, ends=Ends(tip_kg=mass, tip_m=(x, y, z)))
 
 
-def _of_link(robot: Robot, axis: int, quantity: str) -> tuple[str, float]:
+def _of_link(scene: Scene, axis: int, quantity: str) -> tuple[str, float]:
     """Return the name and the nominal value of a parameter of the link of an axis."""
-    name = robot.axis_parameter(axis, quantity)
+    name = scene.robot.axis_parameter(axis, quantity)
     assert name is not None  # every axis of the preset moves a link
-    return name, robot.parameters()[name]
+    return name, scene.robot.parameters()[name]
 
 
 def _link_share(effect: str, quantity: str, low: float, high: float) -> Draw:
-    def draw(rng: Rng, robot: Robot, axis: int) -> Drawn:
-        share = _between(rng, low, high)
-        name, nominal = _of_link(robot, axis, quantity)
+    def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
+        share = between(rng, low, high)
+        name, nominal = _of_link(scene, axis, quantity)
         changed = {name: nominal * (1 + share)}
         return Drawn(effect, axis, {"relative_change": share}, changed=changed)
 
     return draw
 
 
-def _link_com(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    shift = {f"{k}_m": _sign(rng) * _between(rng, 0.02, 0.08) for k in "xyz"}
+def _link_com(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    shift = {f"{k}_m": sign(rng) * between(rng, 0.02, 0.08) * scene.reach for k in "xyz"}
     changed = {}
     for key, size in shift.items():
-        name, nominal = _of_link(robot, axis, f"com_{key[0]}")
+        name, nominal = _of_link(scene, axis, f"com_{key[0]}")
         changed[name] = nominal + size
     return Drawn("link_com", axis, shift, changed=changed)
 
 
-def _rocking(rng: Rng, _robot: Robot, _axis: int) -> Drawn:
-    about = _between(rng, 2e-8, 2e-7), _between(rng, 2e-8, 2e-7)
-    damping = _between(rng, 5e-4, 4e-3)
+def _rocking(rng: Rng, scene: Scene, _axis: int) -> Drawn:
+    about = [between(rng, 2e-8, 2e-7) / scene.weight for _ in range(2)]
+    damping = between(rng, 5e-4, 4e-3)
     values = {"about_x_rad_nm": about[0], "about_y_rad_nm": about[1], "damping_s": damping}
-    return Drawn("base_compliance", None, values, ends=Ends(rocks_rad_nm=about, rocks_s=damping))
+    return Drawn(
+        "base_compliance",
+        None,
+        values,
+        ends=Ends(rocks_rad_nm=(about[0], about[1]), rocks_s=damping),
+    )
 
 
-def _warmup(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    own = robot.parameters()[f"{robot.axis_names[axis - 1]}.viscous_friction"]
-    size, time = -own * _between(rng, 0.4, 0.8), _between(rng, 2.0, 6.0)
+def _warmup(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    own = scene.of_joint(axis, "viscous_friction")
+    size, time = -own * between(rng, 0.4, 0.8), between(rng, 2.0, 6.0)
     values = {"viscous_nm_s_rad": size, "time_constant_s": time}
     return Drawn("friction_warmup", axis, values, laws=[laws.Warmup(size, time)])
 
 
-def _gains(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    kp, ki = (_sign(rng) * _between(rng, 0.08, 0.3) for _ in range(2))
+def _gains(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    kp, ki = (sign(rng) * between(rng, 0.08, 0.3) for _ in range(2))
     values = {"relative_proportional": kp, "relative_integral": ki}
     return Drawn("controller_gain", axis, values, Native(kp=kp, ki=ki))
 
 
-def _speed_filter(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    lag, sample = _between(rng, 1e-3, 5e-3), robot.sample_time_s
+def _speed_filter(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    lag, sample = between(rng, 1e-3, 5e-3), scene.robot.sample_time_s
     # Of an exact lag; the library states that of a backward difference which forgets as fast.
     stated = sample / -float(np.expm1(-sample / lag)) - sample
     return Drawn("velocity_filter", axis, {"time_constant_s": stated}, Native(filter_s=lag))
 
 
-def _fed_forward(rng: Rng, robot: Robot, axis: int) -> Drawn:
-    name = robot.axis_names[axis - 1]
-    own = robot.parameters()
-    rate = _between(rng, 0.2, 1.0) * own[f"{name}.motor_inertia"]
-    speed = _between(rng, 0.3, 1.0) * own[f"{name}.viscous_friction"]
+def _fed_forward(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    rate = between(rng, 0.2, 1.0) * scene.of_joint(axis, "motor_inertia")
+    speed = between(rng, 0.3, 1.0) * scene.of_joint(axis, "viscous_friction")
     values = {"acceleration_nm_s2_rad": rate, "speed_nm_s_rad": speed}
     return Drawn("feedforward_missing", axis, values, Native(for_rate=rate, for_speed=speed))
 
 
-# Of the largest torque of the arm's logs, as the caller knows it.
-_LARGEST_NM = np.array([20.0, 46.0, 40.0])
-
-
-def _limit(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    limit = float(rng.uniform(0.75, 0.9) * _LARGEST_NM[axis - 1])
+def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    limit = float(rng.uniform(0.75, 0.9) * scene.largest_nm[axis - 1])
     return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[laws.Limit(limit)])
 
 
-def _deadband(rng: Rng, _robot: Robot, _axis: int) -> Drawn:
-    width = _between(rng, 0.2, 0.6)
+def _deadband(rng: Rng, scene: Scene, _axis: int) -> Drawn:
+    width = between(rng, 0.2, 0.6) * scene.torque(1)
     # Where the torque carries weight it keeps its sign, and a deadband is an offset.
     return Drawn("torque_deadband", 1, {"width_nm": width}, laws=[laws.Deadband(width)])
 
 
-def _tone(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size, frequency = _between(rng, 0.3, 1.0), float(rng.uniform(3.0, 30.0))
+def _tone(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size, frequency = between(rng, 0.3, 1.0) * scene.torque(axis), float(rng.uniform(3.0, 30.0))
     law = laws.Tone(size, frequency, float(rng.uniform(0, 2 * np.pi)))
     return Drawn(
         "outside_tone", axis, {"amplitude_nm": size, "frequency_hz": frequency}, laws=[law]
     )
 
 
-def _friction_step(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size = _between(rng, 0.4, 0.9)
+def _friction_step(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = between(rng, 0.4, 0.9) * scene.torque(axis)
     return Drawn(
         "friction_step", axis, {"friction_nm": size}, laws=[laws.FrictionStep(size, 0.05, 5.0)]
     )
 
 
-def _cubic_damper(rng: Rng, _robot: Robot, axis: int) -> Drawn:
-    size = _between(rng, 2e6, 2e7)
+def _cubic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    rated = scene.stiffness(axis) * scene.deflection(axis)
+    size = between(rng, 1.1, 11.0) * rated
     return Drawn("cubic_damper", axis, {"cubic_nm_s3_rad3": size}, laws=[laws.CubicDamper(size)])
 
 

@@ -36,14 +36,19 @@ def make_command(
     first: Annotated[int, typer.Option(min=0, help="Number of the first case.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Cases are a function of seed and number.")] = 0,
     workers: _Workers = None,
+    engine: Annotated[str | None, typer.Option(help="mujoco or pinocchio. Default: drawn.")] = None,
+    arm: Annotated[str | None, typer.Option(help="One of the presets drawn from.")] = None,
+    motions: Annotated[str | None, typer.Option(help="One of the plans drawn from.")] = None,
 ) -> None:
-    """Simulate machines that differ from their simulator, with MuJoCo (extra ``blind``)."""
+    """Simulate machines that differ from their simulator, with other engines (extra ``blind``)."""
     with errors(), bars() as progress:
-        # Only this command needs MuJoCo.
+        # Only this command needs the engines.
+        from axisight.blind.drawing import Choice  # noqa: PLC0415
         from axisight.blind.make import make_cases  # noqa: PLC0415
 
         numbers = range(first, first + count)
-        make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress)
+        choice = Choice(engine, arm, motions)
+        make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress, choice)
     OUT.print(f"{count} cases: {cases}; what is withheld: {truth}", soft_wrap=True)
 
 

@@ -113,6 +113,23 @@ class Standing:
         """Return the same with one of its candidates first."""
         return replace(self, ranked=(first, *(r for r in self.ranked if r is not first)))
 
+    def with_what_others_say(self, others: Sequence[Standing]) -> Standing:
+        """Return the same with rivals held against the first where they do worst.
+
+        ``others``: standings of other axes that the first leads too. What moves several axes is seen on
+        all of them; one that does as well on one of them may do worse on another.
+        """
+        first = self.best
+        odds = {r.trial.label: r.probability for r in self.ranked}
+        for other in others:
+            there = {r.trial.label: r.probability / other.best.probability for r in other.ranked}
+            odds = {
+                label: min(p, first.probability * there.get(label, 0.0))
+                for label, p in odds.items()
+            }
+        held = (replace(r, probability=odds[r.trial.label]) for r in self.ranked)
+        return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
+
     def inseparable(self) -> list[Ranked]:
         """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
         winner = self.best

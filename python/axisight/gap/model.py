@@ -20,6 +20,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.gap.scales import NaturalSizes
 from axisight.gap.tolerances import tolerance_of
 from axisight.robot import Robot
 
@@ -184,6 +185,7 @@ class ModelFitter(ABC):
         self.block_s = block_s
         self.cancel = _core.CancelToken()
         self.tolerances = tolerances
+        self.natural: NaturalSizes | None = None
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
@@ -415,7 +417,7 @@ class ModelFitter(ABC):
         for i, f in enumerate(free):
             keep = held[i] and f.effect.label in known
             added += [
-                replace(_trial_parameter(tried, i, f, name), nuisance=keep) for name in f.free
+                replace(self._trial_parameter(tried, i, f, name), nuisance=keep) for name in f.free
             ]
         parameters = own + added
         keys: list[tuple[str | None, str]] = [(None, p.name) for p in own]
@@ -426,16 +428,21 @@ class ModelFitter(ABC):
         warm = [(i, columns[key]) for i, key in enumerate(keys) if key in columns]
         return _Setup(tried, parameters, own, warm)
 
-
-def _trial_parameter(effects: Sequence[Effect], i: int, free: FreeEffect, name: str) -> Parameter:
-    parameter = effect_parameter(effects, i, name)
-    # Beyond the bounds of the effect itself there is no model.
-    least, most = free.bounds.get(name, (parameter.lower, parameter.upper))
-    lower, upper = max(least, parameter.lower), min(most, parameter.upper)
-    initial = min(max(parameter.initial, lower), upper)
-    return replace(
-        parameter, initial=initial, lower=lower, upper=upper, prior=free.priors.get(name)
-    )
+    def _trial_parameter(
+        self, effects: Sequence[Effect], i: int, free: FreeEffect, name: str
+    ) -> Parameter:
+        parameter = effect_parameter(effects, i, name)
+        # Beyond the bounds of the effect itself there is no model.
+        least, most = free.bounds.get(name, (parameter.lower, parameter.upper))
+        lower, upper = max(least, parameter.lower), min(most, parameter.upper)
+        return replace(
+            parameter,
+            initial=min(max(parameter.initial, lower), upper),
+            lower=lower,
+            upper=upper,
+            scale=parameter.scale if self.natural is None else self.natural.of(effects[i], name),
+            prior=free.priors.get(name),
+        )
 
 
 def _is_relative(effect: str) -> bool:

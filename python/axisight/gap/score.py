@@ -90,9 +90,7 @@ def linear_step(evidence: Linearized) -> Array:
     """
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
-    # An amplitude may start on its bound; a parameter of the simulator there is held.
-    held = np.array([n in evidence.at_bound and n[0] is None for n in evidence.parameters])
-    movable = (np.diag(matrix) > 0) & ~held
+    movable = np.diag(matrix) > 0
     free, (least, most) = movable.copy(), _room(evidence)
     step = np.zeros(len(gradient))
     # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the

@@ -80,8 +80,12 @@ class Bench:
         return self.fitter.runs(self.model)
 
     def begin_nominal(self) -> None:
-        """Get ready for candidates that begin at the nominal values of the simulator's own parameters."""
-        self.near_nominal = self.fitter.runs(self.model, {})
+        """Get ready for candidates that begin at the nominal values of the simulator's own parameters.
+
+        Where it cannot be simulated with these alone, candidates are tried without runs to follow.
+        """
+        with suppress(InputError):
+            self.near_nominal = self.fitter.runs(self.model, {})
 
     def attempt(
         self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None

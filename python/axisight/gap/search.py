@@ -194,6 +194,10 @@ def _taken(
         led = _led_by_a_cause(standing, state, settings, tried)
         if led is None:
             continue
+        least = state.least_falls(settings)
+        led = led.with_what_others_say(
+            [s for s in standings if _leads(led, s, fall[place[led.best.trial.label]], least)]
+        )
         mine = place[led.best.trial.label]
         felt = any(
             interact(one, mine, led.axis, fall) or interact(mine, one, axis, fall)
@@ -205,6 +209,12 @@ def _taken(
     if not found and round_.fitter.adds_up:
         found = _pairs(round_, trials, state, settings, tried)
     return tuple(found)
+
+
+def _leads(led: Standing, other: Standing, fall: Array, least: Array) -> bool:
+    """Whether what leads a standing also leads another, by what a cause takes away there."""
+    same = other.best.trial is led.best.trial
+    return other.axis != led.axis and same and bool(fall[other.axis] > least[other.axis])
 
 
 def _named_simply(

@@ -141,12 +141,20 @@ def _gear_waves(trial: Trial) -> FreeEffect:
 _SMALL_SHARE = 0.1
 
 
+# A tenth of it, where searches begin, is ten times the least that effects take.
+_LEAST_DEFLECTION_RAD = 1e-4
+
+
 def _deflection_rad(trial: Trial) -> float:
-    """Return the deflection of the gear under the torque of the log that moves it most."""
+    """Return the deflection of the gear under the torque of the log that moves it most.
+
+    Not less than what shapes of gears are stated for.
+    """
     robot, i = trial.robot, trial.index
     stiffness = robot.parameters()[f"{robot.axis_names[i]}.stiffness"]
     ratio = abs(float(robot.gear_ratio[i]))
-    return max(float(np.std(torque)) for torque in trial.torque()) / ratio / stiffness
+    most = max(float(np.std(torque)) for torque in trial.torque())
+    return max(most / ratio / stiffness, _LEAST_DEFLECTION_RAD)
 
 
 def _play(trial: Trial) -> FreeEffect:

@@ -39,6 +39,9 @@ _ROUGHLY = 0.3
 _LOOKED_AT = 3
 # Share of what is left on an axis that one fitted elsewhere explains: what is tried there waits.
 _MOST = 0.5
+# Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
+# the one found before its shadow on another axis.
+_AS_MUCH = 0.9
 # Leaders of an axis that are refined, and what share of the first one's score the others need: a fit
 # with sensitivities of its own does not make more of the rest.
 _REFINED = 2
@@ -174,13 +177,15 @@ class Trials:
         """Fit the chosen, place after place, the most promising first.
 
         Where one found before explains most of what is left on an axis, what is tried there would
-        be felt by it and have to wait for the next round: it goes to ``waiting``.
+        be felt by it and have to wait for the next round: it goes to ``waiting``, unless it promises
+        as much as any.
         """
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
         promise: dict[int | None, float] = {}
         for start in chosen:
             place = start.option.effect.axis
             promise[place] = max(promise.get(place, -np.inf), start.gain)
+        most = max(promise.values(), default=0.0)
         found: list[Trial] = []
         done = 0
         axes = sorted((p for p in promise if p is not None), key=lambda p: -promise[p])
@@ -190,12 +195,13 @@ class Trials:
         for places in turns:
             here = [s for s in chosen if s.option.effect.axis in places]
             explained = (falls(found, self.current, self.layout) / left).max(axis=0, initial=0.0)
+            now = here
             if all(p is not None and explained[p - 1] > _MOST for p in places):
-                self.waiting += here
-            else:
-                for k, fitted in enumerate(pool.map(self._fitted, here)):
-                    self.progress(label, done + k, len(chosen))
-                    found += [] if fitted is None else [fitted]
+                now = [s for s in here if s.gain > _AS_MUCH * most]
+                self.waiting += [s for s in here if s.gain <= _AS_MUCH * most]
+            for k, fitted in enumerate(pool.map(self._fitted, now)):
+                self.progress(label, done + k, len(chosen))
+                found += [] if fitted is None else [fitted]
             done += len(here)
         self.progress(label, done, len(chosen))
         return found

@@ -116,10 +116,15 @@ def _shown(cause: ShownCause) -> NamedCause:
 
 
 def _strongest(found: Search) -> Standing | None:
-    """Return how candidates first stood where there was most to explain."""
-    first = found.rounds[0].standings
+    """Return how candidates first stood where there was most to explain.
+
+    Of what leads there and was taken in, as it was judged then: by what other axes say, too.
+    """
+    first = found.rounds[0]
     left = found.to_explain() / found.layout.samples()
-    return max(first, key=lambda s: float(left[s.axis]), default=None)
+    most = max(first.standings, key=lambda s: float(left[s.axis]), default=None)
+    judged = (s for _, s in first.accepted if most and s.best.trial is most.best.trial)
+    return next(judged, most)
 
 
 def _open(winner: Ranked, standing: Standing, accepted: set[str]) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.result import Mode
+from axisight.gap.scales import NaturalSizes
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
 from axisight.gap.torques import Variant
@@ -39,6 +40,10 @@ class View(ABC):
     """Causes that the logs show by themselves."""
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs settle by themselves: no candidates."""
+
+    def __post_init__(self) -> None:
+        """Tell the fitter what is large on this robot."""
+        self.fitter.natural = NaturalSizes(self.robot, self.logs)
 
     def candidates(
         self, model: Evidence, *, axes: Collection[int] | None = None

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.blind.arm_mjcf import NOTHING, PLAIN, STEPS_PER_SAMPLE, Ends, Native, mjcf
+from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE, mjcf
+from axisight.blind.controller import Controller
 from axisight.blind.laws import Axis, Law
+from axisight.blind.machine import Machine
 from axisight.errors import InputError, MissingExtraError
-from axisight.robot import Robot
 
 try:
     import mujoco
@@ -26,22 +26,18 @@ Array = NDArray[np.float64]
 _SETTLING_S = 4.0
 
 
-@dataclass(frozen=True)
-class Machine:
-    """A robot as it really is: changes that MuJoCo makes, laws by axis (from 0)."""
+def run(
+    machine: Machine, references: Sequence[Array], noises: Sequence[Array]
+) -> list[tuple[Array, Array]]:
+    """Return reported torque [Nm] and measured motor angle [rad] along references [rad/s], (n, n_axes) each.
 
-    robot: Robot
-    native: Mapping[int, Native] = field(default_factory=dict)
-    ends: Ends = PLAIN
-    laws: Mapping[int, Sequence[Law]] = field(default_factory=dict)
-
-
-def run(machine: Machine, reference: Array, noise: Array) -> tuple[Array, Array]:
-    """Return reported torque [Nm] and measured motor angle [rad] along a reference [rad/s], (n, n_axes).
-
-    ``noise`` (n, n_axes) [rad] is added to the angle that is logged and fed back. The machine stands
+    ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
     still under its controller before. Raises InputError where it does not stay stable.
     """
+    return [_along(machine, *pair) for pair in zip(references, noises, strict=True)]
+
+
+def _along(machine: Machine, reference: Array, noise: Array) -> tuple[Array, Array]:
     loop = _Loop(machine)
     still = np.zeros((round(_SETTLING_S / machine.robot.sample_time_s), reference.shape[1]))
     loop.follow(still, still)
@@ -54,8 +50,6 @@ class _Loop:
 
     def __init__(self, machine: Machine) -> None:
         robot = machine.robot
-        if robot.controller_kind != "pi_velocity":
-            raise InputError(f"controller: expected pi_velocity, got {robot.controller_kind}")
         self.n = robot.n_axes
         self.sample_s = robot.sample_time_s
         self.step_s = self.sample_s / STEPS_PER_SAMPLE
@@ -69,18 +63,7 @@ class _Loop:
             mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_TENDON, f"{x}_gear") for x in names
         ]
         self.stiffness = self.model.tendon_stiffness[ids].reshape(len(ids), -1)[:, 0].copy()
-        gains = robot.controller_gains
-        own = [machine.native.get(axis, NOTHING) for axis in range(self.n)]
-        self.kp = gains["kp"] * (1 + np.array([x.kp for x in own]))
-        self.ki = gains["ki"] * (1 + np.array([x.ki for x in own]))
-        lags = np.array([x.filter_s for x in own])
-        # Of a first-order lag between samples, exactly; all of a new speed without.
-        self.fresh = -np.expm1(-self.sample_s / np.maximum(lags, 1e-12))
-        self.speed = np.zeros(self.n)
-        self.for_rate = np.array([x.for_rate for x in own])
-        self.for_speed = np.array([x.for_speed for x in own])
-        self.wanted = np.zeros(self.n)
-        self.laws = [(axis, law) for axis, laws in machine.laws.items() for law in laws]
+        self.laws = machine.laws_of(Law)
         for _, law in self.laws:
             law.begin(self.step_s)
         self.data.qpos[self.joints] = robot.operating_point
@@ -88,9 +71,8 @@ class _Loop:
         # Gears give way to it, so that the joints stand at the operating point.
         deflection = weight / self.stiffness
         self.data.qpos[: self.n] = (robot.operating_point + deflection) / self.ratio
-        self.measured = self.data.qpos[: self.n].copy()
-        # Angle by which the motors are behind their reference: at rest it holds the arm.
-        self.behind = weight * self.ratio / self.ki
+        angle = self.data.qpos[: self.n].copy()
+        self.controller = Controller(machine, angle, weight * self.ratio)
         self.time_s = 0.0
 
     def _weight(self) -> Array:
@@ -109,15 +91,7 @@ class _Loop:
             measured = self.data.qpos[: self.n] + noise[k]
             for axis, law in self.laws:
                 measured[axis] += law.sensor(float(self.data.qpos[axis]))
-            moved = measured - self.measured
-            self.measured = measured
-            self.behind -= moved
-            self.speed += self.fresh * (moved / self.sample_s - self.speed)
-            command = self.kp * (wanted - self.speed) + self.ki * self.behind
-            command += self.for_rate * (wanted - self.wanted) / self.sample_s
-            command += self.for_speed * wanted
-            self.wanted = np.array(wanted)
-            self.behind += wanted * self.sample_s
+            command = self.controller.command(measured, wanted)
             angle[k] = measured
             torque[k] = command
             for axis, law in self.laws:

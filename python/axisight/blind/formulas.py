@@ -1,0 +1,440 @@
+"""Formulas that a machine follows in the engine on Pinocchio: other ones than those of `laws`.
+
+A formula acts on one axis of many runs at once. It answers with torques on the motors and on the
+joints, at any moment of a step, as a function of where the axis is and of where it was when the step
+began; `moved` ends a step. It may bend what sensors say and what drives do with commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an axis is in every run (n_runs,), as `laws.Axis`; time [s] is one for all."""
+
+    time_s: float
+    motor: Array
+    motor_speed: Array
+    deflection: Array
+    deflection_rate: Array
+    gear_ratio: float
+    gear_torque: Array
+    """Of spring and damper, on the joint [Nm]."""
+
+
+class Formula:
+    """A formula that does nothing: the base of all others."""
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin at rest; steps will be this long."""
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return the torque on the motor and on the joint [Nm]."""
+        del at
+        return 0.0, 0.0
+
+    def moved(self, at: Place) -> None:
+        """End a step."""
+
+    def sensor(self, motor: Array) -> Array | float:
+        """Return what the sensor says more than the motor angle [rad], once a sample."""
+        del motor
+        return 0.0
+
+    def command(self, torque: Array) -> Array:
+        """Return the mean torque the drive makes of a command [Nm] over a step."""
+        return torque
+
+    def reported(self, torque: Array) -> Array:
+        """Return the command as the drive reports it [Nm]."""
+        return torque
+
+
+def _through_gear(at: Place, torque: Array) -> tuple[Array, Array]:
+    """Return what a torque of the gear is on the motor and on the joint."""
+    return -at.gear_ratio * torque, torque
+
+
+def _bristle(torque: Array, moved: Array, limit: Array | float, stiffness: float) -> Array:
+    """Return Dahl's friction after a displacement one way, from what it was before (Dahl 1968)."""
+    end = np.sign(moved) * limit
+    return np.asarray(end + (torque - end) * np.exp(-stiffness * np.abs(moved) / limit))
+
+
+@dataclass
+class DahlFriction(Formula):
+    """Dry friction of the motor that comes with displacement, as the strain of a bristle does."""
+
+    dry_nm: float
+    stiffness_nm_rad: float
+    torque_nm: Array = field(default_factory=lambda: np.zeros(1))
+    motor: Array = field(default_factory=lambda: np.zeros(1))
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin without strain."""
+        del step_s
+        self.motor, self.torque_nm = place.motor, np.zeros_like(place.motor)
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        moved = at.motor - self.motor
+        return -_bristle(self.torque_nm, moved, self.dry_nm, self.stiffness_nm_rad), 0.0
+
+    def moved(self, at: Place) -> None:
+        """Keep the strain."""
+        self.torque_nm = -np.asarray(self.torque(at)[0])
+        self.motor = at.motor
+
+
+@dataclass
+class TanhStribeck(Formula):
+    """Friction of three hyperbolic tangents of speed, differentiable everywhere (Makkar et al. 2005)."""
+
+    dry_nm: float
+    excess_nm: float
+    decay_rad_s: float
+    corner_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        fast = np.tanh(at.motor_speed / self.corner_rad_s)
+        excess = self.excess_nm * (fast - np.tanh(at.motor_speed / self.decay_rad_s))
+        return -(excess + self.dry_nm * fast), 0.0
+
+
+@dataclass
+class ArctanLoadFriction(Formula):
+    """Friction that follows the gear's torque, its sign an arc tangent of speed."""
+
+    share: float
+    corner_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        sign = 2 / np.pi * np.arctan(at.motor_speed / self.corner_rad_s)
+        return -self.share * np.abs(at.gear_torque * at.gear_ratio) * sign, 0.0
+
+
+@dataclass
+class WarmingFriction(Formula):
+    """Viscous friction that falls or grows with the time a machine has run, as its oil warms."""
+
+    viscous_nm_s_rad: float
+    time_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        return self.viscous_nm_s_rad * np.expm1(-at.time_s / self.time_s) * at.motor_speed, 0.0
+
+
+@dataclass
+class Play(Formula):
+    """A gear that pulls and damps only in contact, its corners rounded off (hyperbolas)."""
+
+    stiffness: float
+    damping: float
+    half_width_rad: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what the gear lacks without contact."""
+        round_off = 0.05 * self.half_width_rad
+        above, below = (
+            np.hypot(at.deflection + s * self.half_width_rad, round_off) for s in (1.0, -1.0)
+        )
+        slack = 0.5 * (above - below)
+        inside = 0.5 * (
+            (at.deflection + self.half_width_rad) / above
+            - (at.deflection - self.half_width_rad) / below
+        )
+        return _through_gear(
+            at, -self.stiffness * slack - self.damping * inside * at.deflection_rate
+        )
+
+
+@dataclass
+class HardeningSpring(Formula):
+    """A gear whose spring is the hyperbolic sine of its deflection; ``cubic_nm_rad3``: its third order."""
+
+    stiffness: float
+    cubic_nm_rad3: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what is beyond the linear spring."""
+        a = np.sqrt(6 * self.cubic_nm_rad3 / self.stiffness)
+        x = np.clip(a * at.deflection, -20.0, 20.0)
+        return _through_gear(at, self.stiffness * (np.sinh(x) - x) / a)
+
+
+@dataclass
+class RoundedKnee(Formula):
+    """A gear with two stiffnesses, the knee between them rounded off (hyperbola)."""
+
+    more_nm_rad: float
+    knee_rad: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what is stiffer beyond the knee."""
+        beyond = np.abs(at.deflection) - self.knee_rad
+        past = 0.5 * (beyond + np.hypot(beyond, 0.05 * self.knee_rad))
+        return _through_gear(at, self.more_nm_rad * np.sign(at.deflection) * past)
+
+
+@dataclass
+class DahlGear(Formula):
+    """A gear part of whose spring slips as a Dahl bristle does."""
+
+    stiffness: float
+    slip_nm: float
+    torque_nm: Array = field(default_factory=lambda: np.zeros(1))
+    deflection: Array = field(default_factory=lambda: np.zeros(1))
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin without strain."""
+        del step_s
+        self.deflection = place.deflection
+        self.torque_nm = np.zeros_like(place.deflection)
+
+    def _on_joint(self, at: Place) -> Array:
+        return _bristle(
+            self.torque_nm, at.deflection - self.deflection, self.slip_nm, self.stiffness
+        )
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what the bristle adds to the gear's torque."""
+        return _through_gear(at, self._on_joint(at))
+
+    def moved(self, at: Place) -> None:
+        """Keep the strain."""
+        self.torque_nm, self.deflection = self._on_joint(at), at.deflection
+
+
+@dataclass
+class GearError(Formula):
+    """A gear whose angle has an error periodic in the motor's, with a small second harmonic."""
+
+    stiffness: float
+    order: float
+    amplitude_rad: float
+    phase: float
+    harmonic: float = 0.03
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what the error adds to the gear's torque; the power it takes comes from the motor."""
+        angle = self.order * at.motor + self.phase
+        shape = np.sin(angle) + self.harmonic * np.sin(2 * angle)
+        slope = np.cos(angle) + 2 * self.harmonic * np.cos(2 * angle)
+        total = self.stiffness * self.amplitude_rad * (shape - np.sin(self.phase))
+        back = at.gear_ratio * total
+        back = back + self.order * self.amplitude_rad * slope * (at.gear_torque + total)
+        return -back, total
+
+
+@dataclass
+class Cogging(Formula):
+    """Torque of a motor periodic in its angle, and a part of it that follows no load."""
+
+    orders: Sequence[float]
+    amplitudes_nm: Sequence[float]
+    phases: Sequence[float]
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return the torque on the motor."""
+        terms = zip(self.orders, self.amplitudes_nm, self.phases, strict=True)
+        return sum(a * np.cos(n * at.motor + p) for n, a, p in terms), 0.0
+
+
+@dataclass
+class ResolverImbalance(Formula):
+    """A resolver whose two windings differ: its angle is the arc tangent of unequal signals.
+
+    ``pairs`` of poles; ``imbalance`` relative amplitude and ``offset`` of one winding: waves of
+    twice and once the electrical angle.
+    """
+
+    pairs: int
+    imbalance: float
+    offset: float
+
+    def sensor(self, motor: Array) -> Array | float:
+        """Return the error of the angle."""
+        angle = self.pairs * motor
+        sine, cosine = (1 + self.imbalance) * np.sin(angle), np.cos(angle) + self.offset
+        # Of the sine and cosine of the difference: no turns to count.
+        apart = np.arctan2(
+            sine * np.cos(angle) - cosine * np.sin(angle),
+            cosine * np.cos(angle) + sine * np.sin(angle),
+        )
+        return np.asarray(apart / self.pairs)
+
+
+@dataclass
+class ConstantTorque(Formula):
+    """A torque that is always there."""
+
+    torque_nm: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return it."""
+        del at
+        return self.torque_nm, 0.0
+
+
+class DelayLine(Formula):
+    """A drive that holds commands and makes them later, by any time."""
+
+    def __init__(self, delay_s: float) -> None:
+        self.delay_s = delay_s
+        self.step_s = 0.0
+        self.line: list[Array] = []
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Empty the line."""
+        del place
+        self.step_s, self.line = step_s, []
+
+    def command(self, torque: Array) -> Array:
+        """Return the mean over the step of what was commanded before."""
+        steps = self.delay_s / self.step_s
+        whole = int(steps)
+        self.line = [*self.line[-(whole + 1) :], torque]
+        newer, older = (self.line[max(len(self.line) - 1 - whole - more, 0)] for more in (0, 1))
+        return np.asarray(newer + (steps - whole) * (older - newer))
+
+
+class Lag(Formula):
+    """A drive whose torque follows its command exponentially; exact over every step."""
+
+    def __init__(self, time_constant_s: float) -> None:
+        self.time_constant_s = time_constant_s
+        self.step_s = 0.0
+        self.made: Array | None = None
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin in balance."""
+        del place
+        self.step_s, self.made = step_s, None
+
+    def command(self, torque: Array) -> Array:
+        """Return the mean torque over the step."""
+        before = torque if self.made is None else self.made
+        left = np.exp(-self.step_s / self.time_constant_s)
+        self.made = torque + left * (before - torque)
+        share = (1 - left) * self.time_constant_s / self.step_s
+        return np.asarray(torque + share * (before - torque))
+
+
+class StaleSensor(Formula):
+    """A sensor that says where the motor was some samples ago."""
+
+    def __init__(self, samples: int) -> None:
+        self.samples = samples
+        self.line: list[Array] = []
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Empty the line."""
+        del place, step_s
+        self.line = []
+
+    def sensor(self, motor: Array) -> Array | float:
+        """Return by how much it is off."""
+        self.line = [*self.line[-self.samples :], motor]
+        return np.asarray(self.line[0] - motor)
+
+
+@dataclass
+class WrongReport(Formula):
+    """A drive that reports a share of its torque less a constant."""
+
+    share: float = 1.0
+    less_nm: float = 0.0
+
+    def reported(self, torque: Array) -> Array:
+        """Return what it says."""
+        return np.asarray(self.share * torque - self.less_nm)
+
+
+@dataclass
+class CurrentLimit(Formula):
+    """A drive that gives no more, and reports what it gives."""
+
+    limit_nm: float
+
+    def command(self, torque: Array) -> Array:
+        """Return the command within the limit."""
+        return np.clip(torque, -self.limit_nm, self.limit_nm)
+
+    reported = command
+
+
+@dataclass
+class DeadZone(Formula):
+    """A drive that makes nothing of small commands."""
+
+    width_nm: float
+
+    def command(self, torque: Array) -> Array:
+        """Return what is beyond the zone."""
+        return np.asarray(torque - np.clip(torque, -self.width_nm, self.width_nm))
+
+
+@dataclass
+class Tone(Formula):
+    """A torque from outside, at a frequency of its own."""
+
+    amplitude_nm: float
+    frequency_hz: float
+    phase: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return it."""
+        angle = 2 * np.pi * self.frequency_hz * at.time_s + self.phase
+        return self.amplitude_nm * float(np.sin(angle)), 0.0
+
+
+@dataclass
+class Push(Formula):
+    """Somebody who leans on the arm for a while, other than the motions do."""
+
+    torque_nm: float
+    from_s: float
+    for_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return a bump on the joint."""
+        phase = (at.time_s - self.from_s) / self.for_s
+        inside = 0.0 < phase < 1.0
+        return 0.0, self.torque_nm * float(np.sin(np.pi * phase)) ** 2 if inside else 0.0
+
+
+@dataclass
+class LateFriction(Formula):
+    """Dry friction that is there from some time on."""
+
+    friction_nm: float
+    corner_rad_s: float
+    from_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        size = self.friction_nm if at.time_s > self.from_s else 0.0
+        return -size * np.tanh(at.motor_speed / self.corner_rad_s), 0.0
+
+
+@dataclass
+class QuadraticDamper(Formula):
+    """A gear damped by the square of the rate of its deflection, against it."""
+
+    quadratic_nm_s2_rad2: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what the damper adds to the gear's torque."""
+        rate = at.deflection_rate
+        return _through_gear(at, self.quadratic_nm_s2_rad2 * np.abs(rate) * rate)

@@ -1,0 +1,97 @@
+"""A machine as it really is: the robot, and what differs from its simulator; engines make it move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+L = TypeVar("L")
+
+
+@dataclass(frozen=True)
+class Native:
+    """What an engine changes by itself on one axis.
+
+    ``half_width_rad``: the gear is slack within; ``friction_nm``: dry friction of the motor;
+    ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
+    to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
+    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
+    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
+    ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
+    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad].
+    """
+
+    half_width_rad: float = 0.0
+    friction_nm: float = 0.0
+    armature: float = 0.0
+    spring: float = 0.0
+    damper: float = 0.0
+    viscous: float = 0.0
+    gear: float = 0.0
+    lag_s: float = 0.0
+    kp: float = 0.0
+    ki: float = 0.0
+    filter_s: float = 0.0
+    zero_rad: float = 0.0
+    for_rate: float = 0.0
+    for_speed: float = 0.0
+
+
+NOTHING = Native()
+
+
+@dataclass(frozen=True)
+class Ends:
+    """What differs at both ends of the arm.
+
+    ``tip_kg`` at ``tip_m`` in the frame of the last link; ``rocks_rad_nm``: compliance of the base about
+    x and y, none where it is zero, ``rocks_s`` their damping over stiffness.
+    """
+
+    tip_kg: float = 0.0
+    tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rocks_rad_nm: tuple[float, float] = (0.0, 0.0)
+    rocks_s: float = 0.0
+
+    @property
+    def springs(self) -> list[tuple[tuple[float, float, float], float]]:
+        """Axis and stiffness of each spring of the base, ground to arm."""
+        named = zip(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), self.rocks_rad_nm, strict=True)
+        return [(axis, 1 / c) for axis, c in named if c]
+
+
+PLAIN = Ends()
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A robot as it really is: native changes and laws of its engine by axis (from 0)."""
+
+    robot: Robot
+    native: Mapping[int, Native] = field(default_factory=dict)
+    ends: Ends = PLAIN
+    laws: Mapping[int, Sequence[object]] = field(default_factory=dict)
+
+    def of_axes(self) -> list[Native]:
+        """Return the native changes of every axis."""
+        return [self.native.get(axis, NOTHING) for axis in range(self.robot.n_axes)]
+
+    def laws_of(self, kind: type[L]) -> list[tuple[int, L]]:
+        """Return axis (from 0) and law, all of a kind. Raises InputError for laws of another engine."""
+        out = []
+        for axis, laws in self.laws.items():
+            for law in laws:
+                if not isinstance(law, kind):
+                    raise InputError(
+                        f"law: expected a {kind.__name__} of this engine, got {type(law).__name__}"
+                    )
+                out.append((axis, law))
+        return out

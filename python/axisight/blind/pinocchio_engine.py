@@ -1,0 +1,254 @@
+"""Closed loops on a machine whose rigid bodies Pinocchio moves; all runs of a machine at once.
+
+Motors, gears and formulas are ours, in arrays over the runs; Runge-Kutta steps of order four.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.blind.controller import Controller
+from axisight.blind.formulas import Formula, Lag, Place
+from axisight.blind.machine import Machine
+from axisight.errors import InputError, MissingExtraError
+from axisight.robot.description import Joint
+
+try:
+    import pinocchio
+except ImportError as error:
+    raise MissingExtraError(
+        "machines of a benchmark are simulated by Pinocchio: pip install 'axisight[blind]'"
+    ) from error
+
+Array = NDArray[np.float64]
+
+# At rest before a log begins, held by the controller.
+_SETTLING_S = 1.0
+STEPS_PER_SAMPLE = 2
+"""Runge-Kutta steps."""
+
+
+def run(
+    machine: Machine, references: Sequence[Array], noises: Sequence[Array]
+) -> list[tuple[Array, Array]]:
+    """Return reported torque [Nm] and measured motor angle [rad] along references [rad/s], (n, n_axes) each.
+
+    ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
+    still under its controller before. Raises InputError where it does not stay stable, or where references
+    differ in length.
+    """
+    if len({x.shape for x in (*references, *noises)}) != 1:
+        raise InputError("references: expected runs of one length")
+    loop = _Loop(machine, len(references))
+    samples = round(_SETTLING_S / machine.robot.sample_time_s)
+    still = np.zeros((samples, len(references), machine.robot.n_axes))
+    loop.follow(still, still)
+    loop.time_s = 0.0
+    torque, angle = loop.follow(np.stack(references, axis=1), np.stack(noises, axis=1))
+    return [(torque[:, i].copy(), angle[:, i].copy()) for i in range(len(references))]
+
+
+@dataclass
+class _Chain:
+    """Joints of the arm as Pinocchio takes them, springs of the base first."""
+
+    model: pinocchio.Model
+    stiffness: list[float] = field(default_factory=list)
+    damping: list[float] = field(default_factory=list)
+    last: int = 0
+
+    def add(self, name: str, axis: Array, origin: Array, *, slides: bool = False) -> None:
+        """Add a joint to the end, with no spring of its own."""
+        kind = (
+            pinocchio.JointModelPrismaticUnaligned
+            if slides
+            else pinocchio.JointModelRevoluteUnaligned
+        )
+        place = pinocchio.SE3(np.eye(3), np.asarray(origin, np.float64))
+        joint = kind(np.asarray(axis, np.float64))
+        self.last = self.model.addJoint(self.last, joint, place, name)
+        self.stiffness.append(0.0)
+        self.damping.append(0.0)
+
+    def spring(self, stiffness: float, damping: float) -> None:
+        """Give the last joint a spring."""
+        self.stiffness[-1], self.damping[-1] = stiffness, damping
+
+    def load(self, mass_kg: float, com_m: Array, inertia_kg_m2: Array) -> None:
+        """Give the last joint a body; inertia xx, yy, zz, xy, xz, yz about its centre of mass."""
+        xx, yy, zz, xy, xz, yz = inertia_kg_m2
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        body = pinocchio.Inertia(mass_kg, np.asarray(com_m, np.float64), about)
+        self.model.appendBodyToJoint(self.last, body, pinocchio.SE3.Identity())
+
+
+def _chain(machine: Machine) -> _Chain:
+    robot, ends = machine.robot, machine.ends
+    chain = _Chain(pinocchio.Model())
+    chain.model.gravity.linear = np.asarray(robot.gravity_m_s2, np.float64)
+    for k, (axis, stiffness) in enumerate(ends.springs):
+        chain.add(f"base{k}", np.array(axis), np.zeros(3))
+        chain.spring(stiffness, stiffness * ends.rocks_s)
+    for joint in robot.joints:
+        _add(chain, joint)
+    if ends.tip_kg:
+        chain.load(ends.tip_kg, np.array(ends.tip_m), np.array([1e-6] * 3 + [0.0] * 3))
+    return chain
+
+
+def _add(chain: _Chain, joint: Joint) -> None:
+    chain.add(joint.name, joint.axis, joint.origin_m, slides=joint.prismatic)
+    if joint.drive is None and joint.spring is not None:
+        chain.spring(joint.spring.stiffness, joint.spring.damping)
+    if joint.link is not None:
+        chain.load(joint.link.mass_kg, joint.link.com_m, joint.link.inertia_kg_m2)
+
+
+# Positions and speeds of motors, then of joints: (n_runs, n_axes), (n_runs, n_joints).
+_State = tuple[Array, Array, Array, Array]
+
+
+class _Loop:
+    """The state of the closed loops of all runs."""
+
+    def __init__(self, machine: Machine, runs: int) -> None:
+        robot, own = machine.robot, machine.of_axes()
+        if any(x.half_width_rad or x.friction_nm for x in own):
+            raise InputError("native: expected play and dry friction as formulas of this engine")
+        chain = _chain(machine)
+        self.model, self.data = chain.model, chain.model.createData()
+        self.springs, self.dampers = np.array(chain.stiffness), np.array(chain.damping)
+        self.joints = np.array(robot.axis_joints) + len(machine.ends.springs)
+        driven = [robot.joints[place] for place in robot.axis_joints]
+        self.ratio = np.asarray(robot.gear_ratio, np.float64)
+        gears = [(j.spring, j.drive, x) for j, x in zip(driven, own, strict=True)]
+        if any(s is None for s, _, _ in gears):
+            raise InputError("joint: expected an elastic gear on every axis")
+        self.stiffness = np.array([s.stiffness * (1 + x.spring) for s, _, x in gears if s])
+        self.damping = np.array([s.damping * (1 + x.damper) for s, _, x in gears if s])
+        self.inertia = np.array([d.motor_inertia * (1 + x.armature) for _, d, x in gears if d])
+        self.viscous = np.array([d.viscous_friction * (1 + x.viscous) for _, d, x in gears if d])
+        self.gain = np.array([1 + x.gear for x in own])
+        self.zero = np.zeros(self.model.nq)
+        self.zero[self.joints] = [x.zero_rad for x in own]
+        self.sample_s = robot.sample_time_s
+        self.step_s = self.sample_s / STEPS_PER_SAMPLE
+        self.time_s = 0.0
+        lags = [(axis, Lag(x.lag_s)) for axis, x in enumerate(own) if x.lag_s]
+        self.formulas: list[tuple[int, Formula]] = [*machine.laws_of(Formula), *lags]
+        joint, weight = self._balanced(np.asarray(robot.operating_point, np.float64))
+        motor = (joint[self.joints] + weight[self.joints] / self.stiffness) / self.ratio
+        self.state: _State = (
+            np.tile(motor, (runs, 1)),
+            np.tile(joint, (runs, 1)),
+            np.zeros((runs, len(motor))),
+            np.zeros((runs, len(joint))),
+        )
+        holding = np.tile(weight[self.joints] * self.ratio, (runs, 1))
+        self.controller = Controller(machine, self.state[0], holding)
+        for axis, formula in self.formulas:
+            formula.begin(self._places(self.state, [axis])[axis], self.step_s)
+
+    def _balanced(self, at: Array) -> tuple[Array, Array]:
+        """Return the joint angles at rest with driven joints as given, and the torques that hold them."""
+        joint = np.zeros(self.model.nq)
+        joint[self.joints] = at
+        free = self.springs > 0
+        weight = np.zeros_like(joint)
+        for _ in range(20):
+            weight = pinocchio.computeGeneralizedGravity(self.model, self.data, joint + self.zero)
+            joint[free] = -weight[free] / self.springs[free]
+        return joint, np.asarray(weight).copy()
+
+    def follow(self, reference: Array, noise: Array) -> tuple[Array, Array]:
+        """Return reported torques and measured angles along references, (n, n_runs, n_axes)."""
+        torque, angle = np.empty_like(reference), np.empty_like(reference)
+        for k, wanted in enumerate(reference):
+            motor = self.state[0]
+            measured = motor + noise[k]
+            for axis, formula in self.formulas:
+                measured[:, axis] += formula.sensor(motor[:, axis])
+            command = self.controller.command(measured, wanted)
+            angle[k], torque[k] = measured, command
+            for axis, formula in self.formulas:
+                torque[k, :, axis] = formula.reported(torque[k, :, axis])
+            for _ in range(STEPS_PER_SAMPLE):
+                self._step(command)
+        if not np.isfinite(angle).all() or np.abs(angle).max() > 1e5:
+            raise InputError("machine: unstable")
+        return torque, angle
+
+    def _step(self, command: Array) -> None:
+        """Take one Runge-Kutta step of order four with the drives' mean torque over it."""
+        drive = command.copy()
+        for axis, formula in self.formulas:
+            drive[:, axis] = formula.command(drive[:, axis])
+        drive *= self.gain
+        h, t = self.step_s, self.time_s
+        first = self._rates(self.state, drive, t)
+        second = self._rates(_ahead(self.state, first, h / 2), drive, t + h / 2)
+        third = self._rates(_ahead(self.state, second, h / 2), drive, t + h / 2)
+        fourth = self._rates(_ahead(self.state, third, h), drive, t + h)
+        mean = [
+            (a + 2 * b + 2 * c + d) / 6
+            for a, b, c, d in zip(first, second, third, fourth, strict=True)
+        ]
+        self.state = _ahead(self.state, mean, h)
+        self.time_s = t + h
+        if self.formulas:
+            places = self._places(self.state, {axis for axis, _ in self.formulas})
+            for axis, formula in self.formulas:
+                formula.moved(places[axis])
+
+    def _places(self, state: _State, axes: Sequence[int] | set[int]) -> dict[int, Place]:
+        """Return where some axes are."""
+        motor, joint, motor_speed, joint_speed = state
+        out = {}
+        for axis in axes:
+            ratio, k = float(self.ratio[axis]), self.joints[axis]
+            deflection = ratio * motor[:, axis] - joint[:, k]
+            rate = ratio * motor_speed[:, axis] - joint_speed[:, k]
+            gear = self.stiffness[axis] * deflection + self.damping[axis] * rate
+            out[axis] = Place(
+                self.time_s, motor[:, axis], motor_speed[:, axis], deflection, rate, ratio, gear
+            )
+        return out
+
+    def _rates(self, state: _State, drive: Array, time_s: float) -> Sequence[Array]:
+        """Return the rates of a state under torques of the drives."""
+        motor, joint, motor_speed, joint_speed = state
+        deflection = self.ratio * motor - joint[:, self.joints]
+        rate = self.ratio * motor_speed - joint_speed[:, self.joints]
+        gear = self.stiffness * deflection + self.damping * rate
+        on_motor = drive - self.viscous * motor_speed - self.ratio * gear
+        on_joint = -self.springs * joint - self.dampers * joint_speed
+        on_joint[:, self.joints] += gear
+        for axis, formula in self.formulas:
+            at = Place(
+                time_s,
+                motor[:, axis],
+                motor_speed[:, axis],
+                deflection[:, axis],
+                rate[:, axis],
+                float(self.ratio[axis]),
+                gear[:, axis],
+            )
+            more, joint_more = formula.torque(at)
+            on_motor[:, axis] += more
+            on_joint[:, self.joints[axis]] += joint_more
+        where = joint + self.zero
+        joint_rate = np.empty_like(joint)
+        for i in range(len(joint)):
+            joint_rate[i] = pinocchio.aba(
+                self.model, self.data, where[i], joint_speed[i], on_joint[i]
+            )
+        return motor_speed, joint_speed, on_motor / self.inertia, joint_rate
+
+
+def _ahead(state: _State, rates: Sequence[Array], by_s: float) -> _State:
+    a, b, c, d = (x + by_s * r for x, r in zip(state, rates, strict=True))
+    return a, b, c, d

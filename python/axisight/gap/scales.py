@@ -1,0 +1,103 @@
+"""How much of an effect is a lot on this robot: natural sizes of its amplitudes, by their units.
+
+The table of effects states sizes of large robots. On a small one a friction that large would throw
+the simulator off any log, and no derivative would tell what a little of it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from axisight.effects import Effect, effect_info
+from axisight.logs import Log
+from axisight.robot import Robot
+
+# Of the torque, the inertia or the mass that is there: more is beyond a fault of a model.
+_SHARE = 0.25
+# Samples over which a speed is taken: noise of the angle is none.
+_APART = 20
+
+
+@dataclass(frozen=True)
+class AxisSizes:
+    """What is large on an axis: torque [Nm] and speed [rad/s] of its motor in the logs, its robot's values.
+
+    ``stiffness`` is None where the gear does not give way.
+    """
+
+    torque_nm: float
+    speed_rad_s: float
+    ratio: float
+    stiffness: float | None
+    motor_inertia: float
+    last_kg: float
+
+    @property
+    def deflection_rad(self) -> float:
+        """Of the gear, by the torque."""
+        return np.inf if self.stiffness is None else self.torque_nm / self.ratio / self.stiffness
+
+
+_BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
+    "Nm": lambda a: a.torque_nm,
+    "Nm s/rad": lambda a: a.torque_nm / a.speed_rad_s,
+    "Nm s^2/rad^2": lambda a: a.torque_nm / a.speed_rad_s**2,
+    "Nm (joint side)": lambda a: a.torque_nm / a.ratio,
+    "Nm/rad (joint side)": lambda a: a.torque_nm / a.ratio,
+    "kg m^2 (joint side)": lambda a: a.motor_inertia / a.ratio**2,
+    "kg": lambda a: a.last_kg,
+}
+
+
+class NaturalSizes:
+    """Natural sizes of amplitudes on a robot that moves as in logs."""
+
+    def __init__(self, robot: Robot, logs: Sequence[Log]) -> None:
+        self.robot, self.logs = robot, logs
+
+    @cached_property
+    def axes(self) -> list[AxisSizes]:
+        """What is large on every axis."""
+        return [self._axis(place) for place in range(self.robot.n_axes)]
+
+    def of(self, effect: Effect, name: str) -> float:
+        """Return the natural size of a parameter of an effect: never more than the table states."""
+        info = effect_info(effect.name)
+        parameter = next(p for p in info.parameters if p.name == name)
+        of = _BY_UNIT.get(parameter.unit)
+        if parameter.unit == "rad (joint side)" and info.acts == "transmission":
+            of = _of_gear
+        if of is None or parameter.role != "amplitude":
+            return parameter.typical
+        # What acts on the arm is felt where least moves, too.
+        axes = self.axes if effect.axis is None else [self.axes[effect.axis - 1]]
+        most = _SHARE * min(of(a) for a in axes)
+        return min(parameter.typical, most) if most > 0 else parameter.typical
+
+    def _axis(self, place: int) -> AxisSizes:
+        joint = self.robot.joints[self.robot.axis_joints[place]]
+        masses = [j.link.mass_kg for j in self.robot.joints if j.link is not None]
+        return AxisSizes(
+            torque_nm=max(float(np.abs(log.torque_nm[:, place]).max()) for log in self.logs),
+            speed_rad_s=max(_top_speed(log, place) for log in self.logs),
+            ratio=abs(float(self.robot.gear_ratio[place])),
+            stiffness=None if joint.spring is None else joint.spring.stiffness,
+            motor_inertia=np.inf if joint.drive is None else joint.drive.motor_inertia,
+            last_kg=masses[-1] if masses else np.inf,
+        )
+
+
+def _of_gear(a: AxisSizes) -> float:
+    return a.deflection_rad
+
+
+def _top_speed(log: Log, place: int) -> float:
+    """Return the top speed of a motor [rad/s], not zero."""
+    angle = log.position_rad[:, place]
+    apart = min(_APART, len(angle) - 1)
+    moved = np.abs(angle[apart:] - angle[:-apart]).max()
+    return max(float(moved) / (apart * log.sample_time_s), 1e-9)
