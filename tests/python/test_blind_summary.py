@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from axisight.blind import markdown
 from axisight.blind.page import render_score
 from axisight.blind.score import Judged, calibration_bins
 from axisight.blind.summary import summary
@@ -74,6 +75,16 @@ def test_figures_are_told_by_engine_arm_and_motions():
     assert found["arm"]["lever_like"]["figures"] == summary(CASES)["figures"]
     pairs = found["engine"]["mujoco"]["figures"]["pairs: both"]
     assert (pairs["hits"], pairs["of"]) == (1, 1)
+
+
+def test_all_of_it_stands_in_tables():
+    text = markdown(summary(CASES))
+    assert "| pairs: both | 1/1 = 100 %" in text
+    assert "| pinocchio | 1 | -" in text and "| mujoco | 6 | 2/3 |" in text
+    assert "| transmission | 1/2 | 1/3 |" in text
+    assert "| case_1_5 | 5.0 | backlash@2 | explained | nonlinear_stiffness@2 |" in text
+    rows = [line for line in text.splitlines() if line]
+    assert all(line.startswith("| ") or set(line) <= set("|-") for line in rows)
 
 
 def test_calibration_is_by_tenths():

@@ -95,6 +95,28 @@ def test_a_linear_step_is_the_least_within_bounds(seed: int):
     np.testing.assert_allclose(linear_gain(evidence), gained, rtol=1e-6)
 
 
+def test_a_linear_step_leads_back_from_a_bound_that_a_fit_ended_at():
+    # What is missing bent the simulator to its bound, which a step with it has to leave.
+    rng = np.random.default_rng(4)
+    x = rng.normal(size=(200, 2))
+    y = x @ np.array([0.5, 3.0])
+    at_bound = replace(
+        linear_evidence(x, y, np.repeat([0, 1], 100)),
+        parameters=((None, "p"), (0, "amplitude")),
+        at_bound=((None, "p"),),
+        gradient=np.stack(
+            [-(x[k : k + 20].T @ (y - 4 * x[:, 0])[k : k + 20]) for k in range(0, 200, 20)]
+        ),
+        loss=np.array([np.sum((y - 4 * x[:, 0])[k : k + 20] ** 2) for k in range(0, 200, 20)]),
+        prior_matrix=np.diag([1.0, 0.0]),
+        prior_gradient=np.array([4.0, 0.0]),
+    )
+    rows, aims = np.vstack([x, [1.0, 0.0]]), np.append(y - 4 * x[:, 0], -4.0)
+    best = scipy.optimize.lsq_linear(rows, aims, bounds=([-8.0, -np.inf], [0.0, np.inf]))
+    assert best.x[0] == pytest.approx(-3.5, abs=0.1)
+    np.testing.assert_allclose(linear_gain(at_bound), aims @ aims - 2 * best.cost, rtol=1e-6)
+
+
 # The size of an effect is judged in test_gap_amplitude.py.
 NO_EFFECT = linear_evidence(np.ones((800, 1)), np.zeros(800), np.zeros(800, int))
 
@@ -276,6 +298,30 @@ def test_the_usual_law_leads_where_the_special_one_cannot_be_told_from_it(behind
     assert led.best.trial.candidate.effect.name == leader
     assert total(led) == pytest.approx(1.0)
     assert len(led.ranked) == 2
+
+
+def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
+    axes, pieces = np.repeat([0, 1], 40), np.tile(np.arange(40) // 2, 2)
+    two = Layout(axes, pieces, np.zeros(80, int), np.full(80, 10))
+    current, floor = np.tile(CURRENT, 2), np.tile(FLOOR, 2)
+
+    def on_both(axis: int, first: float, second: float) -> Trial:
+        found = a_trial("viscous_friction", 1, np.full(40, first), axis)
+        return replace(found, held_out=np.repeat([first, second], 40))
+
+    true, shadow, elsewhere = on_both(2, 1.1, 1.1), on_both(1, 1.1, 2.0), on_both(3, 1.1, 12.0)
+    here, there = (
+        stand([true, shadow, elsewhere], current, floor, two, axis, explained_share=0.6)
+        for axis in (0, 1)
+    )
+    assert here is not None and there is not None
+    # On the first axis all do the same; the second has seen more.
+    assert len(here.inseparable()) == 3
+    here = here.led_by(next(r for r in here.ranked if r.trial is true))
+    held = here.with_what_others_say([there])
+    assert held.best.trial is true and held.best.probability > 0.99
+    assert total(held) == pytest.approx(1.0)
+    assert here.with_what_others_say([]).best.probability == pytest.approx(here.best.probability)
 
 
 def test_a_load_is_more_usual_than_a_link_that_is_not_as_it_was_drawn():

@@ -54,6 +54,14 @@ def test_what_one_elsewhere_explains_waits():
     assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@2"]
 
 
+def test_what_promises_as_much_as_any_does_not_wait():
+    # An offset on axis 3 hangs on axis 2 as well: either may be the other's shadow.
+    round_ = Round({"torque_offset@1": (1.0, 1.4), "torque_offset@2": (1.0, 1.0)})
+    promises = {"torque_offset@1": 8.0, "torque_offset@2": 7.9, "backlash@2": 5.0}
+    assert round_.fit(promises) == ["torque_offset@1", "torque_offset@2"]
+    assert [s.option.effect.label for s in round_.waiting] == ["backlash@2"]
+
+
 def test_what_nothing_elsewhere_explains_is_fitted():
     round_ = Round({"backlash@1": (2.0, 1.9), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
     assert set(round_.fit(PROMISES)) == set(PROMISES)

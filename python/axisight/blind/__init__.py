@@ -1,9 +1,11 @@
-"""The withheld-effect benchmark: machines of another engine, diagnoses that cannot see the truth, a score.
+"""The withheld-effect benchmark: machines of other engines, diagnoses that cannot see the truth, a score.
 
-`axisight.blind.make` needs MuJoCo (extra ``blind``), the others nothing.
+`axisight.blind.make` needs MuJoCo and Pinocchio (extra ``blind``), the others nothing.
 """
 
-from axisight.blind.score import Judged, Share, calibration_error, figures, judged_cases, markdown
+from axisight.blind.score import Judged, Share, calibration_error, figures, judged_cases
+from axisight.blind.summary import summary
+from axisight.blind.table import markdown
 
 __all__ = [
     "Judged",
@@ -12,4 +14,5 @@ __all__ = [
     "figures",
     "judged_cases",
     "markdown",
+    "summary",
 ]

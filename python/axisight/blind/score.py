@@ -265,17 +265,3 @@ def _axis_named(judged: Judged) -> bool:
     if judged.named:
         return judged.named[0].partition("@")[2] == str(axis)
     return axis in judged.where
-
-
-def markdown(judged: Sequence[Judged]) -> str:
-    """Return the figures, and every case that is not right."""
-    lines = ["| figure | measured |", "|---|---|"]
-    lines += [f"| {name} | {share} |" for name, share in figures(judged).items()]
-    lines += [f"| expected calibration error | {calibration_error(judged):.3f} |", ""]
-    lines += ["| case | severity | truth | verdict | named |", "|---|---|---|---|---|"]
-    for j in judged:
-        if not j.right:
-            named = ", ".join(j.named) or "-"
-            truth = ", ".join(j.truth) or "nothing"
-            lines.append(f"| {j.name} | {j.severity:.1f} | {truth} | {j.verdict} | {named} |")
-    return "\n".join(lines) + "\n"

@@ -9,9 +9,8 @@ from typing import Annotated
 
 import typer
 
-from axisight.blind import judged_cases, markdown
+from axisight.blind import judged_cases, markdown, summary
 from axisight.blind.page import render_score
-from axisight.blind.summary import summary
 from axisight.cli.common import OUT, bars, errors
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
@@ -19,7 +18,7 @@ from axisight.storage import write_whole
 
 blind_app = typer.Typer(
     add_completion=False,
-    help="The withheld-effect benchmark: cases of another engine, diagnoses, a score.",
+    help="The withheld-effect benchmark: cases of other engines, diagnoses, a score.",
     no_args_is_help=True,
 )
 
@@ -91,7 +90,8 @@ def score_command(
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
     with errors():
         judged = judged_cases(cases, truth, verdicts)
-        text, score = markdown(judged), summary(judged)
+        score = summary(judged)
+        text = markdown(score)
         if out is not None:
             write_whole(out, text)
         if json is not None:

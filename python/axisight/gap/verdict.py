@@ -118,13 +118,13 @@ def _shown(cause: ShownCause) -> NamedCause:
 def _strongest(found: Search) -> Standing | None:
     """Return how candidates first stood where there was most to explain.
 
-    Of what leads there and was taken in, as it was judged then: by what other axes say, too.
+    Of what was taken in first, as it was judged then: by what other axes say, too.
     """
     first = found.rounds[0]
+    if first.accepted:
+        return first.accepted[0][1]
     left = found.to_explain() / found.layout.samples()
-    most = max(first.standings, key=lambda s: float(left[s.axis]), default=None)
-    judged = (s for _, s in first.accepted if most and s.best.trial is most.best.trial)
-    return next(judged, most)
+    return max(first.standings, key=lambda s: float(left[s.axis]), default=None)
 
 
 def _open(winner: Ranked, standing: Standing, accepted: set[str]) -> tuple[str, ...]:

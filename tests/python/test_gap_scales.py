@@ -1,0 +1,93 @@
+"""Natural sizes: what is a lot on a large robot and on a small one, and what hangs on it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Log, Robot, load_robot, simulate
+from axisight.blind.motions import multisines, point_to_point
+from axisight.effects import effect_info
+from axisight.gap import Settings
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.scales import NaturalSizes
+from axisight.gap.score import linear_gain
+from axisight.gap.screening import Bench, Screen
+
+
+def logs_of(robot: Robot, effects: list[Effect], seconds: float = 4.0) -> list[Log]:
+    """A log of moves and one of a multisine."""
+    rng = np.random.default_rng(1)
+    found = [point_to_point(rng, robot)["moves_1"], multisines(rng, robot)["multisine_fresh"]]
+    out = []
+    for run, (_, reference) in enumerate(found):
+        ref = reference[: round(seconds / robot.sample_time_s)]
+        data = simulate(robot, ref, effects=effects, noise_seed=5, run=run)
+        out.append(
+            Log(
+                name=f"run{run}",
+                source=Path(f"run{run}.parquet"),
+                sample_time_s=robot.sample_time_s,
+                time_s=data.time.values,
+                velocity_ref_rad_s=ref,
+                torque_nm=data.torque_cmd_nm.values,
+                position_rad=data.position_rad.values,
+            )
+        )
+    return out
+
+
+@pytest.fixture(scope="module")
+def small() -> Robot:
+    return load_robot("scara_like")
+
+
+def test_a_large_robot_has_the_sizes_of_the_table():
+    robot = load_robot("irb6600_like")
+    sizes = NaturalSizes(robot, logs_of(robot, [], 2.0))
+    for name in ("coulomb_friction", "backlash", "payload", "torque_ripple", "extra_mode"):
+        info = effect_info(name)
+        effect = Effect(name, None if info.scope == "arm" else 1)
+        for p in info.parameters:
+            # Two seconds do not show all of its torque.
+            assert 0.5 * p.typical < sizes.of(effect, p.name) <= p.typical or p.typical == 0
+
+
+def test_a_small_robot_has_sizes_of_its_own(small: Robot):
+    logs = logs_of(small, [], 2.0)
+    sizes = NaturalSizes(small, logs)
+    largest = [max(np.abs(log.torque_nm[:, i]).max() for log in logs) for i in range(3)]
+    friction = sizes.of(Effect("coulomb_friction", 2), "coulomb_nm")
+    assert friction == pytest.approx(0.25 * largest[1]) and friction < 0.1
+    # A ball screw of 4e6 N/m gives way by micrometres; what a shape is, stays what it is.
+    assert sizes.of(Effect("backlash", 3), "half_width_rad") < 2e-5
+    assert sizes.of(Effect("coulomb_friction", 2), "smoothing_rad_s") == 0.1
+    assert sizes.of(Effect("payload", None), "mass_kg") == pytest.approx(0.25 * 3.0)
+    assert sizes.of(Effect("torque_constant", 2), "relative_error") == 0.05
+    still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]
+    assert NaturalSizes(small, still).of(Effect("coulomb_friction", 2), "coulomb_nm") == 0.5
+
+
+def test_a_small_robots_friction_promises_what_a_fit_gains(small: Robot):
+    # With sizes of large robots half of the blocks had no derivative, and friction no promise.
+    truth = Effect("friction_warmup", 1, {"viscous_nm_s_rad": -6e-4, "time_constant_s": 2.0})
+    view = ClosedLoopView(small, logs_of(small, [truth]), Settings())
+    base = view.fitter.fit([])
+    option = next(c for c in view.candidates(base) if c.effect.label == "friction_warmup@1")
+    fitted = view.fitter.fit([option], base)
+    gained = base.total - fitted.total
+    assert gained > 0.9 * base.total
+    assert linear_gain(view.fitter.evaluate([option], base)) > 0.8 * gained
+
+
+def test_a_simulator_that_cannot_follow_as_it_is_does_not_end_a_diagnosis(small: Robot):
+    view = ClosedLoopView(small, logs_of(small, []), Settings())
+    base = view.fitter.fit([])
+    logs = view.fitter.records
+    # Angles as of a loop that swings up without end.
+    wild = [(p * 1e9 * np.arange(len(p))[:, None] ** 2, t) for p, t in logs]
+    bench = Bench(view.fitter.along(wild), base)
+    bench.begin_nominal()
+    assert bench.near_nominal is None
+    assert Screen(Bench(view.fitter, base)).bench.near_nominal is None
