@@ -186,7 +186,8 @@ class _Loop:
         """Take one Runge-Kutta step of order four with the drives' mean torque over it."""
         drive = command.copy()
         for axis, formula in self.formulas:
-            drive[:, axis] = formula.command(drive[:, axis])
+            # A drive may keep what it was told: its own copy.
+            drive[:, axis] = formula.command(drive[:, axis].copy())
         drive *= self.gain
         h, t = self.step_s, self.time_s
         first = self._rates(self.state, drive, t)

@@ -14,6 +14,7 @@ import scipy
 from axisight.blind.sealed import SEAL, seal_of
 from axisight.effects import effect_info, effect_table
 from axisight.errors import InputError
+from axisight.gap.twins import TWIN_SHARE
 
 SEVERE = 3.0
 """Change of the torque over its noise from which an effect counts as there to be found."""
@@ -158,6 +159,12 @@ def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
     return next((t for t in as_twins if _label(t) in named), effect)
 
 
+def _said(cause: dict[str, Any]) -> float:
+    """Return the probability said of a cause or a twin of it: they count as one another."""
+    twins = effect_info(cause["effect"]).twins
+    return float(cause["probability"] / (1 - TWIN_SHARE * len(twins)))
+
+
 def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
     if "error" in verdict:
         # What could not be diagnosed counts, and is not right.
@@ -184,7 +191,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
         named=tuple(_label(c) for c in causes),
-        probabilities=tuple(c["probability"] for c in causes),
+        probabilities=tuple(_said(c) for c in causes),
         allowed=frozenset(allowed),
         where=frozenset(w["axis"] for w in verdict["where"][:1]),
         ratios=tuple(ratios),

@@ -13,9 +13,9 @@ from axisight.effects import Effect, effect_info, phrase
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Candidate
 
-# How often it is the twin, of machines that give such logs: as nothing tells, what is usual has the
-# odds of four to one.
-_SHARE = 0.2
+TWIN_SHARE = 0.2
+"""How often it is the twin, of machines that give such logs: as nothing tells, what is usual has the odds
+of four to one."""
 
 
 def with_twins(ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
@@ -23,15 +23,15 @@ def with_twins(ranking: Sequence[Candidate]) -> tuple[Candidate, ...]:
     out = []
     for one in ranking:
         names = effect_info(one.effect).twins
-        out.append(replace(one, probability=one.probability * (1 - _SHARE * len(names))))
-        out += [replace(one, effect=n, probability=one.probability * _SHARE) for n in names]
+        out.append(replace(one, probability=one.probability * (1 - TWIN_SHARE * len(names))))
+        out += [replace(one, effect=n, probability=one.probability * TWIN_SHARE) for n in names]
     return tuple(sorted(out, key=lambda c: -c.probability))
 
 
 def less_their_twins(causes: Sequence[NamedCause]) -> tuple[NamedCause, ...]:
     """Return the causes without the share of probability that their twins have."""
     return tuple(
-        replace(c, probability=c.probability * (1 - _SHARE * len(effect_info(c.effect).twins)))
+        replace(c, probability=c.probability * (1 - TWIN_SHARE * len(effect_info(c.effect).twins)))
         for c in causes
     )
 
