@@ -21,6 +21,7 @@ KNOWING = (
     "python/axisight/effects/stated.py",
     # What a benchmark withholds has the names that verdicts give it.
     "python/axisight/blind/withheld.py",
+    "python/axisight/blind/withheld_formulas.py",
 )
 
 

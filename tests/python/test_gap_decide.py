@@ -324,6 +324,25 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
     assert here.with_what_others_say([]).best.probability == pytest.approx(here.best.probability)
 
 
+@pytest.mark.parametrize(
+    ("fits", "behind", "open_"),
+    [
+        # A rival that fits the logs better and predicts a little worse is as good.
+        (50.0, 0.08, 2),
+        # One that fits no better is not, nor is one that explains less than formulas differ by.
+        (0.0, 0.08, 1),
+        (50.0, 0.6, 1),
+    ],
+)
+def test_where_one_predicts_better_and_the_other_fits_better_neither_is_surer(fits, behind, open_):
+    first = a_trial("viscous_friction", 1, np.full(40, 1.02))
+    rival = a_trial("torque_offset", 1, np.full(40, 1.02 + behind))
+    better = replace(NO_EFFECT, loss=NO_EFFECT.loss - fits / len(NO_EFFECT.loss))
+    found = standing([first, replace(rival, evidence=better)])
+    assert found.best.trial is first
+    assert len(found.inseparable()) == open_
+
+
 def test_a_load_is_more_usual_than_a_link_that_is_not_as_it_was_drawn():
     link = a_trial("link_com", 1, np.full(40, 1.5))
     load = a_trial("payload", 1, np.full(40, 1.5 * 1.05))

@@ -207,6 +207,7 @@ def stand(
     unknown = mine[int(np.argmin(losses))].cost
     cost = np.array([*(t.cost for t in mine), 0.0, unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - _PARAMETER_COST * cost
+    logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
     samples = float(layout.samples()[axis])
@@ -222,6 +223,27 @@ def stand(
     ]
     ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
     return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
+
+
+# Half of it is a log-likelihood ratio: more than a fit leaves open.
+_BETTER = 4.0
+
+
+def _with_those_that_fit_better(trials: Sequence[Trial], logp: Array, score: Array) -> Array:
+    """Return log-probabilities with rivals as probable as the first that fit the logs better than it.
+
+    With few logs, what is predicted without one hangs on what the others tell of the simulator's own
+    parameters. Where of two that explain the same share the one predicts better and the other, with no more
+    numbers to it, fits better, neither is surer.
+    """
+    first = int(np.argmax(logp[: len(trials)]))
+    best = trials[first]
+    out = logp.copy()
+    for i, t in enumerate(trials):
+        fits = t.evidence.total < best.evidence.total - _BETTER and t.cost <= best.cost
+        if fits and score[i] > score[first] - _FORMULA_ERROR:
+            out[i] = logp[first]
+    return out
 
 
 def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explains: bool) -> float:
