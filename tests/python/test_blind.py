@@ -27,7 +27,7 @@ from axisight.blind.machine import Machine, Native
 from axisight.blind.make import make_cases
 from axisight.blind.motions import MOTIONS, multisines
 from axisight.blind.scene import Scene
-from axisight.blind.score import _said, comparable, sizes
+from axisight.blind.score import _missed, _said, comparable, sizes
 from axisight.blind.sealed import SEAL
 from axisight.cli import app
 
@@ -261,6 +261,30 @@ def test_figures_count_what_they_say():
     assert [c.right for c in cases] == [True, False, False, False, True, False, True, True, False]
     # Seven causes named at 0.9, four of them true.
     assert calibration_error(cases) == pytest.approx(0.9 - 4 / 7)
+
+
+def test_what_is_missed_is_held_against_the_limit_said_of_it():
+    withheld = [
+        {"effect": "backlash", "axis": 1, "parameters": {"half_width_rad": 2e-4}},
+        {
+            "effect": "torque_ripple",
+            "axis": 2,
+            "parameters": {"order_1": 2.0, "amplitude_1_nm": 0.1},
+        },
+        {"effect": "torque_offset", "axis": 3, "parameters": {"offset_nm": -0.1}},
+        {"effect": "payload", "axis": None, "parameters": {"mass_kg": 3.0}},
+        {"effect": "push", "axis": 1, "parameters": {"torque_nm": 3.0}},
+    ]
+    limits = [
+        {"effect": "backlash", "axis": 1, "parameter": "half_width_rad", "value": 8e-4},
+        {"effect": "torque_ripple", "axis": 2, "parameter": "cosine_1_nm", "value": 0.02},
+        {"effect": "torque_offset", "axis": 3, "parameter": "offset_nm", "value": None},
+    ]
+    found = _missed(withheld, {"payload"}, limits)
+    assert found == pytest.approx(
+        {"backlash@1": 0.25, "torque_ripple@2": 5.0, "torque_offset@3": 0.0}
+    )
+    assert np.isnan(_missed(withheld[3:], set(), limits)["payload"])
 
 
 def test_what_is_said_of_a_cause_counts_for_its_twin():

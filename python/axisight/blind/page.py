@@ -64,6 +64,10 @@ def render_score(name: str, score: dict[str, Any]) -> str:
                 "truth": _listed(m["truth"]) or "nothing",
                 "verdict": m["verdict"],
                 "named": _listed(m["named"]) or NO_VALUE,
+                "over": ", ".join(
+                    NO_VALUE if v is None else f"{v:.2g}" for v in m["over_limit"].values()
+                )
+                or NO_VALUE,
             }
             for m in score["misses"]
         ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,9 @@ class Judged:
     Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
     ``where``: the axis on which the gap mainly lies. ``ratios``: named value over true value of the
     parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
-    names of engine, arm and motions.
+    names of engine, arm and motions. ``missed``: by label of effects of the library that are not named,
+    their size over the detection limit that the verdict states for it; 0 where it says that no size would
+    show, NaN where it says nothing.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Judged:
     ratios: tuple[float, ...]
     covered: tuple[bool, ...]
     setting: Mapping[str, str]
+    missed: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -148,6 +151,7 @@ _FAILED: dict[str, Any] = {
     "alternatives": [],
     "equivalent": [],
     "where": [],
+    "detection_limits": [],
 }
 
 
@@ -157,6 +161,27 @@ def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
     twins = effect_info(kind).twins if kind in effect_table() else ()
     as_twins = [{**effect, "effect": name} for name in twins]
     return next((t for t in as_twins if _label(t) in named), effect)
+
+
+def _missed(
+    withheld: Sequence[dict[str, Any]], named: set[str], limits: Sequence[dict[str, Any]]
+) -> dict[str, float]:
+    """Return what is not named, with its size over the detection limit said of it."""
+    stated = {_label(limit): limit for limit in limits}
+    out = {}
+    for effect in withheld:
+        label = _label(effect)
+        if label not in named and effect["effect"] in effect_table():
+            limit = stated.get(label)
+            out[label] = float("nan") if limit is None else _over(effect["parameters"], limit)
+    return out
+
+
+def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
+    """Return a size over its limit; of waves, which a limit states by cosine or sine, of the largest."""
+    waves = [v for k, v in true.items() if k.startswith("amplitude")]
+    size = true.get(limit["parameter"], max(waves, default=float("nan")))
+    return 0.0 if limit["value"] is None else abs(size) / float(limit["value"])
 
 
 def _said(cause: dict[str, Any]) -> float:
@@ -188,6 +213,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         truth=tuple(_label(e) for e in withheld),
         in_library=all(e["effect"] in effect_table() for e in withheld),
         setting={key: truth.get(key, "-") for key in SETTING},
+        missed=_missed(withheld, {_label(c) for c in causes}, verdict["detection_limits"]),
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
         named=tuple(_label(c) for c in causes),
@@ -254,6 +280,10 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
         "out of the library: unknown": share(unknown, [j.right for j in unknown]),
         "wrong cause explained": share(
             judged, [j.verdict == "explained" and not set(j.named) <= set(j.truth) for j in judged]
+        ),
+        "missed at twice the detection limit said of it": Share(
+            sum(over >= 2 for j in judged for over in j.missed.values()),
+            sum(len(j.truth) for j in judged if j.in_library),
         ),
         "pairs: both": share(pairs, [set(j.truth) <= set(j.named) for j in pairs]),
         "pairs: spurious third": share(pairs, [bool(set(j.named) - set(j.truth)) for j in pairs]),

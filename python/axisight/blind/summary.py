@@ -55,6 +55,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
                 "truth": list(j.truth),
                 "verdict": j.verdict,
                 "named": list(j.named),
+                "over_limit": {k: _number(v) for k, v in j.missed.items()},
             }
             for j in judged
             if not j.right

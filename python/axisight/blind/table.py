@@ -50,10 +50,16 @@ def markdown(score: Mapping[str, Any]) -> str:
             ", ".join(m["truth"]) or "nothing",
             m["verdict"],
             ", ".join(m["named"]) or "-",
+            ", ".join("-" if v is None else f"{v:.2g}" for v in m["over_limit"].values()) or "-",
         ]
         for m in score["misses"]
     ]
-    lines += ["", *_table(["case", "severity", "truth", "verdict", "named"], misses)]
+    lines += [
+        "",
+        *_table(
+            ["case", "severity", "truth", "verdict", "named", "missed: size over limit"], misses
+        ),
+    ]
     return "\n".join(lines) + "\n"
 
 
