@@ -34,21 +34,7 @@ def render_score(name: str, score: dict[str, Any]) -> str:
             {"title": title, "rows": [_class(k, v) for k, v in score[key].items()]}
             for title, key in (("By family", "families"), ("By effect", "effects"))
         ],
-        "settings": [
-            {
-                "title": f"By {key}",
-                "columns": list(score["figures"]),
-                "rows": [
-                    {
-                        "name": value,
-                        "cases": row["cases"],
-                        "shares": [_share(x)["count"] for x in row["figures"].values()],
-                    }
-                    for value, row in rows.items()
-                ],
-            }
-            for key, rows in score["settings"].items()
-        ],
+        "settings": [_setting(key, values) for key, values in score["settings"].items()],
         "columns": [_word(n) for n in named],
         "confusion": [
             {"truth": _word(t), "cells": [_cell(t, n, row.get(n, 0)) for n in named]}
@@ -73,6 +59,19 @@ def render_score(name: str, score: dict[str, Any]) -> str:
         ],
     }
     return rendered("score.html.j2", page)
+
+
+def _setting(key: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Return figures as rows, the engines (arms, motions) as columns."""
+    names = list(next(iter(values.values()))["figures"])
+    return {
+        "title": f"By {key}",
+        "columns": [f"{name}, {row['cases']} cases" for name, row in values.items()],
+        "rows": [
+            {"name": n, "shares": [_share(row["figures"][n])["count"] for row in values.values()]}
+            for n in names
+        ],
+    }
 
 
 def _share(share: dict[str, Any]) -> dict[str, str]:
