@@ -33,10 +33,20 @@ def judged(
 
 OTHER = {"engine": "pinocchio", "arm": "lever_like", "motions": "moves"}
 CASES = [
-    judged(("backlash@1",), ("backlash@1",), "explained", 12.0, 0.95, ratios=(1.1, 0.98)),
+    judged(
+        ("backlash@1",),
+        ("backlash@1",),
+        "explained",
+        12.0,
+        0.95,
+        ratios=(1.1, 0.98),
+        reduction=0.93,
+    ),
     judged(("backlash@2",), ("nonlinear_stiffness@2",), "explained", 5.0, 0.6),
     judged(("backlash@3",), (), "none", 0.1, setting=OTHER, missed={"backlash@3": 0.25}),
-    judged(("coulomb_friction@1",), ("coulomb_friction@1",), "explained", 3.0, 0.95),
+    judged(
+        ("coulomb_friction@1",), ("coulomb_friction@1",), "explained", 3.0, 0.95, reduction=0.98
+    ),
     judged((), (), "none", 0.0),
     judged(("outside_tone@1",), (), "unknown", 9.0, in_library=False),
     judged(("backlash@1", "payload"), ("payload", "backlash@1"), "explained", 8.0, 0.95),
@@ -65,6 +75,8 @@ def test_all_is_counted():
     assert curve[30.0, None] == (0, 0)
     assert sum(of for _, of in curve.values()) == 4
     assert found["unknown"]["hits"] == 1
+    reduced = found["figures"]["gap_reduction within 5 points of the true one"]
+    assert (reduced["hits"], reduced["of"]) == (1, 2)
     assert found["parameters_median_error"] == pytest.approx(0.06)
     assert [m["truth"] for m in found["misses"]] == [["backlash@2"], ["backlash@3"]]
 

@@ -20,6 +20,8 @@ SEVERE = 3.0
 """Change of the torque over its noise from which an effect counts as there to be found."""
 SETTING = ("engine", "arm", "motions")
 """What a case is drawn with, as its truth says."""
+# Of a gap's reduction, that count as right.
+_POINTS = 0.05
 # Alternatives this likely belong to what a verdict allows.
 _ALTERNATIVE = 0.05
 _BINS = 10
@@ -34,7 +36,8 @@ class Judged:
     parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
     names of engine, arm and motions. ``missed``: by label of effects of the library that are not named,
     their size over the detection limit that the verdict states for it; 0 where it says that no size would
-    show, NaN where it says nothing.
+    show, NaN where it says nothing. ``reduction``: `gap_reduction` of the first cause; of the true cause of
+    a gap, where it is the only one, all of the gap goes.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Judged:
     covered: tuple[bool, ...]
     setting: Mapping[str, str]
     missed: Mapping[str, float] = field(default_factory=dict)
+    reduction: float = float("nan")
 
     @property
     def kind(self) -> str:
@@ -213,6 +217,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         truth=tuple(_label(e) for e in withheld),
         in_library=all(e["effect"] in effect_table() for e in withheld),
         setting={key: truth.get(key, "-") for key in SETTING},
+        reduction=causes[0]["gap_reduction"]["value"] if causes else float("nan"),
         missed=_missed(withheld, {_label(c) for c in causes}, verdict["detection_limits"]),
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
@@ -287,6 +292,10 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
         ),
         "pairs: both": share(pairs, [set(j.truth) <= set(j.named) for j in pairs]),
         "pairs: spurious third": share(pairs, [bool(set(j.named) - set(j.truth)) for j in pairs]),
+        "gap_reduction within 5 points of the true one": share(
+            found := [j for j in single if j.named == j.truth],
+            [abs(j.reduction - 1.0) <= _POINTS for j in found],
+        ),
         "parameters within 10 %": Share(
             sum(abs(r - 1) <= 0.1 for j in judged for r in j.ratios),
             sum(len(j.ratios) for j in judged),
