@@ -17,6 +17,7 @@ from axisight.blind import (
     calibration_error,
     figures,
     judged_cases,
+    make,
     mujoco_engine,
     pinocchio_engine,
 )
@@ -344,6 +345,27 @@ def test_from_machine_to_score(tmp_path: Path):
     path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), "seed": 5}), "utf-8")
     with pytest.raises(InputError, match="sealed"):
         judged_cases(cases, truth, out)
+
+
+def test_a_machine_that_runs_away_is_drawn_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    asked: list[Machine] = []
+
+    def engine(machine: Machine, references: list[np.ndarray], noises: list[np.ndarray]):
+        asked.append(machine)
+        if len(asked) == 1:
+            raise InputError("machine: unstable")
+        torque = 1e3 if len(asked) == 2 else 1e-3
+        return [(np.full_like(x, torque), np.cumsum(x, axis=0)) for x in references]
+
+    monkeypatch.setattr(make, "_engine", lambda _: engine)
+    fixed = Choice("mujoco", "lever_like", "slow_and_short")
+    make._make(tmp_path / "c", tmp_path / "t", 3, fixed, 8)
+    # The third of them works; nothing is withheld from it, and no severity to be had.
+    assert len(asked) == 3
+    stiffness = [m.robot.parameters()["axis1.stiffness"] for m in asked]
+    assert len(set(stiffness)) == 3
+    truth = json.loads((tmp_path / "t" / "case_0003_0008.json").read_text("utf-8"))
+    assert truth["effects"] == [] and truth["severity"] == [0.0]
 
 
 def test_truths_stay_apart_from_cases(tmp_path: Path):

@@ -82,9 +82,9 @@ DRAWN = Choice()
 """All by chance."""
 
 
-def draw(seed: int, number: int, choice: Choice = DRAWN) -> Draw:
-    """Return case ``number`` of a benchmark."""
-    rng = np.random.default_rng([seed, number])
+def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Draw:
+    """Return case ``number`` of a benchmark; another one at every further ``attempt``."""
+    rng = np.random.default_rng([seed, number, attempt] if attempt else [seed, number])
     engine, arm, motions = (
         chosen or drawn
         for chosen, drawn in zip(

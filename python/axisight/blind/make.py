@@ -16,6 +16,7 @@ from axisight.blind.case_files import CaseFolder
 from axisight.blind.drawing import DRAWN, Choice, Draw, draw
 from axisight.blind.machine import Machine
 from axisight.blind.processes import Progress, shared_out
+from axisight.blind.scene import Scene
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.errors import InputError
 from axisight.storage import write_whole
@@ -23,6 +24,12 @@ from axisight.storage import write_whole
 Array = NDArray[np.float64]
 # Of an engine: machine, references and noises of its runs to torques and angles.
 Run = Callable[[Machine, Sequence[Array], Sequence[Array]], list[tuple[Array, Array]]]
+
+
+# Draws until a machine works.
+_ATTEMPTS = 20
+# Times the largest torque of the simulator, from which a machine does not.
+_RUNAWAY = 5.0
 
 
 def make_cases(
@@ -47,8 +54,15 @@ def make_cases(
 
 def _make(cases: Path, truths: Path, seed: int, choice: Choice, number: int) -> None:
     name = f"case_{seed:04d}_{number:04d}"
-    if not (cases / name / SEAL).is_file():
-        _write(cases / name, truths / f"{name}.json", draw(seed, number, choice), seed)
+    if (cases / name / SEAL).is_file():
+        return
+    for attempt in range(_ATTEMPTS):
+        drawn = draw(seed, number, choice, attempt)
+        logs = _logs(drawn, seed)
+        if logs is not None:
+            _write(cases / name, truths / f"{name}.json", drawn, logs, seed)
+            return
+    raise InputError(f"{name}: expected a machine that works within {_ATTEMPTS} draws")
 
 
 def _engine(name: str) -> Run:
@@ -56,18 +70,33 @@ def _engine(name: str) -> Run:
     return import_module(f"axisight.blind.{name}_engine").run  # type: ignore[no-any-return]
 
 
-def _write(folder: Path, truth: Path, drawn: Draw, seed: int) -> None:
+def _logs(drawn: Draw, seed: int) -> list[tuple[Array, Array]] | None:
+    """Return torque and angle along every reference; None of a machine that nobody would run.
+
+    An effect may take the loop beyond its margin: it swings without end.
+    """
     rng = np.random.default_rng([seed, drawn.number, 1])
-    run, robot = _engine(drawn.engine), drawn.robot
     references = [reference for _, reference in drawn.references.values()]
-    noises = [robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    noises = [drawn.robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    try:
+        logs = _engine(drawn.engine)(drawn.machine, references, noises)
+    except InputError:
+        return None
+    largest = np.max([np.abs(torque).max(axis=0) for torque, _ in logs], axis=0)
+    usual = Scene(drawn.robot, references).largest_nm
+    return logs if np.all(largest < _RUNAWAY * usual) else None
+
+
+def _write(
+    folder: Path, truth: Path, drawn: Draw, logs: Sequence[tuple[Array, Array]], seed: int
+) -> None:
     case = CaseFolder(folder, folder.name)
-    logs = run(drawn.machine, references, noises)
     for (name, (role, reference)), log in zip(drawn.references.items(), logs, strict=True):
-        time_s = np.arange(len(reference), dtype=np.float64) * robot.sample_time_s
+        time_s = np.arange(len(reference), dtype=np.float64) * drawn.robot.sample_time_s
         case.add(name, role, time_s, reference, *log)
     case.finish(drawn.arm)
-    text = json.dumps(_truth(drawn, seed, _severity(drawn, run)), indent=1)
+    severity = _severity(drawn, _engine(drawn.engine))
+    text = json.dumps(_truth(drawn, seed, severity), indent=1)
     write_whole(truth, text)
     # Last: a case with its seal is whole.
     write_whole(folder / SEAL, seal_of(text) + "\n")
