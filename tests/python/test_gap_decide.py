@@ -117,6 +117,22 @@ def test_a_linear_step_leads_back_from_a_bound_that_a_fit_ended_at():
     np.testing.assert_allclose(linear_gain(at_bound), aims @ aims - 2 * best.cost, rtol=1e-6)
 
 
+def test_a_linear_step_does_not_lead_past_a_bound_that_is_no_tolerance():
+    # A damping at nothing, with a tolerance that would let it go below.
+    x, y = np.ones((40, 1)), np.full(40, -5.0)
+    at_nothing = replace(
+        linear_evidence(x, y, np.repeat([0, 1], 20)),
+        parameters=((None, "damping"),),
+        at_bound=((None, "damping"),),
+        gradient=np.stack([-(x[k : k + 20].T @ y[k : k + 20]) for k in (0, 20)]),
+        loss=np.array([np.sum(y[k : k + 20] ** 2) for k in (0, 20)]),
+        prior_matrix=np.array([[0.3**-2]]),
+        prior_gradient=np.array([-1.0 * 0.3**-2]),
+    )
+    assert linear_gain(at_nothing) == 0.0
+    assert linear_gain(replace(at_nothing, at_bound=())) > 0.0
+
+
 # The size of an effect is judged in test_gap_amplitude.py.
 NO_EFFECT = linear_evidence(np.ones((800, 1)), np.zeros(800), np.zeros(800, int))
 
@@ -305,9 +321,11 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
     two = Layout(axes, pieces, np.zeros(80, int), np.full(80, 10))
     current, floor = np.tile(CURRENT, 2), np.tile(FLOOR, 2)
 
+    both_axes = linear_evidence(np.ones((1600, 1)), np.zeros(1600), np.zeros(1600, int))
+
     def on_both(axis: int, first: float, second: float) -> Trial:
-        found = a_trial("viscous_friction", 1, np.full(40, first), axis)
-        return replace(found, held_out=np.repeat([first, second], 40))
+        found = a_trial("viscous_friction", 1, np.repeat([first, second], 40), axis)
+        return replace(found, evidence=both_axes)
 
     true, shadow, elsewhere = on_both(2, 1.1, 1.1), on_both(1, 1.1, 2.0), on_both(3, 1.1, 12.0)
     here, there = (
@@ -329,7 +347,7 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
     [
         # A rival that fits the logs better and predicts a little worse is as good.
         (50.0, 0.08, 2),
-        # One that fits no better is not, nor is one that explains less than formulas differ by.
+        # One that fits no better is not, nor is one that explains less by more than formulas differ.
         (0.0, 0.08, 1),
         (50.0, 0.6, 1),
     ],

@@ -111,18 +111,29 @@ def _effects(
 ) -> tuple[Drawn, ...]:
     if number % _ONE_IN["nothing"] == 0:
         return ()
-    names, count = list(kinds), scene.robot.n_axes
-    first = names[int(rng.integers(len(names)))]
-    axes = rng.permutation(count) + 1
-    out = [kinds[first].draw(rng, scene, int(axes[0]))]
-    if number % _ONE_IN["pair"] == 1 and kinds[first].in_library and count > 1:
-        others = [n for n, k in kinds.items() if k.in_library and n != first]
-        second = others[int(rng.integers(len(others)))]
-        # Some kinds have an axis of their own: the other is not there.
-        place = next(int(a) for a in axes if a != out[0].axis)
-        both = kinds[second].draw(rng, scene, place)
-        out += [both] if both.axis is None or both.axis != out[0].axis else []
+    there = {name: kind for name, kind in kinds.items() if kind.axes(scene)}
+    first = str(rng.choice(list(there)))
+    out = [there[first].draw(rng, scene, int(rng.choice(there[first].axes(scene))))]
+    if number % _ONE_IN["pair"] == 1 and there[first].in_library:
+        out += _second(rng, scene, there, first, out[0])
     return tuple(out)
+
+
+def _second(
+    rng: np.random.Generator, scene: Scene, kinds: Mapping[str, Kind], first: str, taken: Drawn
+) -> list[Drawn]:
+    """Return another effect of the library, elsewhere; none where there is no room for one."""
+    rooms = {
+        name: [axis for axis in kind.axes(scene) if axis != taken.axis]
+        for name, kind in kinds.items()
+        if kind.in_library and name != first
+    }
+    names = [name for name, axes in rooms.items() if axes]
+    if not names or scene.robot.n_axes == 1:
+        return []
+    name = str(rng.choice(names))
+    both = kinds[name].draw(rng, scene, int(rng.choice(rooms[name])))
+    return [both] if both.axis != taken.axis else []
 
 
 def scattered(rng: np.random.Generator, robot: Robot) -> Robot:

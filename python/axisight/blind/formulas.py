@@ -1,4 +1,7 @@
-"""Formulas that a machine follows in the engine on Pinocchio: other ones than those of `laws`.
+"""Formulas that a machine follows in the engine on Pinocchio.
+
+Friction, springs, gears and resolvers follow other formulas than those of `laws`; an offset, a limit, a
+report, a delay have only one.
 
 A formula acts on one axis of many runs at once. It answers with torques on the motors and on the
 joints, at any moment of a step, as a function of where the axis is and of where it was when the step
@@ -26,8 +29,15 @@ class Place:
     deflection: Array
     deflection_rate: Array
     gear_ratio: float
-    gear_torque: Array
-    """Of spring and damper, on the joint [Nm]."""
+    stiffness: float
+    """Of the gear, on the joint [Nm/rad]."""
+    damping: float
+    """Of the gear [Nm s/rad]."""
+
+    @property
+    def gear_torque(self) -> Array:
+        """Of spring and damper, on the joint [Nm]."""
+        return np.asarray(self.stiffness * self.deflection + self.damping * self.deflection_rate)
 
 
 class Formula:
@@ -139,8 +149,6 @@ class WarmingFriction(Formula):
 class Play(Formula):
     """A gear that pulls and damps only in contact, its corners rounded off (hyperbolas)."""
 
-    stiffness: float
-    damping: float
     half_width_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
@@ -154,23 +162,20 @@ class Play(Formula):
             (at.deflection + self.half_width_rad) / above
             - (at.deflection - self.half_width_rad) / below
         )
-        return _through_gear(
-            at, -self.stiffness * slack - self.damping * inside * at.deflection_rate
-        )
+        return _through_gear(at, -at.stiffness * slack - at.damping * inside * at.deflection_rate)
 
 
 @dataclass
 class HardeningSpring(Formula):
     """A gear whose spring is the hyperbolic sine of its deflection; ``cubic_nm_rad3``: its third order."""
 
-    stiffness: float
     cubic_nm_rad3: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
         """Return what is beyond the linear spring."""
-        a = np.sqrt(6 * self.cubic_nm_rad3 / self.stiffness)
+        a = np.sqrt(6 * self.cubic_nm_rad3 / at.stiffness)
         x = np.clip(a * at.deflection, -20.0, 20.0)
-        return _through_gear(at, self.stiffness * (np.sinh(x) - x) / a)
+        return _through_gear(at, at.stiffness * (np.sinh(x) - x) / a)
 
 
 @dataclass
@@ -220,7 +225,6 @@ class DahlGear(Formula):
 class GearError(Formula):
     """A gear whose angle has an error periodic in the motor's, with a small second harmonic."""
 
-    stiffness: float
     order: float
     amplitude_rad: float
     phase: float
@@ -231,7 +235,7 @@ class GearError(Formula):
         angle = self.order * at.motor + self.phase
         shape = np.sin(angle) + self.harmonic * np.sin(2 * angle)
         slope = np.cos(angle) + 2 * self.harmonic * np.cos(2 * angle)
-        total = self.stiffness * self.amplitude_rad * (shape - np.sin(self.phase))
+        total = at.stiffness * self.amplitude_rad * (shape - np.sin(self.phase))
         back = at.gear_ratio * total
         back = back + self.order * self.amplitude_rad * slope * (at.gear_torque + total)
         return -back, total
@@ -239,7 +243,7 @@ class GearError(Formula):
 
 @dataclass
 class Cogging(Formula):
-    """Torque of a motor periodic in its angle, and a part of it that follows no load."""
+    """Torque of a motor periodic in its angle, under load or without."""
 
     orders: Sequence[float]
     amplitudes_nm: Sequence[float]

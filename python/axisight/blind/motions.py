@@ -1,4 +1,4 @@
-"""Motions of the logs of a case, by the name of a plan; motor speeds of 30 to 55 rad/s."""
+"""Motions of the logs of a case, by the name of a plan; motors turn at up to 55 rad/s."""
 
 from __future__ import annotations
 

@@ -213,11 +213,16 @@ class _Loop:
             ratio, k = float(self.ratio[axis]), self.joints[axis]
             deflection = ratio * motor[:, axis] - joint[:, k]
             rate = ratio * motor_speed[:, axis] - joint_speed[:, k]
-            gear = self.stiffness[axis] * deflection + self.damping[axis] * rate
-            out[axis] = Place(
-                self.time_s, motor[:, axis], motor_speed[:, axis], deflection, rate, ratio, gear
+            out[axis] = self._place(
+                axis, self.time_s, motor[:, axis], motor_speed[:, axis], deflection, rate
             )
         return out
+
+    def _place(
+        self, axis: int, time_s: float, motor: Array, speed: Array, deflection: Array, rate: Array
+    ) -> Place:
+        gear = float(self.stiffness[axis]), float(self.damping[axis])
+        return Place(time_s, motor, speed, deflection, rate, float(self.ratio[axis]), *gear)
 
     def _rates(self, state: _State, drive: Array, time_s: float) -> Sequence[Array]:
         """Return the rates of a state under torques of the drives."""
@@ -229,14 +234,13 @@ class _Loop:
         on_joint = -self.springs * joint - self.dampers * joint_speed
         on_joint[:, self.joints] += gear
         for axis, formula in self.formulas:
-            at = Place(
+            at = self._place(
+                axis,
                 time_s,
                 motor[:, axis],
                 motor_speed[:, axis],
                 deflection[:, axis],
                 rate[:, axis],
-                float(self.ratio[axis]),
-                gear[:, axis],
             )
             more, joint_more = formula.torque(at)
             on_motor[:, axis] += more

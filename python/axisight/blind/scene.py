@@ -23,6 +23,8 @@ _RATED_NM = 20.0
 _DEFLECTION_RAD = 2.56e-3
 _REACH_M = 2.75
 _MASS_KG = 1440.0
+# Of the rated torque of a motor: less is no weight.
+_NO_WEIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,19 @@ class Scene:
         ratio = float(self.robot.gear_ratio[axis - 1])
         rated = _RATED_NM * self.torque(axis) / ratio
         return rated / self.stiffness(axis) / _DEFLECTION_RAD
+
+    def play(self, axis: int) -> float:
+        """Return the unit of lost motion and of errors of gears: 1 on axes that turn."""
+        return self.deflection(axis) if self.robot.axis_is_prismatic[axis - 1] else 1.0
+
+    def holds(self, axis: int) -> float:
+        """Return the torque that holds an axis at rest, over the rated one of its motor."""
+        return float(np.abs(self._at_rest[axis - 1])) / (_RATED_NM * self.torque(axis))
+
+    @cached_property
+    def _at_rest(self) -> Array:
+        still = np.zeros((1, self.robot.n_axes))
+        return np.asarray(simulate(self.robot, still)["torque_cmd_nm"].values[0])
 
     @property
     def reach(self) -> float:
@@ -95,12 +110,32 @@ class Drawn:
 Draw = Callable[[Rng, Scene, int], Drawn]
 
 
+def everywhere(scene: Scene) -> list[int]:
+    """Return all axes (from 1)."""
+    return scene.robot.axis_numbers()
+
+
+def turning(scene: Scene) -> list[int]:
+    """Return the axes that turn: the zero of a slide moves no weight about."""
+    slides = scene.robot.axis_is_prismatic
+    return [axis for axis in everywhere(scene) if not slides[axis - 1]]
+
+
+def unloaded(scene: Scene) -> list[int]:
+    """Return the axes that carry no weight.
+
+    Where a torque keeps its sign, a deadband is an offset and a gear stays beyond its knee.
+    """
+    return [axis for axis in everywhere(scene) if scene.holds(axis) < _NO_WEIGHT]
+
+
 @dataclass(frozen=True)
 class Kind:
-    """A kind of effect. ``in_library``: the diagnosis can name it."""
+    """A kind of effect, and the axes where it is one. ``in_library``: the diagnosis can name it."""
 
     draw: Draw
     in_library: bool = True
+    axes: Callable[[Scene], list[int]] = everywhere
 
 
 def sign(rng: Rng) -> float:

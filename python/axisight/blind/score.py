@@ -167,6 +167,13 @@ def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
     return next((t for t in as_twins if _label(t) in named), effect)
 
 
+def _setting(name: str, truth: dict[str, Any]) -> dict[str, str]:
+    absent = [key for key in SETTING if key not in truth]
+    if absent:
+        raise InputError(f"{name}.json: expected {', '.join(absent)} of the case")
+    return {key: truth[key] for key in SETTING}
+
+
 def _missed(
     withheld: Sequence[dict[str, Any]], named: set[str], limits: Sequence[dict[str, Any]]
 ) -> dict[str, float]:
@@ -174,17 +181,22 @@ def _missed(
     stated = {_label(limit): limit for limit in limits}
     out = {}
     for effect in withheld:
-        label = _label(effect)
-        if label not in named and effect["effect"] in effect_table():
-            limit = stated.get(label)
+        label, kind = _label(effect), effect["effect"]
+        if label not in named and kind in effect_table():
+            # A limit of one of twins is that of the other.
+            twins = ({**effect, "effect": name} for name in (kind, *effect_info(kind).twins))
+            limit = next((stated[_label(t)] for t in twins if _label(t) in stated), None)
             out[label] = float("nan") if limit is None else _over(effect["parameters"], limit)
     return out
 
 
 def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
-    """Return a size over its limit; of waves, which a limit states by cosine or sine, of the largest."""
+    """Return a size over its limit; of waves, which a limit states by cosine or sine, of the largest.
+
+    A size that another formula states by another name comes first.
+    """
     waves = [v for k, v in true.items() if k.startswith("amplitude")]
-    size = true.get(limit["parameter"], max(waves, default=float("nan")))
+    size = true.get(limit["parameter"], max(waves, default=next(iter(true.values()))))
     return 0.0 if limit["value"] is None else abs(size) / float(limit["value"])
 
 
@@ -216,7 +228,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         name=name,
         truth=tuple(_label(e) for e in withheld),
         in_library=all(e["effect"] in effect_table() for e in withheld),
-        setting={key: truth.get(key, "-") for key in SETTING},
+        setting=_setting(name, truth),
         reduction=causes[0]["gap_reduction"]["value"] if causes else float("nan"),
         missed=_missed(withheld, {_label(c) for c in causes}, verdict["detection_limits"]),
         severity=max(truth["severity"]),
@@ -288,7 +300,7 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
         ),
         "missed at twice the detection limit said of it": Share(
             sum(over >= 2 for j in judged for over in j.missed.values()),
-            sum(len(j.truth) for j in judged if j.in_library),
+            sum(_with_a_limit(j) for j in judged if j.in_library),
         ),
         "pairs: both": share(pairs, [set(j.truth) <= set(j.named) for j in pairs]),
         "pairs: spurious third": share(pairs, [bool(set(j.named) - set(j.truth)) for j in pairs]),
@@ -304,6 +316,12 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
             sum(sum(j.covered) for j in judged), sum(len(j.covered) for j in judged)
         ),
     }
+
+
+def _with_a_limit(judged: Judged) -> int:
+    """Return how many effects were named, or missed with a limit said of them."""
+    said = sum(not np.isnan(over) for over in judged.missed.values())
+    return len(judged.truth) - len(judged.missed) + said
 
 
 def _axis_named(judged: Judged) -> bool:

@@ -15,7 +15,17 @@ import numpy as np
 from axisight.blind import laws
 from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE
 from axisight.blind.machine import Ends, Native
-from axisight.blind.scene import Draw, Drawn, Kind, Rng, Scene, between, sign
+from axisight.blind.scene import (
+    Draw,
+    Drawn,
+    Kind,
+    Rng,
+    Scene,
+    between,
+    sign,
+    turning,
+    unloaded,
+)
 
 
 def _coulomb(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -45,8 +55,8 @@ def _load_friction(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     return Drawn("load_dependent_friction", axis, {"coefficient": share}, laws=[law])
 
 
-def _backlash(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    width = between(rng, 0.8e-4, 4e-4)
+def _backlash(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    width = between(rng, 0.8e-4, 4e-4) * scene.play(axis)
     return Drawn("backlash", axis, {"half_width_rad": width}, Native(half_width_rad=width))
 
 
@@ -57,11 +67,10 @@ def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("nonlinear_stiffness", axis, {"cubic_nm_rad3": cubic}, laws=[law])
 
 
-def _knee(rng: Rng, scene: Scene, _axis: int) -> Drawn:
-    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(1)
-    # Where the gear carries weight it stays beyond its knee, and is another spring altogether.
-    law = laws.KneeSpring(step * scene.stiffness(1), knee)
-    return Drawn("piecewise_stiffness", 1, {"step": step, "knee_rad": knee}, laws=[law])
+def _knee(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(axis)
+    law = laws.KneeSpring(step * scene.stiffness(axis), knee)
+    return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
 
 
 def _zero(rng: Rng, _scene: Scene, axis: int) -> Drawn:
@@ -90,7 +99,8 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size, phase = between(rng, 0.7e-4, 2e-4), float(rng.uniform(0, 2 * np.pi))
+    size = between(rng, 0.7e-4, 2e-4) * scene.play(axis)
+    phase = float(rng.uniform(0, 2 * np.pi))
     conserves = bool(rng.integers(2))
     law = laws.GearWave(scene.stiffness(axis), 2.0, size, phase, conserves)
     return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
@@ -121,8 +131,9 @@ def _resolver_ripple(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     return Drawn("resolver_ripple", axis, _terms(waves, "rad"), laws=[laws.SensorWave(*waves)])
 
 
-def _delay(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    delay = 0.25e-3 * float(rng.integers(2, 7))
+def _delay(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    # By whole steps of the engine: one to three samples.
+    delay = float(rng.integers(2, 7)) * scene.robot.sample_time_s / STEPS_PER_SAMPLE
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
 
 
@@ -245,10 +256,9 @@ def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[laws.Limit(limit)])
 
 
-def _deadband(rng: Rng, scene: Scene, _axis: int) -> Drawn:
-    width = between(rng, 0.2, 0.6) * scene.torque(1)
-    # Where the torque carries weight it keeps its sign, and a deadband is an offset.
-    return Drawn("torque_deadband", 1, {"width_nm": width}, laws=[laws.Deadband(width)])
+def _deadband(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    width = between(rng, 0.2, 0.6) * scene.torque(axis)
+    return Drawn("torque_deadband", axis, {"width_nm": width}, laws=[laws.Deadband(width)])
 
 
 def _tone(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -267,8 +277,7 @@ def _friction_step(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _cubic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    rated = scene.stiffness(axis) * scene.deflection(axis)
-    size = between(rng, 1.1, 11.0) * rated
+    size = between(rng, 1.1, 11.0) * scene.stiffness(axis) / scene.deflection(axis) ** 2
     return Drawn("cubic_damper", axis, {"cubic_nm_s3_rad3": size}, laws=[laws.CubicDamper(size)])
 
 
@@ -292,7 +301,7 @@ KINDS: Mapping[str, Kind] = {
     "motor_inertia": Kind(_inertia),
     "payload": Kind(_payload),
     "torque_saturation": Kind(_limit),
-    "torque_deadband": Kind(_deadband),
+    "torque_deadband": Kind(_deadband, axes=unloaded),
     "controller_gain": Kind(_gains),
     "velocity_filter": Kind(_speed_filter),
     # Beyond what the same link of another machine weighs.
@@ -301,8 +310,8 @@ KINDS: Mapping[str, Kind] = {
     "link_com": Kind(_link_com),
     "base_compliance": Kind(_rocking),
     "friction_warmup": Kind(_warmup),
-    "piecewise_stiffness": Kind(_knee),
-    "joint_zero_offset": Kind(_zero),
+    "piecewise_stiffness": Kind(_knee, axes=unloaded),
+    "joint_zero_offset": Kind(_zero, axes=turning),
     "torque_sensor_gain": Kind(_reported),
     "sensor_delay": Kind(_late_sensor),
     "torque_sensor_offset": Kind(_reported_less),

@@ -1,4 +1,4 @@
-"""What is withheld from simulators in the engine on Pinocchio: the same kinds, by other formulas."""
+"""What is withheld from simulators in the engine on Pinocchio: the same kinds, most by other formulas."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from axisight.blind import formulas
 from axisight.blind.machine import Native
-from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign
+from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, unloaded
 from axisight.blind.withheld import KINDS
 
 # Angle of a motor over which dry friction comes after a reversal.
@@ -44,21 +44,21 @@ def _warmup(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _backlash(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    width = between(rng, 0.8e-4, 4e-4)
-    law = formulas.Play(scene.stiffness(axis), scene.of_joint(axis, "damping"), width)
-    return Drawn("backlash", axis, {"half_width_rad": width}, laws=[law])
+    width = between(rng, 0.8e-4, 4e-4) * scene.play(axis)
+    return Drawn("backlash", axis, {"half_width_rad": width}, laws=[formulas.Play(width)])
 
 
 def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
     cubic = between(rng, 1.1e5, 8e5) * scene.stiffness(axis) / scene.deflection(axis) ** 2
-    law = formulas.HardeningSpring(scene.stiffness(axis), cubic)
+    law = formulas.HardeningSpring(cubic)
+    # Where higher orders of the sine join, the library's cube is another one.
     return Drawn("nonlinear_stiffness", axis, {"third_order_nm_rad3": cubic}, laws=[law])
 
 
-def _knee(rng: Rng, scene: Scene, _axis: int) -> Drawn:
-    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(1)
-    law = formulas.RoundedKnee(step * scene.stiffness(1), knee)
-    return Drawn("piecewise_stiffness", 1, {"step": step, "knee_rad": knee}, laws=[law])
+def _knee(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(axis)
+    law = formulas.RoundedKnee(step * scene.stiffness(axis), knee)
+    return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
 
 
 def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -70,8 +70,8 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size, phase = between(rng, 0.7e-4, 2e-4), float(rng.uniform(0, 2 * np.pi))
-    law = formulas.GearError(scene.stiffness(axis), 2.0, size, phase)
+    size = between(rng, 0.7e-4, 2e-4) * scene.play(axis)
+    law = formulas.GearError(2.0, size, float(rng.uniform(0, 2 * np.pi)))
     return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
 
 
@@ -140,9 +140,9 @@ def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[law])
 
 
-def _deadband(rng: Rng, scene: Scene, _axis: int) -> Drawn:
-    width = between(rng, 0.2, 0.6) * scene.torque(1)
-    return Drawn("torque_deadband", 1, {"width_nm": width}, laws=[formulas.DeadZone(width)])
+def _deadband(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    width = between(rng, 0.2, 0.6) * scene.torque(axis)
+    return Drawn("torque_deadband", axis, {"width_nm": width}, laws=[formulas.DeadZone(width)])
 
 
 def _tone(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -159,7 +159,7 @@ def _friction_step(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _quadratic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = between(rng, 0.05, 0.4) * scene.stiffness(axis)
+    size = between(rng, 0.05, 0.4) * scene.stiffness(axis) / scene.deflection(axis)
     law = formulas.QuadraticDamper(size)
     return Drawn("quadratic_damper", axis, {"quadratic_nm_s2_rad2": size}, laws=[law])
 
@@ -181,7 +181,7 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = _SHARED | {
     "friction_warmup": Kind(_warmup),
     "backlash": Kind(_backlash),
     "nonlinear_stiffness": Kind(_cubic),
-    "piecewise_stiffness": Kind(_knee),
+    "piecewise_stiffness": Kind(_knee, axes=unloaded),
     "gear_hysteresis": Kind(_hysteresis),
     "transmission_error": Kind(_transmission),
     "torque_ripple": Kind(_torque_ripple),
@@ -193,7 +193,7 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = _SHARED | {
     "torque_sensor_gain": Kind(_reported),
     "torque_sensor_offset": Kind(_reported_less),
     "torque_saturation": Kind(_limit),
-    "torque_deadband": Kind(_deadband),
+    "torque_deadband": Kind(_deadband, axes=unloaded),
     "outside_tone": Kind(_tone, in_library=False),
     "friction_step": Kind(_friction_step, in_library=False),
     "quadratic_damper": Kind(_quadratic_damper, in_library=False),

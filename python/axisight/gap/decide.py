@@ -207,7 +207,8 @@ def stand(
     unknown = mine[int(np.argmin(losses))].cost
     cost = np.array([*(t.cost for t in mine), 0.0, unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - _PARAMETER_COST * cost
-    logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable)
+    fitted = np.array([_fitted_loss(t.evidence, here) for t in mine])
+    logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
     samples = float(layout.samples()[axis])
@@ -225,22 +226,34 @@ def stand(
     return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
 
 
-# Half of it is a log-likelihood ratio: more than a fit leaves open.
+# Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which
+# they leave open about as much again.
 _BETTER = 4.0
+_LEFT_OPEN = 2e-3
 
 
-def _with_those_that_fit_better(trials: Sequence[Trial], logp: Array, score: Array) -> Array:
+def _fitted_loss(evidence: Evidence, here: NDArray[np.bool_]) -> float:
+    """Return the loss of a fit on some blocks, with what the simulator's own parameters went off."""
+    precision = np.diag(evidence.prior_matrix)
+    told = precision > 0
+    off = evidence.prior_gradient[told] ** 2 / precision[told]
+    return float(evidence.loss[here].sum() + off.sum())
+
+
+def _with_those_that_fit_better(
+    trials: Sequence[Trial], logp: Array, score: Array, fitted: Array
+) -> Array:
     """Return log-probabilities with rivals as probable as the first that fit the logs better than it.
 
     With few logs, what is predicted without one hangs on what the others tell of the simulator's own
     parameters. Where of two that explain the same share the one predicts better and the other, with no more
-    numbers to it, fits better, neither is surer.
+    numbers to it, fits better, neither is surer. ``fitted``: loss of the fits on the axis.
     """
     first = int(np.argmax(logp[: len(trials)]))
-    best = trials[first]
+    least = fitted[first] - max(_BETTER, _LEFT_OPEN * fitted[first])
     out = logp.copy()
     for i, t in enumerate(trials):
-        fits = t.evidence.total < best.evidence.total - _BETTER and t.cost <= best.cost
+        fits = fitted[i] < least and t.cost <= trials[first].cost
         if fits and score[i] > score[first] - _FORMULA_ERROR:
             out[i] = logp[first]
     return out

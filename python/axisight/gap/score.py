@@ -90,7 +90,7 @@ def linear_step(evidence: Linearized) -> Array:
     """
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
-    movable = np.diag(matrix) > 0
+    movable = (np.diag(matrix) > 0) & ~_at_end(evidence)
     free, (least, most) = movable.copy(), _room(evidence)
     step = np.zeros(len(gradient))
     # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the
@@ -129,6 +129,18 @@ def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Arr
     scale = 1 / np.sqrt(np.diag(a))
     normal = a * np.outer(scale, scale) + 1e-9 * np.eye(len(a))
     return np.asarray(-scale * np.linalg.solve(normal, g * scale))
+
+
+def _at_end(evidence: Linearized) -> NDArray[np.bool_]:
+    """Return which of the simulator's own parameters cannot go further, their tolerances or not.
+
+    A tolerance of half the value and more would take it below zero.
+    """
+    own = np.array([n[0] is None and n in evidence.at_bound for n in evidence.parameters])
+    least, most = _room(evidence)
+    # Not by its tolerance: that leaves room on both sides.
+    inside = np.minimum(-least, most) > _SLIGHT * (most - least)
+    return np.asarray(own & inside & np.isfinite(most - least))
 
 
 def _room(evidence: Linearized) -> tuple[Array, Array]:

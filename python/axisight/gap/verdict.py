@@ -116,9 +116,9 @@ def _shown(cause: ShownCause) -> NamedCause:
 
 
 def _strongest(found: Search) -> Standing | None:
-    """Return how candidates first stood where there was most to explain.
+    """Return how candidates stood where the first cause was taken in, by what other axes say, too.
 
-    Of what was taken in first, as it was judged then: by what other axes say, too.
+    Without a cause, where there was most to explain.
     """
     first = found.rounds[0]
     if first.accepted:
