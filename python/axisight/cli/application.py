@@ -22,7 +22,7 @@ _COMMANDS = {
     ),
     "blind": (
         "blind:blind_app",
-        "The withheld-effect benchmark: cases of another engine, diagnoses, a score.",
+        "The withheld-effect benchmark: cases of other engines, diagnoses, a score.",
     ),
     "montecarlo": (
         "montecarlo:montecarlo_command",
