@@ -12,14 +12,18 @@ from axisight.effects import effect_info
 from axisight.gap import Settings
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.scales import NaturalSizes
-from axisight.gap.score import linear_gain
-from axisight.gap.screening import Bench
+from axisight.gap.screening import Bench, Screen
 
 
-def logs_of(robot: Robot, effects: list[Effect], seconds: float = 4.0) -> list[Log]:
-    """A log of moves and one of a multisine."""
+def logs_of(
+    robot: Robot, effects: list[Effect], seconds: float = 4.0, *, moving: bool = False
+) -> list[Log]:
+    """A log of moves and one of a multisine; or logs of moves only."""
     rng = np.random.default_rng(1)
-    found = [point_to_point(rng, robot)["moves_1"], multisines(rng, robot)["multisine_fresh"]]
+    moves = point_to_point(rng, robot)
+    found = [moves["moves_1"], multisines(rng, robot)["multisine_fresh"]]
+    if moving:
+        found = [x for x in moves.values() if x[0] == "estimation"]
     out = []
     for run, (_, reference) in enumerate(found):
         ref = reference[: round(seconds / robot.sample_time_s)]
@@ -50,8 +54,8 @@ def test_a_large_robot_has_the_sizes_of_the_table():
         info = effect_info(name)
         effect = Effect(name, None if info.scope == "arm" else 1)
         for p in info.parameters:
-            # Two seconds do not show all of its torque.
-            assert 0.5 * p.typical < sizes.of(effect, p.name) <= p.typical or p.typical == 0
+            # Two seconds do not show all of its torque; within a factor, the table's.
+            assert 0.05 * p.typical < sizes.of(effect, p.name) <= p.typical
 
 
 def test_a_small_robot_has_sizes_of_its_own(small: Robot):
@@ -59,26 +63,40 @@ def test_a_small_robot_has_sizes_of_its_own(small: Robot):
     sizes = NaturalSizes(small, logs)
     largest = [max(np.abs(log.torque_nm[:, i]).max() for log in logs) for i in range(3)]
     friction = sizes.of(Effect("coulomb_friction", 2), "coulomb_nm")
-    assert friction == pytest.approx(0.25 * largest[1]) and friction < 0.1
+    assert friction == pytest.approx(0.02 * largest[1]) and friction < 0.01
     # A ball screw of 4e6 N/m gives way by micrometres; what a shape is, stays what it is.
-    assert sizes.of(Effect("backlash", 3), "half_width_rad") < 2e-5
+    assert sizes.of(Effect("backlash", 3), "half_width_rad") < 2e-6
     assert sizes.of(Effect("coulomb_friction", 2), "smoothing_rad_s") == 0.1
-    assert sizes.of(Effect("payload", None), "mass_kg") == pytest.approx(0.25 * 3.0)
+    assert sizes.of(Effect("payload", None), "mass_kg") == pytest.approx(0.02 * 3.0)
     assert sizes.of(Effect("torque_constant", 2), "relative_error") == 0.05
     still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]
     assert NaturalSizes(small, still).of(Effect("coulomb_friction", 2), "coulomb_nm") == 0.5
 
 
-def test_a_small_robots_friction_promises_what_a_fit_gains(small: Robot):
+@pytest.mark.parametrize(
+    ("truth", "moving"),
+    [
+        (Effect("friction_warmup", 1, {"viscous_nm_s_rad": -6e-4, "time_constant_s": 2.0}), False),
+        # Of slow motions only, whose low frequencies are quiet.
+        (Effect("viscous_friction", 3, {"viscous_nm_s_rad": 9e-5}), True),
+    ],
+)
+def test_a_small_robots_friction_promises_what_a_fit_gains(
+    truth: Effect, moving: bool, small: Robot
+):
     # With sizes of large robots half of the blocks had no derivative, and friction no promise.
-    truth = Effect("friction_warmup", 1, {"viscous_nm_s_rad": -6e-4, "time_constant_s": 2.0})
-    view = ClosedLoopView(small, logs_of(small, [truth]), Settings())
+    logs = logs_of(small, [truth], 10.0 if moving else 4.0, moving=moving)
+    view = ClosedLoopView(small, logs, Settings())
     base = view.fitter.fit([])
-    option = next(c for c in view.candidates(base) if c.effect.label == "friction_warmup@1")
+    option = next(c for c in view.candidates(base) if c.effect.label == truth.label)
     fitted = view.fitter.fit([option], base)
     gained = base.total - fitted.total
     assert gained > 0.9 * base.total
-    assert linear_gain(view.fitter.evaluate([option], base)) > 0.8 * gained
+    # As it is screened: beside others, any of which could make a block count as chaotic.
+    screen = Screen(Bench(view.fitter, base))
+    starts = [s for group in screen.groups(view.candidates(base)) for s in screen.starts(group)]
+    (promised,) = (s.gain for s in starts if s.option.effect.label == truth.label)
+    assert promised > 0.8 * gained
 
 
 def test_a_simulator_that_cannot_follow_as_it_is_does_not_end_a_diagnosis(small: Robot):

@@ -16,8 +16,9 @@ from axisight.effects import Effect, effect_info
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Of the torque, the inertia or the mass that is there: more is beyond a fault of a model.
-_SHARE = 0.25
+# Of the torque, the inertia or the mass that is there, as production scatter is of parameters. In quiet logs of
+# slow motions a quarter of a small torque is a thousand times the noise, and would count as chaos.
+_SHARE = 0.02
 # Samples over which a speed is taken: noise of the angle is none.
 _APART = 20
 
