@@ -76,16 +76,26 @@ def test_they_are_said_and_others_are_not():
 def test_a_score_takes_one_for_the_other_and_nothing_else():
     def judged(withheld: str, named: str):
         effect = {"effect": withheld, "axis": 1, "parameters": {}}
-        found = {"effect": named, "axis": 1, "parameters": {}, "probability": 0.8}
+        found = {
+            "effect": named,
+            "axis": 1,
+            "parameters": {},
+            "probability": 0.8,
+            "gap_reduction": {"value": 1.0},
+        }
         verdict = {
             "verdict": "explained",
             "causes": [found],
             "alternatives": [],
             "equivalent": [],
             "where": [],
+            "detection_limits": [],
         }
-        return _judged("case", {"effects": [effect], "severity": [9.0]}, verdict)
+        setting = {"engine": "mujoco", "arm": "lever_like", "motions": "moves"}
+        return _judged("case", {"effects": [effect], "severity": [9.0], **setting}, verdict)
 
     assert judged("sensor_delay", "input_delay").truth == ("input_delay@1",)
+    # What is said of one counts for both: four fifths are all of it.
+    assert judged("sensor_delay", "input_delay").probabilities == pytest.approx((1.0,))
     assert judged("sensor_delay", "backlash").truth == ("sensor_delay@1",)
     assert judged("backlash", "input_delay").truth == ("backlash@1",)
