@@ -28,6 +28,24 @@ def reference(kind: str, seed: int, n: int, sample_time_s: float) -> np.ndarray:
     return (np.minimum(time / 0.1, 1.0) * 6.0 * (0.7 * wave / np.abs(wave).max() + square))[:, None]
 
 
+def log_of(
+    machine: Robot, effects: list[Effect], reference: np.ndarray, run: int, name: str = ""
+) -> Log:
+    """The log of a simulated run along a velocity reference (n, n_axes)."""
+    data = simulate(machine, reference, effects=effects, noise_seed=5, run=run)
+    assert data.attrs["status"] == "completed"
+    name = name or f"run{run}"
+    return Log(
+        name=name,
+        source=Path(f"{name}.parquet"),
+        sample_time_s=machine.sample_time_s,
+        time_s=data.time.values,
+        velocity_ref_rad_s=reference,
+        torque_nm=data.torque_cmd_nm.values,
+        position_rad=data.position_rad.values,
+    )
+
+
 def logs_of(
     machine: Robot,
     effects: list[Effect],
@@ -39,19 +57,7 @@ def logs_of(
     n = int(seconds / machine.sample_time_s)
     for run, (name, (kind, seed)) in enumerate(plan.items()):
         ref = reference(kind, seed, n, machine.sample_time_s)
-        data = simulate(machine, ref, effects=effects, noise_seed=5, run=run)
-        assert data.attrs["status"] == "completed"
-        out.append(
-            Log(
-                name=name,
-                source=Path(f"{name}.parquet"),
-                sample_time_s=machine.sample_time_s,
-                time_s=data.time.values,
-                velocity_ref_rad_s=ref,
-                torque_nm=data.torque_cmd_nm.values,
-                position_rad=data.position_rad.values,
-            )
-        )
+        out.append(log_of(machine, effects, ref, run, name))
     return out
 
 

@@ -1,18 +1,18 @@
 """Natural sizes: what is a lot on a large robot and on a small one, and what hangs on it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from axisight import Effect, Log, Robot, load_robot, simulate
+from axisight import Effect, Log, Robot, load_robot
 from axisight.blind.motions import multisines, point_to_point
 from axisight.effects import effect_info
 from axisight.gap import Settings
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.screening import Bench, Screen
+from gap_data import log_of
 
 
 def logs_of(
@@ -24,22 +24,8 @@ def logs_of(
     found = [moves["moves_1"], multisines(rng, robot)["multisine_fresh"]]
     if moving:
         found = [x for x in moves.values() if x[0] == "estimation"]
-    out = []
-    for run, (_, reference) in enumerate(found):
-        ref = reference[: round(seconds / robot.sample_time_s)]
-        data = simulate(robot, ref, effects=effects, noise_seed=5, run=run)
-        out.append(
-            Log(
-                name=f"run{run}",
-                source=Path(f"run{run}.parquet"),
-                sample_time_s=robot.sample_time_s,
-                time_s=data.time.values,
-                velocity_ref_rad_s=ref,
-                torque_nm=data.torque_cmd_nm.values,
-                position_rad=data.position_rad.values,
-            )
-        )
-    return out
+    n = round(seconds / robot.sample_time_s)
+    return [log_of(robot, effects, ref[:n], run) for run, (_, ref) in enumerate(found)]
 
 
 @pytest.fixture(scope="module")

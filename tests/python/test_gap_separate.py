@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from axisight import Diagnosis, Effect, Log, Robot, Settings, diagnose, simulate
+from axisight import Diagnosis, Effect, Log, Settings, diagnose
 from axisight.blind.case_files import CaseFolder
 from axisight.cli import app
 from axisight.excitation import read_references
@@ -16,7 +16,7 @@ from axisight.gap.model import FreeEffect
 from axisight.gap.separate.design import separating
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
-from gap_data import bare_axis, scattered
+from gap_data import bare_axis, log_of, scattered
 
 
 def one_way(seed: int, n: int, sample_time_s: float) -> np.ndarray:
@@ -26,20 +26,6 @@ def one_way(seed: int, n: int, sample_time_s: float) -> np.ndarray:
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
     wave = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
     return (np.minimum(time / 0.1, 1.0) * (10.0 + 2.0 * wave / np.abs(wave).max()))[:, None]
-
-
-def log_of(machine: Robot, effects: list[Effect], reference: np.ndarray, run: int) -> Log:
-    data = simulate(machine, reference, effects=effects, noise_seed=5, run=run)
-    assert data.attrs["status"] == "completed"
-    return Log(
-        name=f"run{run}",
-        source=Path(f"run{run}.parquet"),
-        sample_time_s=machine.sample_time_s,
-        time_s=data.time.values,
-        velocity_ref_rad_s=reference,
-        torque_nm=data.torque_cmd_nm.values,
-        position_rad=data.position_rad.values,
-    )
 
 
 FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.05, "smoothing_rad_s": 0.1})

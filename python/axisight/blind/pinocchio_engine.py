@@ -5,7 +5,7 @@ Motors, gears and formulas are ours, in arrays over the runs; Runge-Kutta steps 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -150,8 +150,8 @@ class _Loop:
         )
         holding = np.tile(weight[self.joints] * self.ratio, (runs, 1))
         self.controller = Controller(machine, self.state[0], holding)
-        for axis, formula in self.formulas:
-            formula.begin(self._places(self.state, [axis])[axis], self.step_s)
+        for _, formula, at in self._places(self.state, self.time_s):
+            formula.begin(at, self.step_s)
 
     def _balanced(self, at: Array) -> tuple[Array, Array]:
         """Return the joint angles at rest with driven joints as given, and the torques that hold them."""
@@ -200,29 +200,18 @@ class _Loop:
         ]
         self.state = _ahead(self.state, mean, h)
         self.time_s = t + h
-        if self.formulas:
-            places = self._places(self.state, {axis for axis, _ in self.formulas})
-            for axis, formula in self.formulas:
-                formula.moved(places[axis])
+        for _, formula, at in self._places(self.state, self.time_s):
+            formula.moved(at)
 
-    def _places(self, state: _State, axes: Sequence[int] | set[int]) -> dict[int, Place]:
-        """Return where some axes are."""
+    def _places(self, state: _State, time_s: float) -> Iterator[tuple[int, Formula, Place]]:
+        """Yield every formula with its axis and where that is."""
         motor, joint, motor_speed, joint_speed = state
-        out = {}
-        for axis in axes:
+        for axis, formula in self.formulas:
             ratio, k = float(self.ratio[axis]), self.joints[axis]
-            deflection = ratio * motor[:, axis] - joint[:, k]
-            rate = ratio * motor_speed[:, axis] - joint_speed[:, k]
-            out[axis] = self._place(
-                axis, self.time_s, motor[:, axis], motor_speed[:, axis], deflection, rate
-            )
-        return out
-
-    def _place(
-        self, axis: int, time_s: float, motor: Array, speed: Array, deflection: Array, rate: Array
-    ) -> Place:
-        gear = float(self.stiffness[axis]), float(self.damping[axis])
-        return Place(time_s, motor, speed, deflection, rate, float(self.ratio[axis]), *gear)
+            phi, speed = motor[:, axis], motor_speed[:, axis]
+            deflection, rate = ratio * phi - joint[:, k], ratio * speed - joint_speed[:, k]
+            gear = float(self.stiffness[axis]), float(self.damping[axis])
+            yield axis, formula, Place(time_s, phi, speed, deflection, rate, ratio, *gear)
 
     def _rates(self, state: _State, drive: Array, time_s: float) -> Sequence[Array]:
         """Return the rates of a state under torques of the drives."""
@@ -233,15 +222,7 @@ class _Loop:
         on_motor = drive - self.viscous * motor_speed - self.ratio * gear
         on_joint = -self.springs * joint - self.dampers * joint_speed
         on_joint[:, self.joints] += gear
-        for axis, formula in self.formulas:
-            at = self._place(
-                axis,
-                time_s,
-                motor[:, axis],
-                motor_speed[:, axis],
-                deflection[:, axis],
-                rate[:, axis],
-            )
+        for axis, formula, at in self._places(state, time_s):
             more, joint_more = formula.torque(at)
             on_motor[:, axis] += more
             on_joint[:, self.joints[axis]] += joint_more
