@@ -2,23 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from axisight.blind import formulas
-from axisight.blind.machine import Native
-from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, unloaded
+from axisight.blind.formulas import Formula
+from axisight.blind.machine import NOTHING, Native
+from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign
 from axisight.blind.withheld import KINDS
 
 # Angle of a motor over which dry friction comes after a reversal.
 _STRAIN_RAD = 2e-3
 
 
-def _coulomb(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = between(rng, 0.2, 0.7) * scene.torque(axis)
-    law = formulas.DahlFriction(size, size / _STRAIN_RAD)
-    return Drawn("coulomb_friction", axis, {"coulomb_nm": size}, laws=[law])
+Law = Callable[[Rng, Scene, int, Mapping[str, float]], Formula]
+
+
+def _by(name: str, law: Law) -> Kind:
+    """Return a kind of `withheld`, as large and where it is there, by another law (of its values)."""
+    kind = KINDS[name]
+
+    def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
+        drawn = kind.draw(rng, scene, axis)
+        laws = [law(rng, scene, axis, drawn.parameters)]
+        # What MuJoCo makes by itself, the law makes here.
+        return replace(drawn, laws=laws, native=NOTHING)
+
+    return replace(kind, draw=draw)
+
+
+def _dahl(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
+    size = values["coulomb_nm"]
+    return formulas.DahlFriction(size, size / _STRAIN_RAD)
+
+
+def _knee(_rng: Rng, scene: Scene, axis: int, values: Mapping[str, float]) -> Formula:
+    return formulas.RoundedKnee(values["step"] * scene.stiffness(axis), values["knee_rad"])
+
+
+def _gear_error(rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
+    phase = float(rng.uniform(0, 2 * np.pi))
+    return formulas.GearError(values["order"], values["amplitude_rad"], phase)
+
+
+def _stale(_rng: Rng, scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
+    return formulas.StaleSensor(round(values["delay_s"] / scene.robot.sample_time_s))
+
+
+def _tone(rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
+    phase = float(rng.uniform(0, 2 * np.pi))
+    return formulas.Tone(values["amplitude_nm"], values["frequency_hz"], phase)
 
 
 def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -30,35 +65,11 @@ def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("stribeck_friction", axis, values, laws=[law])
 
 
-def _load_friction(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    share = between(rng, 0.03, 0.1)
-    law = formulas.ArctanLoadFriction(share, 0.1)
-    return Drawn("load_dependent_friction", axis, {"coefficient": share}, laws=[law])
-
-
-def _warmup(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    own = scene.of_joint(axis, "viscous_friction")
-    size, time = -own * between(rng, 0.4, 0.8), between(rng, 2.0, 6.0)
-    values = {"viscous_nm_s_rad": size, "time_constant_s": time}
-    return Drawn("friction_warmup", axis, values, laws=[formulas.WarmingFriction(size, time)])
-
-
-def _backlash(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    width = between(rng, 0.8e-4, 4e-4) * scene.play(axis)
-    return Drawn("backlash", axis, {"half_width_rad": width}, laws=[formulas.Play(width)])
-
-
 def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
     cubic = between(rng, 1.1e5, 8e5) * scene.stiffness(axis) / scene.deflection(axis) ** 2
     law = formulas.HardeningSpring(cubic)
     # Where higher orders of the sine join, the library's cube is another one.
     return Drawn("nonlinear_stiffness", axis, {"third_order_nm_rad3": cubic}, laws=[law])
-
-
-def _knee(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    step, knee = between(rng, 0.4, 1.2), between(rng, 1e-4, 5e-4) * scene.deflection(axis)
-    law = formulas.RoundedKnee(step * scene.stiffness(axis), knee)
-    return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
 
 
 def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -67,12 +78,6 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
     law = formulas.DahlGear(stiff, stiff * slip)
     values = {"share": share, "deflection_rad": slip}
     return Drawn("gear_hysteresis", axis, values, Native(spring=-share), [law])
-
-
-def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = between(rng, 0.7e-4, 2e-4) * scene.play(axis)
-    law = formulas.GearError(2.0, size, float(rng.uniform(0, 2 * np.pi)))
-    return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
 
 
 def _torque_ripple(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -105,57 +110,9 @@ def _delay(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[formulas.DelayLine(delay)])
 
 
-def _late_sensor(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    samples = int(rng.integers(1, 4))
-    values = {"delay_s": samples * scene.robot.sample_time_s}
-    return Drawn("sensor_delay", axis, values, laws=[formulas.StaleSensor(samples)])
-
-
 def _lag(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     lag = between(rng, 0.6e-3, 3e-3)
     return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag}, Native(lag_s=lag))
-
-
-def _offset(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = sign(rng) * between(rng, 0.3, 1.0) * scene.torque(axis)
-    law = formulas.ConstantTorque(size)
-    return Drawn("torque_offset", axis, {"offset_nm": size}, laws=[law])
-
-
-def _reported(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    share = sign(rng) * between(rng, 0.03, 0.1)
-    law = formulas.WrongReport(share=1 + share)
-    return Drawn("torque_sensor_gain", axis, {"relative_error": share}, laws=[law])
-
-
-def _reported_less(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = sign(rng) * between(rng, 0.3, 1.0) * scene.torque(axis)
-    law = formulas.WrongReport(less_nm=size)
-    return Drawn("torque_sensor_offset", axis, {"offset_nm": size}, laws=[law])
-
-
-def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    limit = float(rng.uniform(0.75, 0.9) * scene.largest_nm[axis - 1])
-    law = formulas.CurrentLimit(limit)
-    return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[law])
-
-
-def _deadband(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    width = between(rng, 0.2, 0.6) * scene.torque(axis)
-    return Drawn("torque_deadband", axis, {"width_nm": width}, laws=[formulas.DeadZone(width)])
-
-
-def _tone(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size, frequency = between(rng, 0.3, 1.0) * scene.torque(axis), float(rng.uniform(3.0, 30.0))
-    law = formulas.Tone(size, frequency, float(rng.uniform(0, 2 * np.pi)))
-    values = {"amplitude_nm": size, "frequency_hz": frequency}
-    return Drawn("outside_tone", axis, values, laws=[law])
-
-
-def _friction_step(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    size = between(rng, 0.4, 0.9) * scene.torque(axis)
-    law = formulas.LateFriction(size, 0.1, 5.0)
-    return Drawn("friction_step", axis, {"friction_nm": size}, laws=[law])
 
 
 def _quadratic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -174,29 +131,47 @@ def _push(rng: Rng, scene: Scene, axis: int) -> Drawn:
 # Cubic dampers and what the tendons and the constraint solver of MuJoCo make are other formulas here.
 _SHARED = {name: kind for name, kind in KINDS.items() if name != "cubic_damper"}
 
-KINDS_BY_FORMULA: Mapping[str, Kind] = _SHARED | {
-    "coulomb_friction": Kind(_coulomb),
-    "stribeck_friction": Kind(_stribeck),
-    "load_dependent_friction": Kind(_load_friction),
-    "friction_warmup": Kind(_warmup),
-    "backlash": Kind(_backlash),
-    "nonlinear_stiffness": Kind(_cubic),
-    "piecewise_stiffness": Kind(_knee, axes=unloaded),
-    "gear_hysteresis": Kind(_hysteresis),
-    "transmission_error": Kind(_transmission),
-    "torque_ripple": Kind(_torque_ripple),
-    "resolver_ripple": Kind(_resolver_ripple),
-    "input_delay": Kind(_delay),
-    "sensor_delay": Kind(_late_sensor),
-    "actuator_bandwidth": Kind(_lag),
-    "torque_offset": Kind(_offset),
-    "torque_sensor_gain": Kind(_reported),
-    "torque_sensor_offset": Kind(_reported_less),
-    "torque_saturation": Kind(_limit),
-    "torque_deadband": Kind(_deadband, axes=unloaded),
-    "outside_tone": Kind(_tone, in_library=False),
-    "friction_step": Kind(_friction_step, in_library=False),
-    "quadratic_damper": Kind(_quadratic_damper, in_library=False),
-    "push": Kind(_push, in_library=False),
-}
+KINDS_BY_FORMULA: Mapping[str, Kind] = (
+    _SHARED
+    | {
+        name: _by(name, law)
+        for name, law in {
+            "coulomb_friction": _dahl,
+            "load_dependent_friction": lambda _r, _s, _a, v: formulas.ArctanLoadFriction(
+                v["coefficient"], 0.1
+            ),
+            "friction_warmup": lambda _r, _s, _a, v: formulas.WarmingFriction(
+                v["viscous_nm_s_rad"], v["time_constant_s"]
+            ),
+            "backlash": lambda _r, _s, _a, v: formulas.Play(v["half_width_rad"]),
+            "piecewise_stiffness": _knee,
+            "transmission_error": _gear_error,
+            "sensor_delay": _stale,
+            "torque_offset": lambda _r, _s, _a, v: formulas.ConstantTorque(v["offset_nm"]),
+            "torque_sensor_gain": lambda _r, _s, _a, v: formulas.WrongReport(
+                share=1 + v["relative_error"]
+            ),
+            "torque_sensor_offset": lambda _r, _s, _a, v: formulas.WrongReport(
+                less_nm=v["offset_nm"]
+            ),
+            "torque_saturation": lambda _r, _s, _a, v: formulas.CurrentLimit(v["limit_nm"]),
+            "torque_deadband": lambda _r, _s, _a, v: formulas.DeadZone(v["width_nm"]),
+            "outside_tone": _tone,
+            "friction_step": lambda _r, _s, _a, v: formulas.LateFriction(
+                v["friction_nm"], 0.1, 5.0
+            ),
+        }.items()
+    }
+    | {
+        "stribeck_friction": Kind(_stribeck),
+        "nonlinear_stiffness": Kind(_cubic),
+        "gear_hysteresis": Kind(_hysteresis),
+        "torque_ripple": Kind(_torque_ripple),
+        "resolver_ripple": Kind(_resolver_ripple),
+        "input_delay": Kind(_delay),
+        "actuator_bandwidth": Kind(_lag),
+        "quadratic_damper": Kind(_quadratic_damper, in_library=False),
+        "push": Kind(_push, in_library=False),
+    }
+)
 """By name."""
