@@ -723,7 +723,7 @@ def fit_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array]],
+    records: Sequence[tuple[_Array, _Array, _Array | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -735,9 +735,10 @@ def fit_simulation(
 ) -> FitResult:
     """Fit a free-running simulation to logs.
 
-    ``records`` are pairs (input, target) of shape (n_samples, n_axes), one per log: a velocity
+    ``records`` are (input, target, certainty) of shape (n_samples, n_axes), one per log: a velocity
     reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or measured motor
-    position [rad], as ``input`` and ``output`` say. Every log starts at rest at the operating
+    position [rad], as ``input`` and ``output`` say; the certainty, from 0 to 1, is a factor on the
+    weighted error of its sample, None for one everywhere. Every log starts at rest at the operating
     point. ``weighting`` has one entry per axis. ``warm`` gives Jacobian columns (n_residuals,)
     of nuisance parameters from an earlier fit, by parameter index (from 0).
     """
@@ -766,7 +767,7 @@ def evaluate_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array]],
+    records: Sequence[tuple[_Array, _Array, _Array | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -785,7 +786,7 @@ def courses(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array]],
+    records: Sequence[tuple[_Array, _Array, _Array | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Effect, Robot, _core, load_robot
+from axisight import Effect, InputError, Robot, _core, load_robot
 from axisight.effects import core_effects
 from axisight.fitting.simulation_error import (
     FitOptions,
@@ -26,11 +26,11 @@ def robot() -> Robot:
 
 
 @pytest.fixture(scope="module")
-def record(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+def record(robot: Robot) -> tuple[np.ndarray, np.ndarray, None]:
     time = np.arange(1500) * robot.sample_time_s
     reference = (5.0 * np.sin(2 * np.pi * 3.0 * time))[:, None]
     run = simulate(robot, reference, noise_seed=1)
-    return reference, run["torque_cmd_nm"].values
+    return reference, run["torque_cmd_nm"].values, None
 
 
 def parameters(robot: Robot) -> list[Parameter]:
@@ -72,6 +72,52 @@ def test_jacobian_is_the_slope_of_the_residual(robot, record):
     slope = (ends[0] - ends[1]) / (2 * step)
     # Truncation of central differences: 1e-10 of third derivatives; friction is smoothed.
     np.testing.assert_allclose(jacobian[0], slope, atol=1e-4 * np.abs(slope).max())
+
+
+def weighted(robot: Robot, record, weighting: Weighting) -> _core.Linearization:
+    chosen = parameters(robot)
+    return _core.evaluate_simulation(
+        robot.core, core_effects(EFFECTS), [core_spec(p, EFFECTS) for p in chosen], [record],
+        weighting.core(), FitOptions(block_s=0.1),
+    )  # fmt: skip
+
+
+# A loop's: low where the torque is large; 1500 is no multiple of the decimation.
+LOOP = Weighting(np.array([0.0, 20.0, 80.0]), np.array([[0.5, 2.0, 0.1]]), decimation=7)
+
+
+def test_certainty_is_a_factor_on_the_weighted_error_and_its_slopes(robot, record):
+    certainty = np.linspace(0.0, 1.0, 1500)[:, None]
+    whole = weighted(robot, record, LOOP)
+    part = weighted(robot, (*record[:2], certainty), LOOP)
+    kept = certainty[: 1500 // 7 * 7 : 7, 0]
+    np.testing.assert_array_equal(part.residual, whole.residual * kept)
+    np.testing.assert_array_equal(part.jacobian, whole.jacobian * kept)
+
+
+@pytest.mark.parametrize(
+    "certainty", [np.full((1500, 1), 1.1), np.full((1500, 1), np.nan), np.ones((1499, 1))]
+)
+def test_what_is_no_certainty_is_refused(robot, record, certainty):
+    with pytest.raises(InputError, match="certainty: expected"):
+        weighted(robot, (*record[:2], certainty), LOOP)
+
+
+@pytest.mark.parametrize("weighting", [LOOP, replace(LOOP, decimation=1)])
+def test_weighting_of_a_signal_is_that_of_the_core(robot, record, weighting):
+    moved = np.zeros((1500, 1))
+    noise = np.random.default_rng(0).normal(size=(1500, 1)).cumsum(axis=0)
+    core = _core.evaluate_inverse_dynamics(
+        robot.core, [], [], [(moved, moved, moved, noise, moved + 1)],
+        weighting.core(), FitOptions(),
+    )  # fmt: skip
+    flat = _core.evaluate_inverse_dynamics(
+        robot.core, [], [], [(moved, moved, moved, noise, moved + 1)],
+        Weighting.flat(1).core(), FitOptions(),
+    )  # fmt: skip
+    ours = weighting.of(flat.residual[:, None], robot.sample_time_s)[:, 0]
+    # Rounding of two transforms of 3000 points.
+    np.testing.assert_allclose(ours, core.residual, atol=1e-11 * np.abs(ours).max())
 
 
 def test_torque_of_a_motion_is_predicted(robot):

@@ -109,4 +109,4 @@ def test_what_the_simulator_gains_by_itself_on_some_logs_is_no_promise(view):
     gains = [s.gain for group in screen.groups(options) for s in screen.starts(group)]
     assert min(gains) < 0.05 * own
     # One that stands in for a parameter of the simulator loses what its prior pulled.
-    assert min(gains) > -0.01 * own
+    assert min(gains) > -0.05 * own

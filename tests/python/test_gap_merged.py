@@ -26,7 +26,7 @@ OFFSET = FreeEffect(Effect("torque_offset", 1, {"offset_nm": 0.0}), ("offset_nm"
 def found(real: list[Effect], free: list[FreeEffect]) -> tuple[Evidence, str | None]:
     """A fit with effects of a machine that has others, and what takes their place."""
     view = ClosedLoopView(
-        bare_axis(), logs_of(bare_axis(), real, PLAN, seconds=1.5), Settings(block_s=0.25)
+        bare_axis(), logs_of(bare_axis(), real, PLAN, seconds=3.0), Settings(block_s=0.5)
     )
     model = view.fitter.fit(free)
     floor = view.floor.expected[model.axis] * model.size

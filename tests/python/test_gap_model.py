@@ -339,7 +339,7 @@ def test_the_beginnings_of_logs_screen_as_the_whole():
     above = whole.loss - view.floor.expected[whole.axis] * whole.samples
     screen = thinned(Bench(view.fitter, whole), above, layout_of(whole))
     half = screen.model
-    assert [len(p) for p, _ in screen.fitter.records] == [len(log.time_s) // 2 for log in logs]
+    assert [len(p) for p, *_ in screen.fitter.records] == [len(log.time_s) // 2 for log in logs]
     # Blocks before the cut are those of the whole, but for what the weights smear over it.
     places = list(zip(whole.log.tolist(), whole.axis.tolist(), strict=True))
     for log in range(len(logs)):
@@ -356,7 +356,7 @@ def test_the_beginnings_of_logs_screen_as_the_whole():
     # Short logs are not cut.
     assert view.fitter.part([0]).begun(whole.part([0])) is not None
     short = copy(view.fitter)
-    short.records = [(p[:8000], t[:8000]) for p, t in view.fitter.records]
+    short.records = [(p[:8000], t[:8000], c[:8000]) for p, t, c in view.fitter.records]
     assert short.begun(whole) is None
 
 

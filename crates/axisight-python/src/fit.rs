@@ -171,8 +171,12 @@ fn linearize<P: Problem + Send>(
     })
 }
 
-/// Pairs (input, target) of arrays `(n, n_axes)`.
-type RecordTuple<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
+/// Input, target and certainty of a record, arrays `(n, n_axes)`.
+type RecordTuple<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    Option<PyReadonlyArray2<'py, f64>>,
+);
 
 /// What an error of simulation is made of, as Python hands it over.
 struct SimulationSpec<'a, 'py> {
@@ -198,10 +202,12 @@ impl SimulationSpec<'_, '_> {
     fn problem(self, cancel: &Arc<AtomicBool>) -> PyResult<SimulationErrorProblem> {
         let (robot, options) = (&self.robot.description, self.options);
         let n_axes = robot.n_axes();
-        let record = |(i, t): &RecordTuple<'_>| {
+        let record = |(i, t, c): &RecordTuple<'_>| {
+            let certainty = c.as_ref().map(|c| rows(c, "certainty", n_axes));
             Ok(Record {
                 input: rows(i, "input", n_axes)?,
                 target: rows(t, "target", n_axes)?,
+                certainty: certainty.transpose()?,
             })
         };
         let problem = SimulationErrorProblem {
@@ -237,7 +243,7 @@ impl SimulationSpec<'_, '_> {
     }
 }
 
-/// Fit the simulation of logs. `records` are pairs (input, target) of `(n, n_axes)` arrays.
+/// Fit the simulation of logs. `records` are (input, target, certainty or None) of `(n, n_axes)` arrays.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding

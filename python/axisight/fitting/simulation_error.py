@@ -60,6 +60,22 @@ class Weighting:
         """No weighting."""
         return cls(np.zeros(1), np.ones((n_axes, 1)))
 
+    def of(self, series: Array, sample_time_s: float) -> Array:
+        """Return signals (n, n_axes) weighted and decimated, (n // decimation, n_axes).
+
+        As the core does it: continued by reflection, zero phase.
+        """
+        kept = len(series) // self.decimation
+        whole = series[: kept * self.decimation]
+        spectrum = np.fft.rfft(np.concatenate([whole, whole[::-1]]), axis=0)[: kept + 1]
+        frequency = np.arange(kept + 1) / (2 * len(whole) * sample_time_s)
+        weight = [np.interp(frequency, self.frequency_hz, w) for w in self.weight]
+        spectrum *= np.stack(weight, axis=1) / np.sqrt(self.decimation)
+        if self.decimation > 1:
+            # Two frequencies meet at the new Nyquist frequency.
+            spectrum[-1] = 0.0
+        return np.asarray(np.fft.irfft(spectrum, 2 * kept, axis=0)[:kept])
+
     def core(self) -> list[tuple[list[float], list[float], int]]:
         """Return the tables as the compiled core takes them."""
         f = self.frequency_hz.tolist()
@@ -272,8 +288,8 @@ def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
     )
 
 
-def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array]]:
-    """Return (input, target) arrays of logs, in closed loop or driven by torque."""
+def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, None]]:
+    """Return (input, target, no certainty) of logs, in closed loop or driven by torque."""
     out = []
     for log in logs:
         reference = log.velocity_ref_rad_s
@@ -283,7 +299,7 @@ def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array]]:
             )
         pair = (reference, log.torque_nm) if closed else (log.torque_nm, log.position_rad)
         first, second = (np.ascontiguousarray(x, dtype=np.float64) for x in pair)
-        out.append((first, second))
+        out.append((first, second, None))
     return out
 
 

@@ -14,13 +14,17 @@ from axisight.effects import Effect, EffectTuple, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.feedback import loop_responses
+from axisight.gap.inverse import predicted_torque
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.motion import Motion, motion
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.own_controller import other_controllers
 from axisight.gap.settings import Settings
-from axisight.gap.torques import Variant
+from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
+from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -37,12 +41,14 @@ Complex = NDArray[np.complex128]
 # the log by more than waves of a ripple are long.
 TRACKING_SPEED = 1 / 3
 
+# Position [rad], torque [Nm] and certainty of a log, (n, n_axes).
+Record = tuple[Array, Array, Array | None]
 # Robot, effects, parameters, records and weights, as the core takes them.
 _Problem = tuple[
     _core.Robot,
     list[EffectTuple],
     list[Spec],
-    list[tuple[Array, Array]],
+    list[Record],
     list[tuple[list[float], list[float], int]],
 ]
 
@@ -62,7 +68,11 @@ class ClosedLoopView(View):
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
         kept_on_log = self.tracking.with_effects(own)
-        data = [(_contiguous(log.position_rad), _contiguous(log.torque_nm)) for log in logs]
+        certain = certainties(self.tracking, logs, floor.weighting)
+        data: list[Record] = [
+            (_contiguous(log.position_rad), _contiguous(log.torque_nm), c)
+            for log, c in zip(logs, certain, strict=True)
+        ]
         fitter = ClosedLoopFitter(
             kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
@@ -126,6 +136,36 @@ def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
+# Of the low-pass that speeds are taken with, where noise of the sensor is no motion; and of the one
+# below which most arms are rigid.
+_SPEED_HZ = 20.0
+_RIGID_HZ = 5.0
+
+
+def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Array]:
+    """Return how far a simulator can be asked to follow each sample of logs (n, n_axes).
+
+    Where a motor stands or turns round, dry friction leaves its torque open: no two laws agree there.
+    """
+    rate_s = logs[0].sample_time_s
+    highest = highest_cutoff_hz(rate_s)
+    speeds = [motion(log, min(_SPEED_HZ, highest))[1] for log in logs]
+    slow = [motion(log, min(_RIGID_HZ, highest)) for log in logs]
+
+    def rigid(at: Motion) -> Array:
+        return predicted_torque(tracking.with_effects([]), AS_GIVEN, at)
+
+    friction = sure_friction_nm(slow, rigid)
+    passed = _passed(tracking, weighting.frequency_hz)
+    weighting = replace(weighting, weight=weighting.weight * passed)
+    out = []
+    for speed in speeds:
+        left_open = open_errors(speed, friction, weighting, rate_s)
+        factor = np.repeat(certainty(left_open, np.ones(1)), weighting.decimation, axis=0)
+        out.append(_contiguous(np.pad(factor, ((0, len(speed) - len(factor)), (0, 0)), "edge")))
+    return out
+
+
 # Seconds that a log is not cut below.
 _LEAST_S = 4.0
 
@@ -137,13 +177,14 @@ class ClosedLoopFitter(ModelFitter):
     would be off; in a nonlinear one the simulator also stays in phase with the
     log, without which lost motion and stiction have no smooth error to fit. The controller is
     that of ``robot``, which need not be the machine's.
-    ``records``: (position [rad], torque [Nm]) of each log, (n, n_axes).
+    ``records``: position [rad] and torque [Nm] of each log, and how far a simulator can be asked to
+    follow it, (n, n_axes).
     """
 
     def __init__(
         self,
         robot: Robot,
-        records: list[tuple[Array, Array]],
+        records: list[Record],
         weighting: Weighting,
         tolerances: Mapping[str, float],
         block_s: float,
@@ -154,7 +195,18 @@ class ClosedLoopFitter(ModelFitter):
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
 
-    def along(self, records: list[tuple[Array, Array]]) -> ClosedLoopFitter:
+    def counted(self) -> Array | None:
+        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        if all(known is None for *_, known in self.records):
+            return None
+        step = self.weighting.decimation
+        parts: list[Array] = []
+        for position, _, known in self.records:
+            factor = np.ones_like(position) if known is None else known
+            parts += list(factor[: len(factor) // step * step : step].T ** 2)
+        return np.concatenate(parts)
+
+    def along(self, records: list[Record]) -> ClosedLoopFitter:
         """Return the same for other runs, as ``records`` are."""
         other = copy(self)
         other.records = records
@@ -162,9 +214,14 @@ class ClosedLoopFitter(ModelFitter):
 
     def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
         """Return the same for the first halves of the logs, if they are long enough, with a model."""
-        other = self.along([(p[: len(p) // 2], t[: len(t) // 2]) for p, t in self.records])
-        least = _LEAST_S / self.robot.sample_time_s
-        if min(len(p) for p, _ in other.records) < least:
+        halves = [len(p) // 2 for p, *_ in self.records]
+        other = self.along(
+            [
+                (p[:n], t[:n], None if c is None else c[:n])
+                for n, (p, t, c) in zip(halves, self.records, strict=True)
+            ]
+        )
+        if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None
         found = other.fit(model.free, model, max_iterations=0)
         # The very same values: fits of what this model screens begin at those of the whole.

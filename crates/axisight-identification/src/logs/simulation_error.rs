@@ -34,6 +34,9 @@ pub struct Record {
     pub input: Vec<f64>,
     /// Commanded torque [Nm] or measured position [rad], as the problem's output asks.
     pub target: Vec<f64>,
+    /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
+    /// follow there. `None`: one everywhere.
+    pub certainty: Option<Vec<f64>>,
 }
 
 /// What drives the simulation.
@@ -125,6 +128,9 @@ impl SimulationErrorProblem {
                     expected,
                     format!("{n} and {m} numbers"),
                 ));
+            }
+            if let Some(certainty) = &record.certainty {
+                check_certainty(i, certainty, n)?;
             }
             if let Some(k) = record.target.iter().position(|v| !v.is_finite()) {
                 let got = format!("{} at sample {}", record.target[k], k / n_axes);
@@ -308,10 +314,30 @@ impl SimulationErrorProblem {
                         b
                     };
                 }
+                if let Some(certainty) = &self.records[*record].certainty {
+                    let step = weighting.decimation * n_axes;
+                    let factors = certainty[axis..].iter().step_by(step);
+                    for quantity in &mut out {
+                        let values = quantity[slot].iter_mut().zip(factors.clone());
+                        values.for_each(|(x, factor)| *x *= factor);
+                    }
+                }
             }
         }
         out
     }
+}
+
+fn check_certainty(record: usize, certainty: &[f64], n: usize) -> Result<(), ProblemError> {
+    let field = format!("records[{record}].certainty");
+    if certainty.len() != n {
+        let got = certainty.len().to_string();
+        return Err(invalid(field, format!("{n} numbers, as the input"), got));
+    }
+    if let Some(bad) = certainty.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+        return Err(invalid(field, "from 0 to 1".into(), bad.to_string()));
+    }
+    Ok(())
 }
 
 /// One batch of logs as an evaluation goes through it.

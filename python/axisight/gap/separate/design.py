@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.excitation import References
-from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
+from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
 from axisight.gap.decide import log_ratio
 from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.search import Search
@@ -34,7 +34,7 @@ _TWICE, _REPEATS, _FOR_EVER = 2, 10, 1000
 class _Runs:
     """A machine on every motion: motor angles and torques, (n, n_axes) each; whether it stands them."""
 
-    records: list[tuple[Array, Array]]
+    records: list[Record]
     possible: NDArray[np.bool_]
 
 
@@ -130,8 +130,8 @@ def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most
     angle, torque = out["position_rad"].values, out["torque_cmd_nm"].values
     # One that broke off is NaN, and larger than anything.
     size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
-    records = [
-        (np.ascontiguousarray(q), np.ascontiguousarray(u))
+    records: list[Record] = [
+        (np.ascontiguousarray(q), np.ascontiguousarray(u), None)
         for q, u in zip(angle, torque, strict=True)
     ]
     return _Runs(records, (size <= _MARGIN * most).all(axis=1))
