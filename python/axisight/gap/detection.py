@@ -90,10 +90,15 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         return float(np.max(np.sqrt(s.losses(float(np.exp(log_size))) / shows))) - 1.0
 
     low, high = np.log(info.typical * _SPAN[0]), np.log(min(largest, info.typical * _SPAN[1]))
-    if missing(high) < 0.0:
+    # Where no parameter meets its bound what is missing grows as the size does; where one does, faster.
+    with np.errstate(divide="ignore"):
+        at_most = low - float(np.log1p(missing(low)))
+    if at_most > high and missing(high) < 0.0:
         # Larger than the effect can be: these logs do not show it at all.
         return DetectionLimit(effect.name, effect.axis, s.parameter, None, info.unit)
-    if missing(low) < 0.0:
-        low = scipy.optimize.brentq(missing, low, high, xtol=_PRECISION)
+    at_most = min(at_most, high)
+    if at_most > low:
+        bounded = missing(at_most) > _PRECISION
+        low = scipy.optimize.brentq(missing, low, at_most, xtol=_PRECISION) if bounded else at_most
     value = max(float(np.exp(low)), tolerated)
     return DetectionLimit(effect.name, effect.axis, s.parameter, value, info.unit)

@@ -29,9 +29,18 @@ class Stage:
         """Return the mean square (n_axes,) of each log."""
         return [b.mean(axis=0) for b in self.blocks]
 
-    def resampled(self, draws: Sequence[NDArray[np.int64]]) -> float:
-        """Return the mean square over logs and axes for resampled blocks."""
-        return float(np.mean([b[d].mean(axis=0) for b, d in zip(self.blocks, draws, strict=True)]))
+    def mean(self) -> float:
+        """Return the mean square over logs and axes."""
+        return float(np.mean(self.per_log()))
+
+    def resampled(self, picks: Sequence[NDArray[np.int64]]) -> Array:
+        """Return the same of resampled blocks (n_draws,), from numbers (n_draws, n_blocks) of each log."""
+        return np.asarray(
+            np.mean(
+                [b.mean(axis=1)[p].mean(axis=1) for b, p in zip(self.blocks, picks, strict=True)],
+                axis=0,
+            )
+        )
 
 
 def stage(
@@ -90,20 +99,16 @@ def gap_reduction(
     bootstrap; Künsch 1989, Annals of Statistics 17(3)).
     """
     rng = np.random.default_rng([seed, 0x676170])
-    counts = [len(b) for b in given.blocks]
+    picks = [rng.integers(0, len(b), (draws, len(b))) for b in given.blocks]
 
-    def ratio(mean: Callable[[Stage], float]) -> float:
-        explainable = mean(given) - mean(floor)
-        if not explainable > 0:
-            return 0.0
-        return float(np.clip((mean(earlier) - mean(later)) / explainable, 0.0, 1.0))
+    def ratio(of: Callable[[Stage], Array | float]) -> Array:
+        explainable = np.asarray(of(given) - of(floor))
+        removed = np.asarray(of(earlier) - of(later))
+        share = removed / np.where(explainable > 0, explainable, np.inf)
+        return np.clip(share, 0.0, 1.0)
 
-    samples = []
-    for _ in range(draws):
-        picks = [rng.integers(0, n, n) for n in counts]
-        samples.append(ratio(lambda s, p=picks: s.resampled(p)))  # type: ignore[misc]
-    low, high = np.quantile(samples, [0.025, 0.975])
-    value = ratio(lambda s: float(np.mean(s.per_log())))
+    low, high = np.quantile(ratio(lambda s: s.resampled(picks)), [0.025, 0.975])
+    value = float(ratio(Stage.mean))
     return Interval(value, float(min(low, value)), float(max(high, value)))
 
 
