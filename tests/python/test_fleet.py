@@ -171,3 +171,16 @@ def test_a_cluster_gives_the_same_bits_though_a_worker_dies(fleet, verdicts, tmp
     for path in sorted(verdicts[0].rglob("*.json")):
         there = tmp_path / "far" / path.relative_to(verdicts[0])
         assert there.read_bytes() == path.read_bytes()
+
+
+def test_linked_folders_are_folders_and_no_way_round(tmp_path: Path):
+    kept, day = tmp_path / "kept", tmp_path / "fleet" / "robot1"
+    (kept / "logs").mkdir(parents=True)
+    (kept / "case.toml").write_text("x")
+    (kept / "logs" / "a.csv").write_text("y")
+    day.mkdir(parents=True)
+    (day / "monday").symlink_to(kept, target_is_directory=True)
+    (kept / "logs" / "back").symlink_to(kept, target_is_directory=True)
+    (case,) = fleet_cases(tmp_path / "fleet")
+    assert (case.name, case.machine) == ("robot1/monday", "robot1")
+    assert case.files() == {"case.toml": b"x", "logs/a.csv": b"y"}

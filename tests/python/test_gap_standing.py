@@ -7,10 +7,11 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from axisight import Log, Robot, diagnose, load_robot
+from axisight import Effect, Log, Robot, diagnose, load_robot
 from axisight.blind.machine import Machine, Native
 from axisight.blind.mujoco_engine import run
 from axisight.fitting import Weighting
+from axisight.gap.intervals import intervals
 from axisight.gap.standstill import open_errors, sure_friction_nm
 from gap_data import scattered
 
@@ -61,6 +62,17 @@ def test_friction_that_sticks_is_named(logs):
     assert found.causes[0].family_probability > 0.95
     coulomb = found.causes[0].parameters["coulomb_nm"]
     assert coulomb.value == pytest.approx(FRICTION_NM, rel=0.1)
+
+
+def test_intervals_stay_within_what_an_effect_takes():
+    values = {"coulomb_nm": 0.3, "smoothing_rad_s": 0.01}
+    found = intervals(
+        Effect("coulomb_friction", 1, values), tuple(values), {"smoothing_rad_s": 9.0}
+    )
+    # The table of the effect: no speed below 1e-5 rad/s.
+    assert found["smoothing_rad_s"].low == 1e-5
+    assert found["smoothing_rad_s"].high == pytest.approx(0.01 + 1.96 * 9.0, rel=1e-6)
+    assert found["coulomb_nm"].low < 0.3 < found["coulomb_nm"].high
 
 
 def test_only_reversals_and_standstill_are_open():

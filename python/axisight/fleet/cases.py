@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,16 +25,16 @@ class FleetCase:
 
     def files(self) -> dict[str, bytes]:
         """Return every file of the case by its name with slashes."""
-        paths = (p for p in sorted(self.path.rglob("*")) if p.is_file())
+        paths = sorted(_files_below(self.path))
         return {p.relative_to(self.path).as_posix(): p.read_bytes() for p in paths}
 
 
 def fleet_cases(folder: Path) -> list[FleetCase]:
     """Return the cases anywhere below a folder, by name.
 
-    Raises InputError where there is none.
+    Folders that are links count as any. Raises InputError where there is none.
     """
-    paths = sorted(p.parent for p in folder.rglob("case.toml"))
+    paths = sorted(p.parent for p in _files_below(folder) if p.name == "case.toml")
     if not paths:
         raise InputError(f"{folder}: expected folders with a case.toml, got none")
     names = [p.relative_to(folder) for p in paths]
@@ -40,6 +42,15 @@ def fleet_cases(folder: Path) -> list[FleetCase]:
         FleetCase(n.as_posix(), n.parent.as_posix() if len(n.parts) > 1 else "", p)
         for n, p in zip(names, paths, strict=True)
     ]
+
+
+def _files_below(folder: Path) -> Iterator[Path]:
+    """Yield every file below a folder, through links too; one that leads back up is not followed."""
+    for place, inner, files in os.walk(folder, followlinks=True):
+        here = Path(place)
+        above = {here.resolve(), *here.resolve().parents}
+        inner[:] = [name for name in inner if (here / name).resolve() not in above]
+        yield from (here / name for name in files if (here / name).is_file())
 
 
 def fingerprint(files: dict[str, bytes], also: str) -> str:
