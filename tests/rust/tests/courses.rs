@@ -74,6 +74,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
         Record {
             input,
             target: run.command,
+            certainty: None,
         }
     };
     let records = LOGS.iter().map(record).collect();
@@ -300,6 +301,7 @@ fn courses_that_do_not_serve_are_left_alone() {
             .map(|n| Record {
                 input: vec![0.0; n],
                 target: vec![0.0; n],
+                certainty: None,
             })
             .collect(),
         weighting: vec![flat(1.0)],

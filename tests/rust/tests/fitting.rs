@@ -39,7 +39,11 @@ fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Record> {
         let input = torque(robot, n, size);
         let noise = measurement_noise(seed, run, n, 1, sigma);
         let target = trace(&plant, robot, Drive::Torque(&[&input]), &[&noise], METHOD).measured;
-        Record { input, target }
+        Record {
+            input,
+            target,
+            certainty: None,
+        }
     };
     [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)]
         .map(log)
@@ -167,7 +171,11 @@ fn three_axes_come_back_from_reference_driven_torque() {
     });
     let problem = SimulationErrorProblem {
         parameters: parameters.collect(),
-        records: vec![Record { input, target }],
+        records: vec![Record {
+            input,
+            target,
+            certainty: None,
+        }],
         robot,
         effects: Vec::new(),
         input: SimulationInput::Reference,
