@@ -13,6 +13,7 @@ from axisight.errors import InputError
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.model import Evidence, FreeEffect, Linearized
+from axisight.gap.score import linear_gain, linear_step
 from axisight.gap.screening import Bench, Screen, _first_halves, _tell, loudest_logs, thinned
 from gap_data import bare_axis, linear_evidence, logs_of, scattered
 
@@ -118,6 +119,7 @@ def numbered() -> Linearized:
         loss=np.array([3.0, 4.0]),
         prior_matrix=-entries,
         prior_gradient=-row,
+        room={(2, "c"): (-1.0, 2.0), (3, "d"): (-3.0, 4.0), (4, "f"): (-5.0, 6.0)},
     )
 
 
@@ -143,6 +145,30 @@ def test_one_candidate_of_several_keeps_its_own_columns(kept, fixed, columns, bo
     np.testing.assert_array_equal(one.prior_matrix, -entries)
     np.testing.assert_array_equal(one.prior_gradient, -np.array(columns, float))
     assert one.total == every.total
+    names = {2: (2, "c"), 3: (3, "d"), 4: (4, "f")}
+    assert one.room == {(2, names[kept][1]): every.room[names[kept]]}
+
+
+def test_a_step_takes_no_effect_beyond_what_it_can_be():
+    """Two columns nearly alike promise most with opposite signs; one of them cannot be negative."""
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(400, 2))
+    x[:, 1] = x[:, 0] + 0.1 * x[:, 1]
+    y = x @ [1.0, -0.4] + 0.01 * rng.normal(size=400)
+    found = replace(linear_evidence(x, y, np.repeat([0, 1], 200)), parameters=((0, "a"), (0, "b")))
+    # From nothing: the residual is what is missing.
+    starts = found.start
+    gradient = np.array([-(x[s : s + 20].T @ y[s : s + 20]) for s in starts])
+    loss = np.array([(y[s : s + 20] ** 2).sum() for s in starts])
+    found = replace(found, gradient=gradient, loss=loss)
+    np.testing.assert_allclose(linear_step(found), [1.0, -0.4], atol=0.05)
+    bounded = replace(found, room={(0, "b"): (0.0, 5.0)})
+    alone = float(x[:, 0] @ y / (x[:, 0] @ x[:, 0]))
+    np.testing.assert_allclose(linear_step(bounded), [alone, 0.0], atol=1e-6)
+    assert linear_gain(bounded) < linear_gain(found)
+    # A bound that it does not meet is none.
+    far = replace(found, room={(0, "b"): (-1.0, 5.0)})
+    np.testing.assert_array_equal(linear_step(far), linear_step(found))
 
 
 @pytest.mark.parametrize("near", [False, True], ids=["exact", "near"])

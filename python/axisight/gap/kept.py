@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.gap.model import Evidence, FreeEffect, Linearized
 
 Array = NDArray[np.float64]
@@ -100,6 +101,7 @@ class Bordered:
             loss=model.loss,
             prior_matrix=prior,
             prior_gradient=np.concatenate([model.prior_gradient[kept], pull]),
+            room={**model.room, **_room(option, len(model.free))},
         )
 
 
@@ -110,3 +112,15 @@ def _priors(option: FreeEffect) -> tuple[Array, Array]:
     precision = np.array([0.0 if p is None else p[1] ** -2 for p in priors])
     off = [0.0 if p is None else values[n] - p[0] for n, p in zip(option.free, priors, strict=True)]
     return precision, precision * np.array(off)
+
+
+def _room(option: FreeEffect, place: int) -> dict[tuple[int | None, str], tuple[float, float]]:
+    """Return how far down and up a candidate's parameters may go from its start values."""
+    values = option.effect.parameters or {}
+    found: dict[tuple[int | None, str], tuple[float, float]] = {}
+    for p in effect_info(option.effect.name).parameters:
+        if p.name in option.free:
+            least, most = option.bounds.get(p.name, (p.lower, p.upper))
+            low, high = max(least, p.lower), min(most, p.upper)
+            found[place, p.name] = (low - values[p.name], high - values[p.name])
+    return found

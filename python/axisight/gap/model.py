@@ -61,7 +61,8 @@ class Linearized:
     By block (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
     ``loss`` (n_blocks,); ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters``
     names the p columns: (None, robot parameter) or (effect position, parameter); ``jacobian`` has
-    them, of a model that was not fitted.
+    them, of a model that was not fitted. ``room``: how far down and up those of effects may go
+    from where they are, as far as that is known.
     """
 
     parameters: tuple[tuple[int | None, str], ...]
@@ -72,6 +73,9 @@ class Linearized:
     prior_matrix: Array
     prior_gradient: Array
     jacobian: tuple[_core.Column, ...] = field(default=(), kw_only=True)
+    room: Mapping[tuple[int | None, str], tuple[float, float]] = field(
+        default_factory=dict, kw_only=True
+    )
 
     @property
     def total(self) -> float:
@@ -103,6 +107,7 @@ class Linearized:
             prior_matrix=self.prior_matrix[pick],
             prior_gradient=self.prior_gradient[wanted],
             jacobian=tuple(self.jacobian[i] for i in wanted) if self.jacobian else (),
+            room={renamed(n): self.room[n] for n in names if n in self.room},
         )
 
 
@@ -475,6 +480,11 @@ def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) ->
         loss=result.block_loss,
         prior_matrix=np.diag(precision),
         prior_gradient=precision * (result.theta[columns] - mean),
+        room={
+            every[i]: (p.lower - float(at), p.upper - float(at))
+            for i, p, at in zip(columns, used, result.theta[columns], strict=True)
+            if p.effect is not None
+        },
     )
 
 
@@ -503,6 +513,7 @@ def _evidence(
         loss=at.loss,
         prior_matrix=at.prior_matrix,
         prior_gradient=at.prior_gradient,
+        room=at.room,
         effects=fitted,
         free=tuple(replace(f, effect=e) for f, e in zip(free, fitted, strict=True)),
         robot_values={p.name: float(result.theta[i]) for i, p in enumerate(setup.own)},

@@ -85,13 +85,16 @@ def linear_falls(evidence: Linearized) -> Array:
 def linear_step(evidence: Linearized) -> Array:
     """Return the step (n_parameters,) to the least of a parabola.
 
-    The simulator's own parameters go no further than their bounds, as in a fit: what would take
-    them beyond is an effect.
+    Parameters go no further than their bounds, as in a fit: what would take the simulator's own beyond
+    is an effect, and no effect is what it cannot be.
     """
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient.sum(axis=0) + evidence.prior_gradient
     movable = (np.diag(matrix) > 0) & ~_at_end(evidence)
     free, (least, most) = movable.copy(), _room(evidence)
+    # Bounds of effects are far: none of them says what is large.
+    own = np.array([n not in evidence.room for n in evidence.parameters], dtype=bool)
+    room = np.where(own & np.isfinite(most - least), most - least, 1.0)
     step = np.zeros(len(gradient))
     # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the
     # strongest pull first, where the slope leads back from it.
@@ -102,7 +105,7 @@ def linear_step(evidence: Linearized) -> Array:
             step[beyond] = np.clip(step, least, most)[beyond]
             free &= ~beyond
             continue
-        back = _pull_back(matrix, gradient, step, least, most)
+        back = _pull_back(matrix, gradient + matrix @ step, (step <= least, step >= most), room)
         back[~movable | free] = 0.0
         if not np.any(back > _SLIGHT):
             break
@@ -114,12 +117,12 @@ def linear_step(evidence: Linearized) -> Array:
 _SLIGHT = 1e-6
 
 
-def _pull_back(matrix: Array, gradient: Array, step: Array, least: Array, most: Array) -> Array:
-    """Return how hard the slope at a step pulls each parameter off its bound (n_parameters,) [1]."""
-    slope = gradient + matrix @ step
-    room = np.where(np.isfinite(most - least), most - least, 1.0)
+def _pull_back(
+    matrix: Array, slope: Array, at_ends: tuple[NDArray[np.bool_], NDArray[np.bool_]], room: Array
+) -> Array:
+    """Return how hard a slope pulls each parameter off its bounds (n_parameters,) [1]."""
     size = np.maximum(np.diag(matrix) * np.maximum(room, 1e-300), 1e-300)
-    at_least, at_most = step <= least, step >= most
+    at_least, at_most = at_ends
     return np.asarray(np.where(at_least, -slope, 0.0) / size + np.where(at_most, slope, 0.0) / size)
 
 
@@ -151,4 +154,9 @@ def _room(evidence: Linearized) -> tuple[Array, Array]:
     # How far it is from its nominal value already.
     off = evidence.prior_gradient * deviation**2
     reach = np.where(own, PRIOR_REACH * deviation, np.inf)
-    return np.minimum(-reach - off, 0.0), np.maximum(reach - off, 0.0)
+    known = np.array([evidence.room.get(n, (-np.inf, np.inf)) for n in evidence.parameters])
+    down, up = known.reshape(-1, 2).T
+    return (
+        np.minimum(np.maximum(-reach - off, down), 0.0),
+        np.maximum(np.minimum(reach - off, up), 0.0),
+    )
