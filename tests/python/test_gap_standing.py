@@ -5,11 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco")
-
 from axisight import Effect, Log, Robot, diagnose, load_robot
 from axisight.blind.machine import Machine, Native
-from axisight.blind.mujoco_engine import run
 from axisight.fitting import Weighting
 from axisight.gap.intervals import intervals
 from axisight.gap.standstill import open_errors, sure_friction_nm
@@ -33,12 +30,15 @@ def references(robot: Robot) -> list[np.ndarray]:
 
 @pytest.fixture(scope="module")
 def logs() -> list[Log]:
+    engine = pytest.importorskip(
+        "axisight.blind.mujoco_engine", reason="MuJoCo comes with the extra `blind`"
+    )
     robot = load_robot("lever_like").with_effects([])
     machine = Machine(scattered(robot, 1), {0: Native(friction_nm=FRICTION_NM)})
     rng = np.random.default_rng(1)
     along = references(robot)
     noises = [1e-5 * rng.normal(size=x.shape) for x in along]
-    ran = run(machine, along, noises)
+    ran = engine.run(machine, along, noises)
     return [
         Log(
             name=f"log{i}",

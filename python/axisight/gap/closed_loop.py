@@ -26,7 +26,7 @@ from axisight.gap.settings import Settings
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View
-from axisight.logs import Log
+from axisight.logs import Log, differentiate
 from axisight.robot import Robot
 from axisight.simulation import simulate_batch, white_noise
 
@@ -42,7 +42,7 @@ Complex = NDArray[np.complex128]
 TRACKING_SPEED = 1 / 3
 
 # Position [rad], torque [Nm] and certainty of a log, (n, n_axes).
-Record = tuple[Array, Array, Array | None]
+Record = tuple[Array, Array, Array]
 # Robot, effects, parameters, records and weights, as the core takes them.
 _Problem = tuple[
     _core.Robot,
@@ -69,7 +69,7 @@ class ClosedLoopView(View):
         own = [e for e in robot.effects if e.label not in after]
         kept_on_log = self.tracking.with_effects(own)
         certain = certainties(self.tracking, logs, floor.weighting)
-        data: list[Record] = [
+        data = [
             (_contiguous(log.position_rad), _contiguous(log.torque_nm), c)
             for log, c in zip(logs, certain, strict=True)
         ]
@@ -147,9 +147,10 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
 
     Where a motor stands or turns round, dry friction leaves its torque open: no two laws agree there.
     """
-    rate_s = logs[0].sample_time_s
-    highest = highest_cutoff_hz(rate_s)
-    speeds = [motion(log, min(_SPEED_HZ, highest))[1] for log in logs]
+    step_s = logs[0].sample_time_s
+    highest = highest_cutoff_hz(step_s)
+    cutoff = min(_SPEED_HZ, highest)
+    speeds = [differentiate(log.position_rad, step_s, cutoff)[0] for log in logs]
     slow = [motion(log, min(_RIGID_HZ, highest)) for log in logs]
 
     def rigid(at: Motion) -> Array:
@@ -160,7 +161,7 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
     weighting = replace(weighting, weight=weighting.weight * passed)
     out = []
     for speed in speeds:
-        left_open = open_errors(speed, friction, weighting, rate_s)
+        left_open = open_errors(speed, friction, weighting, step_s)
         factor = np.repeat(certainty(left_open, np.ones(1)), weighting.decimation, axis=0)
         out.append(_contiguous(np.pad(factor, ((0, len(speed) - len(factor)), (0, 0)), "edge")))
     return out
@@ -195,14 +196,11 @@ class ClosedLoopFitter(ModelFitter):
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
 
-    def counted(self) -> Array | None:
+    def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""
-        if all(known is None for *_, known in self.records):
-            return None
         step = self.weighting.decimation
         parts: list[Array] = []
-        for position, _, known in self.records:
-            factor = np.ones_like(position) if known is None else known
+        for *_, factor in self.records:
             parts += list(factor[: len(factor) // step * step : step].T ** 2)
         return np.concatenate(parts)
 
@@ -216,10 +214,7 @@ class ClosedLoopFitter(ModelFitter):
         """Return the same for the first halves of the logs, if they are long enough, with a model."""
         halves = [len(p) // 2 for p, *_ in self.records]
         other = self.along(
-            [
-                (p[:n], t[:n], None if c is None else c[:n])
-                for n, (p, t, c) in zip(halves, self.records, strict=True)
-            ]
+            [(p[:n], t[:n], c[:n]) for n, (p, t, c) in zip(halves, self.records, strict=True)]
         )
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
 from axisight.gap.model import Evidence, FreeEffect, Linearized
 
 Array = NDArray[np.float64]
@@ -117,10 +116,8 @@ def _priors(option: FreeEffect) -> tuple[Array, Array]:
 def _room(option: FreeEffect, place: int) -> dict[tuple[int | None, str], tuple[float, float]]:
     """Return how far down and up a candidate's parameters may go from its start values."""
     values = option.effect.parameters or {}
-    found: dict[tuple[int | None, str], tuple[float, float]] = {}
-    for p in effect_info(option.effect.name).parameters:
-        if p.name in option.free:
-            least, most = option.bounds.get(p.name, (p.lower, p.upper))
-            low, high = max(least, p.lower), min(most, p.upper)
-            found[place, p.name] = (low - values[p.name], high - values[p.name])
-    return found
+    limits = {name: option.limits(name) for name in option.free}
+    return {
+        (place, name): (least - values[name], most - values[name])
+        for name, (least, most) in limits.items()
+    }

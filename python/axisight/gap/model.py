@@ -53,6 +53,12 @@ class FreeEffect:
         """Return the same with other start values."""
         return replace(self, effect=self.effect.with_values(values))
 
+    def limits(self, name: str) -> tuple[float, float]:
+        """Return the least and the largest value of a parameter: beyond those of the effect there is no model."""
+        table = next(p for p in effect_info(self.effect.name).parameters if p.name == name)
+        least, most = self.bounds.get(name, (table.lower, table.upper))
+        return max(least, table.lower), min(most, table.upper)
+
 
 @dataclass(frozen=True)
 class Linearized:
@@ -437,9 +443,7 @@ class ModelFitter(ABC):
         self, effects: Sequence[Effect], i: int, free: FreeEffect, name: str
     ) -> Parameter:
         parameter = effect_parameter(effects, i, name)
-        # Beyond the bounds of the effect itself there is no model.
-        least, most = free.bounds.get(name, (parameter.lower, parameter.upper))
-        lower, upper = max(least, parameter.lower), min(most, parameter.upper)
+        lower, upper = free.limits(name)
         return replace(
             parameter,
             initial=min(max(parameter.initial, lower), upper),

@@ -95,6 +95,7 @@ def linear_step(evidence: Linearized) -> Array:
     # Bounds of effects are far: none of them says what is large.
     own = np.array([n not in evidence.room for n in evidence.parameters], dtype=bool)
     room = np.where(own & np.isfinite(most - least), most - least, 1.0)
+    size = np.maximum(np.diag(matrix) * np.maximum(room, 1e-300), 1e-300)
     step = np.zeros(len(gradient))
     # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the
     # strongest pull first, where the slope leads back from it.
@@ -105,7 +106,8 @@ def linear_step(evidence: Linearized) -> Array:
             step[beyond] = np.clip(step, least, most)[beyond]
             free &= ~beyond
             continue
-        back = _pull_back(matrix, gradient + matrix @ step, (step <= least, step >= most), room)
+        side = (step >= most).astype(float) - (step <= least)
+        back = side * (gradient + matrix @ step) / size
         back[~movable | free] = 0.0
         if not np.any(back > _SLIGHT):
             break
@@ -115,15 +117,6 @@ def linear_step(evidence: Linearized) -> Array:
 
 # Of the curvature times the room of a parameter: a slope that this small leads nowhere.
 _SLIGHT = 1e-6
-
-
-def _pull_back(
-    matrix: Array, slope: Array, at_ends: tuple[NDArray[np.bool_], NDArray[np.bool_]], room: Array
-) -> Array:
-    """Return how hard a slope pulls each parameter off its bounds (n_parameters,) [1]."""
-    size = np.maximum(np.diag(matrix) * np.maximum(room, 1e-300), 1e-300)
-    at_least, at_most = at_ends
-    return np.asarray(np.where(at_least, -slope, 0.0) / size + np.where(at_most, slope, 0.0) / size)
 
 
 def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Array:
