@@ -32,10 +32,10 @@ class Round(Trials):
         self.losses, self.waiting, self.asked = losses, [], []
         self.progress = lambda *_: None
 
-    def _fitted(self, start: Start):
-        label = start.option.effect.label
-        self.asked.append(label)
-        return SimpleNamespace(label=label, held_out=np.array(self.losses[label]))
+    def _fitted(self, pool, starts):
+        labels = [start.option.effect.label for start in starts]
+        self.asked += labels
+        return [SimpleNamespace(label=x, held_out=np.array(self.losses[x])) for x in labels]
 
     def fit(self, promises: dict[str, float]) -> list[str]:
         """Fit candidates with these promises; return the labels of those fitted."""
@@ -117,13 +117,15 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _worth_refining(self, trials, done, crooked):
             return [t for t in trials if t.label not in done]
 
-    def settled(fitter, free_, start):
+    def settled(fitter, free_, start, *, rough):
+        assert rough is None
         if start is whole.evidence:
             raise InputError("the simulation failed")
         return start
 
     field = Field({})
     field.bench = SimpleNamespace(skipped={})
+    field.screen = SimpleNamespace(bench=field.bench)
     field.fitter = None
     monkeypatch.setattr(trials, "settled", settled)
     monkeypatch.setattr(trials, "trial", lambda candidate, evidence: other)
@@ -154,4 +156,4 @@ def test_a_model_short_of_its_best_is_fitted_on():
     # Two blocks of twenty samples and a unit column: a slope s promises (2 s)^2 / 40.
     assert finished(3.0) == []
     (options,) = finished(3.3)
-    assert options["fine"] is True
+    assert options["worth"] == 1.0

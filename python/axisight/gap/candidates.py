@@ -20,27 +20,31 @@ Array = NDArray[np.float64]
 
 
 def situation(
-    robot: Robot,
     logs: Sequence[Log],
-    baseline: Evidence,
+    model: Evidence,
     decimation: int,
     response: Response,
     enough: Array,
+    before: Sequence[Sequence[Turning]] = (),
 ) -> Situation:
-    """Return the residual of a model and how the motors turned, by log and axis."""
+    """Return the residual of a model and how the motors turned, by log and axis.
+
+    ``before``: the same of another model, if there was one: motors turned as they did.
+    """
 
     def one(i: int, log: Log, axis: int) -> Turning:
-        mine = (baseline.log == i) & (baseline.axis == axis)
-        first = int(baseline.start[mine].min())
-        count = int(baseline.size[mine].sum())
+        mine = (model.log == i) & (model.axis == axis)
+        first = int(model.start[mine].min())
+        residual = model.residual[first : first + int(model.size[mine].sum())]
+        if before:
+            return before[i][axis].leaving(residual)
         position = log.position_rad[:, axis]
         speed = np.gradient(position, log.sample_time_s)
         # A short running mean takes the quantization and noise off the speed.
         speed = np.convolve(speed, np.ones(9) / 9, mode="same")
-        residual = baseline.residual[first : first + count]
         return turning(residual, position, speed, log.sample_time_s, decimation)
 
-    axes = range(robot.n_axes)
+    axes = range(logs[0].n_axes)
     turned = [[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)]
     return Situation(turned, response, enough)
 

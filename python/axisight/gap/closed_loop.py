@@ -18,7 +18,7 @@ from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.feedback import loop_responses
 from axisight.gap.inverse import predicted_torque
 from axisight.gap.limits import missing, reported, torque_limits
-from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.own_controller import other_controllers
@@ -210,18 +210,14 @@ class ClosedLoopFitter(ModelFitter):
         other.records = records
         return other
 
-    def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
-        """Return the same for the first halves of the logs, if they are long enough, with a model."""
+    def beginnings(self) -> ModelFitter | None:
+        """Return the same for the first halves of the logs, if they are long enough."""
         halves = [len(p) // 2 for p, *_ in self.records]
-        other = self.along(
-            [(p[:n], t[:n], c[:n]) for n, (p, t, c) in zip(halves, self.records, strict=True)]
-        )
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None
-        found = other.fit(model.free, model, max_iterations=0)
-        # The very same values: fits of what this model screens begin at those of the whole.
-        same = replace(found, robot_values=model.robot_values, log=np.unique(model.log)[found.log])
-        return other, same
+        return self.along(
+            [(p[:n], t[:n], c[:n]) for n, (p, t, c) in zip(halves, self.records, strict=True)]
+        )
 
     def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:
         """Return the problem as the core takes it."""

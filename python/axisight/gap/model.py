@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 # Share of the loss that another step of a fit has to be worth.
 _TOLERANCE = 1e-4
 _TRIAL_TOLERANCE = 1e-3
-# The same where what noise leaves open counts, which is a share of no loss.
-_FINE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -255,10 +253,27 @@ class ModelFitter(ABC):
         other._keep(logs)
         return other
 
-    def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
-        """Return the same for the beginnings of the logs, with a model as it is; None to take the whole."""
-        del model
+    def beginnings(self) -> ModelFitter | None:
+        """Return the same for the first halves of the logs; None where only the whole will do."""
         return None
+
+    def begun(self, model: Evidence) -> tuple[ModelFitter, Evidence] | None:
+        """Return the same for the first halves of the logs, with a model as it is; None to take the whole.
+
+        Its sensitivities are those of the whole, cut: weights smear little over the end.
+        """
+        other = self.beginnings()
+        if other is None:
+            return None
+        rows = _first_halves(model)
+        cut = {key: column.part(rows) for key, column in model.columns.items()}
+        setup = other._setup(
+            model.free, replace(model, columns=cut), None, [True] * len(model.free), lazy=True
+        )
+        found = other._solved(setup, model.free, other._options(), None, renewed=model.renewed)
+        # The very same values: fits of what this model screens begin at those of the whole.
+        same = replace(found, robot_values=model.robot_values, log=np.unique(model.log)[found.log])
+        return other, same
 
     def counted(self) -> Array | None:
         """Return what every residual counts for (n_residuals,), from 0 to 1; None where all are one."""
@@ -297,7 +312,7 @@ class ModelFitter(ABC):
         max_iterations: int = 15,
         refreshes: int = 0,
         fresh: bool = False,
-        fine: bool = False,
+        worth: float | None = None,
     ) -> Evidence:
         """Fit the simulator's own parameters and the effects ``free``.
 
@@ -307,7 +322,8 @@ class ModelFitter(ABC):
         sensitivities from ``start``; else they are computed where the fit begins, and
         ``refreshes`` times anew where it has settled: small changes of masses and stiffness
         hardly bend them. ``fresh`` computes them at every step, for effects that do bend them.
-        ``near`` are `runs` of a model close by. ``fine`` follows flat valleys to their lowest place.
+        ``near`` are `runs` of a model close by. ``worth`` is the loss that another step has to
+        bring, where it is not a share of it.
         """
         # What a candidate changes of the sensitivities of effects elsewhere can wait.
         here = free[-1].effect.axis if free else None
@@ -316,13 +332,23 @@ class ModelFitter(ABC):
         # What is to be compared with others is fitted to less than the formulas agree; so is what
         # others are to be compared with.
         tolerance = _TRIAL_TOLERANCE if lazy or not free else _TOLERANCE
-        tolerance = _FINE_TOLERANCE if fine else tolerance
+        if worth is not None and start is not None:
+            tolerance = worth / max(start.total, worth)
         options = self._options(max_iterations, refreshes, tolerance)
-        result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
         renewed = not lazy and near is None
-        counted = self.counted()
-        found = _evidence(result, setup, list(free), renewed=renewed, counted=counted)
-        return replace(found, fresh=fresh)
+        return replace(self._solved(setup, free, options, near, renewed=renewed), fresh=fresh)
+
+    def _solved(
+        self,
+        setup: _Setup,
+        free: Sequence[FreeEffect],
+        options: FitOptions,
+        near: _core.Courses | None,
+        *,
+        renewed: bool,
+    ) -> Evidence:
+        result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
+        return _evidence(result, setup, list(free), renewed=renewed, counted=self.counted())
 
     def evaluate(
         self,
@@ -452,6 +478,17 @@ class ModelFitter(ABC):
             scale=parameter.scale if self.natural is None else self.natural.of(effects[i], name),
             prior=free.priors.get(name),
         )
+
+
+def _first_halves(model: Evidence) -> list[tuple[int, int]]:
+    """Return the rows (first, behind the last) of the residual that belong to first halves of logs."""
+    rows = []
+    for log in np.unique(model.log):
+        for axis in np.unique(model.axis):
+            mine = (model.log == log) & (model.axis == axis)
+            first = int(model.start[mine].min())
+            rows.append((first, first + int(model.size[mine].sum()) // 2))
+    return rows
 
 
 def _is_relative(effect: str) -> bool:

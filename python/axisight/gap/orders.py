@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,12 @@ class Turning:
     speed_rad_s: Array
     sample_time_s: float
     later_s: float = 0.0
+
+    def leaving(self, residual: Array) -> Turning:
+        """Return the same motion with another residual (n,); what is known of its waves is kept."""
+        other = replace(self, residual=residual)
+        vars(other).update({k: v for k, v in vars(self).items() if k == "spectra"})
+        return other
 
     @property
     def frequency_hz(self) -> Array:

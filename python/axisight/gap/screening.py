@@ -88,14 +88,24 @@ class Bench:
             self.near_nominal = self.fitter.runs(self.model, {})
 
     def attempt(
-        self, solve: Callable[..., A], option: FreeEffect, values: Mapping[str, float] | None
+        self,
+        solve: Callable[..., A],
+        option: FreeEffect,
+        values: Mapping[str, float] | None,
+        *,
+        beside: Sequence[FreeEffect] | None = None,
+        close: bool = False,
     ) -> A | None:
-        """Return what ``solve`` of the fitter makes of a candidate; None where it cannot."""
-        effects = [*kept_beside(self.model.free, option), option]
+        """Return what ``solve`` of the fitter makes of a candidate; None where it cannot.
+
+        ``values``: where the simulator's own parameters begin, the model's unless given; ``close``: near
+        the model's. ``beside``: the other effects, those of the model unless given.
+        """
+        others = kept_beside(self.model.free, option) if beside is None else beside
+        effects = [*others, option]
         # Runs serve where the simulator's own parameters are those of the runs, or near them.
-        near = (
-            self.near if values is None or values == self.model.robot_values else self.near_nominal
-        )
+        as_model = close or values is None or values == self.model.robot_values
+        near = self.near if as_model else self.near_nominal
         try:
             return solve(effects, self.model, robot_values=values, near=near)
         except InputError as error:

@@ -119,7 +119,7 @@ def search(
     ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
     """
     progress("re-fitting the simulator", 0, 1)
-    baseline = fitter.fit([], refreshes=1)
+    baseline = _refitted(fitter)
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.samples
     out = Search(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
@@ -142,7 +142,7 @@ def search(
         if not taken:
             break
         try:
-            _take_in(fitter, out, taken, progress)
+            _take_in(round_, out, taken, progress)
         except InputError as error:
             # Together they cannot be simulated: what promised most was none of it.
             refused.add(taken[0][0].trial.label)
@@ -159,6 +159,14 @@ def search(
         _withdraw_doubtful(fitter, out, settings)
     _finish(fitter, out)
     return out
+
+
+def _refitted(fitter: ModelFitter) -> Evidence:
+    """Return the simulator re-fitted without effects: most of the way on the first halves of the logs."""
+    halves = fitter.beginnings()
+    if halves is None:
+        return fitter.fit([], refreshes=1)
+    return fitter.fit([], halves.fit([]))
 
 
 def _judged(
@@ -283,7 +291,7 @@ def _is_cause(
 
 
 def _take_in(
-    fitter: ModelFitter,
+    round_: Trials,
     state: Search,
     taken: Sequence[tuple[Ranked, Standing]],
     progress: Progress,
@@ -293,14 +301,14 @@ def _take_in(
     start = taken[0][0].trial.evidence
     # One of a pair that the count of causes has no room for was fitted beside the other.
     if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:
-        state.model = settled(fitter, start.free, start)
+        state.model = settled(round_.fitter, start.free, start, rough=round_.rough)
     else:
         free = list(state.model.free)
         for r, _ in taken:
             new = r.trial.evidence.free[-1]
             free = [*kept_beside(free, new), new]
         # From the simulator of the first: a gap may have bent the one without it.
-        state.model = settled(fitter, free, start)
+        state.model = settled(round_.fitter, free, start, rough=round_.rough)
     progress(label, 1, 1)
 
 
@@ -334,7 +342,9 @@ def _finish(fitter: ModelFitter, state: Search) -> None:
     if not model.free or linear_gain(model) < _OPEN:
         return
     with suppress(InputError):
-        state.model = fitter.fit(model.free, model, max_iterations=_FINISHING, fine=True)
+        state.model = fitter.fit(
+            model.free, model, lazy=True, max_iterations=_FINISHING, refreshes=1, worth=_OPEN
+        )
 
 
 def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:

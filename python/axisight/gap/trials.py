@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from functools import partial
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 import numpy as np
@@ -18,10 +17,11 @@ from axisight.gap.edge import BENT, bent
 from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
-from axisight.gap.score import held_out_loss
+from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
+from axisight.gap.tryout import Tryout
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -52,8 +52,10 @@ _FAR = 0.3
 # One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
 _ALONE = 0.5
-# Steps of the fit of a candidate; leaders go on from there.
-_STEPS = 8
+# How often sensitivities are renewed in a fit that is to last, and at every step where it promises
+# more than this share of the loss in the end.
+_RENEWALS = 1
+_SETTLED = 1e-3
 # Share of a gain that another candidate may have on the same axis and not count as felt.
 _FELT = 0.2
 
@@ -71,15 +73,35 @@ def fresh(options: Sequence[FreeEffect], model: Evidence, refused: set[str]) -> 
 
 
 def settled(
-    fitter: ModelFitter, free: Sequence[FreeEffect], start: Evidence, *, max_iterations: int = 6
+    fitter: ModelFitter,
+    free: Sequence[FreeEffect],
+    start: Evidence,
+    *,
+    rough: ModelFitter | None = None,
+    max_iterations: int = 6,
 ) -> Evidence:
-    """Return a fit with sensitivities of its own, as often renewed as it needs."""
-    if not start.renewed or len(free) != len(start.free):
-        start = fitter.fit(free, start, refreshes=1)
-    # One that stalled with sensitivities renewed at every step gets no further.
-    if start.converged or (start.fresh and start.status == "stalled"):
-        return start
-    return fitter.fit(start.free, start, fresh=True, max_iterations=max_iterations)
+    """Return a fit with sensitivities of its own, as often renewed as it needs.
+
+    ``rough``: the same for part of the data, which brings what bends the simulator most of the way.
+    """
+    if start.renewed and len(free) == len(start.free):
+        return _renewed(fitter, start, max_iterations)
+    renewals = _RENEWALS
+    if rough is not None:
+        with suppress(InputError):
+            start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
+            free, renewals = start.free, 0
+    return _renewed(fitter, fitter.fit(free, start, refreshes=renewals), max_iterations)
+
+
+def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evidence:
+    """Return a fit, with sensitivities renewed at every step where it has not settled without."""
+    if found.converged or linear_gain(found) < _SETTLED * found.total:
+        return found
+    # Those may stall too: no fit gets further.
+    if found.fresh and found.status == "stalled":
+        return found
+    return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
 
 
 class Trials:
@@ -106,8 +128,15 @@ class Trials:
         self.settings, self.progress = settings, progress
         self.current = held_out_loss(model)
         self.bench = Bench(fitter, model)
+        self.screen = Screen(self.bench)
         self.waiting: list[Start] = []
         self.sensitivities: dict[str, Sensitivity] = {}
+
+    @property
+    def rough(self) -> ModelFitter | None:
+        """The fitter for the part of the data that candidates are screened on; None where that is all."""
+        part = self.screen.bench
+        return None if part is self.bench else part.fitter
 
     @property
     def skipped(self) -> dict[str, str]:
@@ -117,13 +146,15 @@ class Trials:
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
         """Screen all candidates by one linear step, fit the promising ones in full."""
         chosen = self._promising(self._screened(options, number))
-        if any(self._bends(start) for start in chosen):
+        tryout = Tryout(self.bench, self.screen)
+        if any(tryout.bends(start) for start in chosen):
             self.bench.begin_nominal()
         with self._threads() as pool:
             return self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
 
     def _screened(self, options: Sequence[FreeEffect], number: int) -> list[Start]:
         screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
+        self.screen = screen
         if any(option.starts and len(option.free) == 1 for option in options):
             screen.bench.begin_nominal()
         rough = self._by_kept(screen, options)
@@ -157,8 +188,9 @@ class Trials:
         chosen, self.waiting = self.waiting, []
         label = f"fitting further candidates, round {number}"
         with self._threads() as pool:
-            fitted = self._each(pool, self._fitted, chosen, label)
-        return [t for t in fitted if t is not None]
+            found = self._fitted(pool, chosen)
+        self.progress(label, len(chosen), len(chosen))
+        return found
 
     @contextmanager
     def _threads(self) -> Iterator[ThreadPoolExecutor]:
@@ -199,12 +231,17 @@ class Trials:
             if all(p is not None and explained[p - 1] > _MOST for p in places):
                 now = [s for s in here if s.gain > _AS_MUCH * most]
                 self.waiting += [s for s in here if s.gain <= _AS_MUCH * most]
-            for k, fitted in enumerate(pool.map(self._fitted, now)):
-                self.progress(label, done + k, len(chosen))
-                found += [] if fitted is None else [fitted]
+            self.progress(label, done, len(chosen))
+            found += self._fitted(pool, now)
             done += len(here)
         self.progress(label, done, len(chosen))
         return found
+
+    def _fitted(self, pool: ThreadPoolExecutor, starts: Sequence[Start]) -> list[Trial]:
+        """Fit candidates, on what the screen has of the data; look at them on all of it."""
+        tryout = Tryout(self.bench, self.screen)
+        begun = pool.map(tryout.begun, starts)
+        return [t for t in pool.map(tryout.ended, begun) if t is not None]
 
     def standings(self, trials: Sequence[Trial]) -> list[Standing]:
         """Return how the trials stand on each axis that one of them improves."""
@@ -242,7 +279,7 @@ class Trials:
     def _refined(self, one: Trial) -> Trial | None:
         """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
         try:
-            evidence = settled(self.fitter, one.evidence.free, one.evidence)
+            evidence = settled(self.fitter, one.evidence.free, one.evidence, rough=self.rough)
         except InputError as error:
             self.skipped[one.label] = str(error)
             return None
@@ -275,15 +312,6 @@ class Trials:
                 if here and near and r.trial.label not in done and r.trial not in out:
                     out.append(r.trial)
         return out
-
-    def _fitted(self, start: Start) -> Trial | None:
-        solve = partial(self.fitter.fit, lazy=not self._bends(start), max_iterations=_STEPS)
-        evidence = self.bench.attempt(solve, start.option, start.robot_values)
-        return None if evidence is None else trial(start.option, evidence)
-
-    def _bends(self, start: Start) -> bool:
-        """Whether a candidate bends the simulator, and has sensitivities of its own."""
-        return start.robot_values is not self.model.robot_values
 
     def _worth(self) -> Array:
         """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""

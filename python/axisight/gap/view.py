@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.model import Evidence, FreeEffect, ModelFitter
 from axisight.gap.noise import Floor
+from axisight.gap.orders import Turning
 from axisight.gap.result import Mode
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.settings import Settings
@@ -44,6 +45,7 @@ class View(ABC):
     def __post_init__(self) -> None:
         """Tell the fitter what is large on this robot."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
+        self._turned: Sequence[Sequence[Turning]] = ()
 
     def candidates(
         self, model: Evidence, *, axes: Collection[int] | None = None
@@ -57,13 +59,14 @@ class View(ABC):
             # A square is more than less than nothing, and less than infinity.
             enough = np.where(np.isin(self.robot.axis_numbers(), list(axes)), -1.0, np.inf)
         at = situation(
-            self.robot,
             self.logs,
             model,
             self.fitter.weighting.decimation,
             self._weighted_response,
             enough,
+            self._turned,
         )
+        self._turned = at.turning
         found = all_candidates(
             self.robot,
             self.logs,

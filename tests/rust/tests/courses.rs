@@ -255,8 +255,13 @@ fn neither_threads_nor_company_change_a_run() {
         let columns = one.columns.iter().zip(&alone.columns);
         for (together, alone) in series.into_iter().chain(columns) {
             let off = norm(&sum(1.0, &together[range.clone()], -1.0, alone)) / norm(alone);
-            // Log 4 is the last batch; 0 and 2 are the longest of the other.
-            let allowed = if [1, 3].contains(&number) { 1e-5 } else { 0.0 };
+            // Log 4 is the last batch; 0 and 2 are the longest of the other. One log in four copies
+            // has fewer derivatives in each, which rounds otherwise.
+            let allowed = if [1, 3].contains(&number) {
+                1e-5
+            } else {
+                1e-13
+            };
             assert!(off <= allowed, "log {number}: {off:.1e}");
         }
         first = range.end;

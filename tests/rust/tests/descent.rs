@@ -144,7 +144,8 @@ fn rosenbrock_ends_in_its_valley() {
     }
 }
 
-/// With x held back at 1/2 the best y is 1/4; x presses on its bound and nothing else does.
+/// With x held back at 1/2 the best y is 1/4; x presses on its bound and nothing else does. Steps
+/// worth less than 1e-14 of the loss of 1/4 are not tried: with a curvature of 100 that is 5e-9.
 #[test]
 fn bound_holds_the_parameter_and_frees_the_others() {
     for rules in &RULES {
@@ -155,9 +156,9 @@ fn bound_holds_the_parameter_and_frees_the_others() {
         let (outcome, theta) = run(&mut model, &limits, rules, &start);
         assert!(outcome.status.converged(), "{:?}", outcome.status);
         assert_eq!((theta[0], limits.at_bound(&theta)), (0.5, vec![0]));
-        assert!((theta[1] - 0.25).abs() < 1e-9 && (model.normal.loss - 0.25).abs() < 1e-12);
+        assert!((theta[1] - 0.25).abs() < 1e-8 && (model.normal.loss - 0.25).abs() < 1e-12);
         let g = &model.normal.gradient;
-        assert!(g[0] < -0.1 && g[1].abs() < 1e-7, "{g}");
+        assert!(g[0] < -0.1 && g[1].abs() < 1e-6, "{g}");
     }
 }
 
@@ -462,4 +463,92 @@ fn step_beyond_a_bound_is_found_anew_on_it() {
         assert_eq!(theta[1], 2.0);
         assert!(outcome.iterations <= 4, "{outcome:?}");
     }
+}
+
+/// Least loss of a linear problem within bounds, by every set of parameters that may lie on one.
+fn least_within(jacobian: &DMatrix<f64>, target: &DVector<f64>, bound: f64) -> f64 {
+    let n = jacobian.ncols();
+    let sets = 3_usize.pow(u32::try_from(n).expect("few"));
+    let losses = (0..sets).filter_map(|set| {
+        // Digit 0: free; 1, 2: on the lower or the upper bound.
+        let digit = |i: usize| set / 3_usize.pow(u32::try_from(i).expect("few")) % 3;
+        let held = DVector::from_fn(n, |i, _| [0.0, -bound, bound][digit(i)]);
+        let free: Vec<usize> = (0..n).filter(|i| digit(*i) == 0).collect();
+        let columns = jacobian.select_columns(&free);
+        let left = target - jacobian * &held;
+        let mut theta = held;
+        if !free.is_empty() {
+            let found =
+                (columns.transpose() * &columns).try_inverse()? * columns.transpose() * left;
+            free.iter()
+                .zip(found.iter())
+                .for_each(|(i, x)| theta[*i] = *x);
+        }
+        let inside = theta.iter().all(|x| x.abs() <= bound + 1e-9);
+        inside.then(|| (jacobian * theta - target).norm_squared())
+    });
+    losses.fold(f64::INFINITY, f64::min)
+}
+
+/// Columns that look alike push one another over their bounds and back: one step ends where the
+/// loss is least within them. Where what is held once is held for good more is left.
+#[test]
+fn a_step_of_a_linear_problem_ends_at_the_least_within_bounds() {
+    let mut x = 0.3_f64;
+    let mut random = || {
+        x = (9301.0 * x + 0.49297).fract();
+        x - 0.5
+    };
+    for _ in 0..50 {
+        let common: Vec<f64> = (0..12).map(|_| random()).collect();
+        let jacobian = DMatrix::from_fn(12, 5, |i, _| common[i] + 0.3 * random());
+        let target = DVector::from_fn(12, |i, _| common[i] + random());
+        let rows = |t: &[f64]| {
+            let residual = &jacobian * DVector::from_column_slice(t) - &target;
+            let rows = jacobian.row_iter().map(|r| r.iter().copied().collect());
+            Some((residual.as_slice().to_vec(), rows.collect()))
+        };
+        let limits = Limits {
+            lower: vec![-0.4; 5],
+            upper: vec![0.4; 5],
+            ..wide(5)
+        };
+        let rules = Rules {
+            max_iterations: 1,
+            damping: Damping::Constant {
+                start: 1e-12,
+                shrink: 0.2,
+                grow: 8.0,
+                least: 1e-12,
+                failures: 0,
+            },
+            ..RULES[1]
+        };
+        let start = [0.0; 5];
+        let mut model = Model::new(rows, &start);
+        let (_, theta) = run(&mut model, &limits, &rules, &start);
+        let (residual, _) = rows(&theta).expect("always holds");
+        let loss: f64 = residual.iter().map(|r| r * r).sum();
+        let least = least_within(&jacobian, &target, 0.4);
+        assert!(loss <= least * (1.0 + 1e-9), "{loss} {least}");
+    }
+}
+
+/// A step that promises less than it would have to gain is not tried.
+#[test]
+fn what_promises_too_little_costs_no_trial() {
+    let start = [0.0, 1.0];
+    let mut model = Model::new(line, &start);
+    let rules = Rules {
+        loss_tolerance: 0.1,
+        ..RULES[1]
+    };
+    let (outcome, theta) = run(&mut model, &wide(2), &rules, &start);
+    // One step takes a linear problem to its end.
+    assert_eq!(outcome.iterations, 1);
+    assert_eq!(model.trials, 1, "{theta:?}");
+    let (again, _) = run(&mut model, &wide(2), &rules, &theta);
+    assert_eq!(again.iterations, 0);
+    assert_eq!(model.trials, 1);
+    assert!(again.status.converged());
 }

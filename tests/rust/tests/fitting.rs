@@ -216,6 +216,42 @@ fn logs_of_different_length_do_not_disturb_each_other() {
     assert_eq!(start, together.residual.len());
 }
 
+/// Lanes that logs leave carry derivatives by other parameters: the numbers are those of the same
+/// logs in as many lanes as there are, but for rounding where each carries fewer.
+#[test]
+fn derivatives_do_not_depend_on_how_many_logs_share_the_lanes() {
+    let mut problem = arm_problem(3, SIGMA);
+    let more = logs(&problem.robot, 7, SIGMA);
+    problem.records.extend(more);
+    let theta: Vec<f64> = problem.parameters.iter().map(|p| p.initial).collect();
+    let columns: Vec<usize> = (0..4).collect();
+    let lengths = problem.records.iter().map(|r| r.input.len());
+    let ends: Vec<usize> = lengths
+        .scan(0, |end, n| {
+            *end += n;
+            Some(*end)
+        })
+        .collect();
+    for logs in 1..4 {
+        for count in 1..=4 {
+            let fewer = SimulationErrorProblem {
+                records: problem.records[..logs].to_vec(),
+                ..problem.clone()
+            };
+            let found = fewer.evaluate(&theta, &columns[..count]).expect("fewer");
+            let alike = problem
+                .evaluate(&theta, &columns[..count])
+                .expect("four logs");
+            let end = ends[logs - 1];
+            assert!(relative(&found.residual, &alike.residual[..end]) < 1e-12);
+            for (a, b) in found.columns.iter().zip(&alike.columns) {
+                let off = relative(a, &b[..end]);
+                assert!(off < 1e-10, "{logs} logs, {count} columns: {off:.1e}");
+            }
+        }
+    }
+}
+
 /// Central differences with relative step 1e-5: truncation 1e-10 of third derivatives,
 /// rounding 1e-16 of a motor angle of 20 rad over a change of 1e-5 of it: below 1e-9. One column
 /// at a time: for many, the arm is linearised along the run, as `courses.rs` has it.

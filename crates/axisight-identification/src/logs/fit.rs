@@ -10,7 +10,7 @@ use super::linearize::{Column, Linearization, at_bound, grams, limits};
 use super::loss::Loss;
 use super::problem::{Evaluation, FitParameter, Problem, ProblemError};
 use axisight_numerics::descent::{
-    Bounded, Damping, LeastSquares, Normal, Progress, Rules, Status, search,
+    Bounded, Damping, Descent, LeastSquares, Normal, Progress, Rules, Status, search,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -25,7 +25,7 @@ pub struct FitOptions {
     pub step_tolerance: f64,
     /// Loss of whitened residuals.
     pub loss: Loss,
-    /// How often nuisance columns are computed anew after the search has settled, where it has
+    /// How often nuisance columns are computed anew, where a step fails by them or the search has
     /// gone far from where they were computed.
     pub nuisance_refreshes: usize,
 }
@@ -43,21 +43,21 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    /// Rules of a search with `left` iterations left.
-    fn rules(&self, left: usize) -> Rules {
+    /// Rules of a search with `left` iterations left that gives up after so many `failures` in a row.
+    fn rules(&self, left: usize, failures: usize) -> Rules {
         Rules {
             max_iterations: left,
             loss_tolerance: self.loss_tolerance,
             progress: Progress::Gained { always: false },
             step_tolerance: self.step_tolerance,
             rounding: 0.0,
-            settled: WORTH_REFRESHING,
+            settled: WORTH_A_STEP,
             damping: Damping::Constant {
                 start: 1e-3,
                 shrink: 0.2,
                 grow: 8.0,
                 least: 1e-12,
-                failures: 8,
+                failures,
             },
         }
     }
@@ -99,11 +99,43 @@ pub struct Fit {
     pub columns: Vec<Column>,
 }
 
-/// Share of the loss that new nuisance columns, or another step, have to be worth.
-const WORTH_REFRESHING: f64 = 1e-4;
+/// Share of the loss that a step has to be worth where a search that no longer moves has not settled.
+const WORTH_A_STEP: f64 = 1e-4;
 
 /// Share of the loss by which it has fallen when columns computed before are no longer good.
-const MOVED: f64 = 0.01;
+const MOVED: f64 = 0.1;
+
+/// How long a search goes on with the nuisance columns that it has.
+#[derive(Debug, Clone, Copy)]
+struct Patience {
+    /// Accepted steps.
+    steps: usize,
+    /// Failures in a row.
+    failures: usize,
+}
+
+impl Patience {
+    /// All columns are renewed at every step.
+    const LONG: Self = Self {
+        steps: usize::MAX,
+        failures: 8,
+    };
+    /// The first step by columns as good as they will be.
+    const FIRST: Self = Self {
+        steps: 1,
+        failures: 3,
+    };
+    /// Further steps: what fails by columns of another point is hardly mended by shorter ones.
+    const FURTHER: Self = Self {
+        steps: usize::MAX,
+        failures: 1,
+    };
+    /// The same where columns are renewed then.
+    const BRIEF: Self = Self {
+        steps: 1,
+        failures: 0,
+    };
+}
 
 /// Sum of squares of whitened residuals by which a natural change of any parameter is taken to
 /// move them. One that moves them less, a millionth of the noise of one, is left where it is:
@@ -151,26 +183,29 @@ pub fn fit<P: Problem>(
     let initial_loss = start.loss;
     let mut search = Search::new(problem, parameters, options.loss, start);
     let lazy = search.fresh.len() < search.free.len();
-    // Columns that were handed over belong to another model.
-    let mut stale = !warm.is_empty();
     let mut before = search.normal.loss;
-    let (mut status, mut iterations) = search.descend(&options, 0)?;
-    for _ in 0..options.nuisance_refreshes {
-        stale |= before - search.normal.loss > MOVED * before;
-        if !lazy || !stale || matches!(status, Status::MaxIterations | Status::Exact) {
+    let (mut status, mut iterations) = (Status::MaxIterations, 0);
+    for left in (0..=options.nuisance_refreshes).rev() {
+        (status, iterations) = if lazy {
+            search.descend_lazily(&options, iterations, left > 0)?
+        } else {
+            search.descend(&options, iterations, Patience::LONG)?
+        };
+        let little = search.promise()? <= options.loss_tolerance * search.normal.loss;
+        let over = status == Status::Exact || iterations == options.max_iterations;
+        if !lazy || left == 0 || over {
+            break;
+        }
+        if little && !search.gone_far(before) {
+            status = Status::LossConverged;
             break;
         }
         before = search.normal.loss;
         search.refresh()?;
-        stale = false;
-        (status, iterations) = search.descend(&options, iterations)?;
-        if before - search.normal.loss <= WORTH_REFRESHING * before {
-            break;
-        }
     }
     // Columns that are no longer good point no longer where the loss is least.
-    let moved = before - search.normal.loss > MOVED * before;
-    if lazy && moved && options.nuisance_refreshes > 0 && status.advice().is_none() {
+    let astray = lazy && options.nuisance_refreshes > 0 && search.gone_far(before);
+    if astray && status.advice().is_none() {
         status = Status::MaxIterations;
     }
     Ok(search.finish(status, initial_loss, iterations))
@@ -203,18 +238,53 @@ impl<'a, P: Problem> Search<'a, P> {
         search
     }
 
-    /// Steps from the present point, after `iterations` of them; how the search ended and how
-    /// many steps there are now.
+    /// Steps from the present point, after `iterations` of them; how the search ended and how many
+    /// steps there are now.
     fn descend(
         &mut self,
         options: &FitOptions,
         iterations: usize,
+        patience: Patience,
     ) -> Result<(Status, usize), ProblemError> {
         let limits = limits(self.parameters, &self.free);
-        let rules = options.rules(options.max_iterations - iterations);
+        let left = options.max_iterations - iterations;
+        let rules = options.rules(left.min(patience.steps), patience.failures);
         let theta = self.free.iter().map(|i| self.theta[*i]).collect();
         let outcome = search(&mut Bounded::new(self, &limits, theta), &rules)?;
         Ok((outcome.status, iterations + outcome.iterations))
+    }
+
+    /// The same with nuisance columns that stay as they are, and whether they can be `renewed` then.
+    fn descend_lazily(
+        &mut self,
+        options: &FitOptions,
+        iterations: usize,
+        renewed: bool,
+    ) -> Result<(Status, usize), ProblemError> {
+        let (status, now) = self.descend(options, iterations, Patience::FIRST)?;
+        let stepped = now > iterations && status == Status::MaxIterations;
+        if !stepped || now == options.max_iterations {
+            return Ok((status, now));
+        }
+        let patience = if renewed {
+            Patience::BRIEF
+        } else {
+            Patience::FURTHER
+        };
+        self.descend(options, now, patience)
+    }
+
+    /// Fall of the loss that an undamped step promises.
+    fn promise(&mut self) -> Result<f64, ProblemError> {
+        let limits = limits(self.parameters, &self.free);
+        let theta = self.free.iter().map(|i| self.theta[*i]).collect();
+        let step = Bounded::new(self, &limits, theta).step(0.0)?;
+        Ok(step.map_or(0.0, |step| step.worth))
+    }
+
+    /// Whether the loss has fallen so far that columns computed at `before` are no longer good.
+    fn gone_far(&self, before: f64) -> bool {
+        before - self.normal.loss > MOVED * before
     }
 
     /// All columns anew.

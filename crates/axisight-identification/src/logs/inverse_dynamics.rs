@@ -97,7 +97,8 @@ impl InverseDynamics {
         theta: &[f64],
         seeds: &[usize],
     ) -> Result<Vec<Vec<Vec<f64>>>, ProblemError> {
-        let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
+        let (overrides, settings) =
+            seeded::<S>(&self.parameters, &self.effects, theta, seeds, S::seeded);
         let failed = |e: PlantError| ProblemError::Failed(e.to_string());
         let plant = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
         if plant.chain.carries_derivatives() {
@@ -108,7 +109,8 @@ impl InverseDynamics {
                 &mut Arm::new(&plant),
             ));
         }
-        let (overrides, settings) = seeded::<f64>(&self.parameters, &self.effects, theta, &[]);
+        let (overrides, settings) =
+            seeded::<f64>(&self.parameters, &self.effects, theta, &[], f64::seeded);
         let plain = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
         Ok(predicted(
             &plant,

@@ -6,6 +6,7 @@ mod gram;
 mod inverse_dynamics;
 mod linearize;
 mod loss;
+mod packing;
 mod problem;
 mod simulation_error;
 

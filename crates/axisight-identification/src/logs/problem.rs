@@ -120,19 +120,21 @@ pub trait Problem: Sync {
     fn blocks(&self) -> Vec<Block>;
 }
 
-/// Parameters of a plant at `theta`, those in `seeds` carrying derivatives.
+/// Parameters of a plant at `theta`, those in `seeds` carrying derivatives: `seed` gives one its
+/// slope, by its place there.
 pub(super) fn seeded<S: Scalar>(
     parameters: &[FitParameter],
     effects: &[EffectSetting<f64>],
     theta: &[f64],
     seeds: &[usize],
+    seed: impl Fn(S, usize) -> S,
 ) -> (Vec<(Parameter, S)>, Vec<EffectSetting<S>>) {
     let mut overrides = Vec::new();
     let mut settings: Vec<EffectSetting<S>> = effects.iter().map(EffectSetting::lifted).collect();
     for (i, (parameter, value)) in parameters.iter().zip(theta).enumerate() {
         let constant = S::constant(*value);
-        let seed = seeds.iter().position(|s| *s == i);
-        let number = seed.map_or(constant, |s| constant.seeded(s));
+        let place = seeds.iter().position(|s| *s == i);
+        let number = place.map_or(constant, |s| seed(constant, s));
         match parameter.target {
             Target::Robot(p) => overrides.push((p, number)),
             Target::Effect(e, j) => {

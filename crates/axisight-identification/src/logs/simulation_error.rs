@@ -1,7 +1,7 @@
 //! Simulation error: logs against a free-running simulation of the loop.
 //!
-//! All logs run in lock-step in the lanes of one simulation; derivatives ride
-//! along as dual numbers, a few parameters per pass. The residual comes from the model itself;
+//! All logs run in lock-step in the lanes of one simulation; derivatives ride along as dual
+//! numbers, a few parameters per pass ([`super::packing`]). The residual comes from the model itself;
 //! for derivatives the arm is linearised along that run ([`axisight_core::robot::Course`]), and
 //! for both when runs of a model nearby are given ([`Courses`]). A pass with `d` derivatives
 //! over `n` samples takes about `4 n (1 + 2 d)` right-hand sides for a batch of logs, of which
@@ -9,6 +9,7 @@
 
 use super::courses::{Batch, Courses};
 use super::gram::{Block, blocks};
+use super::packing::{LANES, PARTIALS, Packing};
 use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
 };
@@ -20,11 +21,6 @@ use axisight_scalar::{Dual, Lanes, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// Logs simulated in lock-step.
-pub(super) const LANES: usize = 4;
-/// Derivatives per pass.
-const SEEDS: usize = 4;
 
 /// One log to be reproduced; arrays are row-major `(n_samples, n_axes)`.
 #[derive(Debug, Clone)]
@@ -154,14 +150,24 @@ impl SimulationErrorProblem {
         all.chunks(LANES).map(<[usize]>::to_vec).collect()
     }
 
-    fn plant<S: Scalar>(&self, theta: &[f64], seeds: &[usize]) -> Result<Plant<S>, ProblemError> {
-        let (overrides, settings) = seeded::<S>(&self.parameters, &self.effects, theta, seeds);
+    fn plant<S: Scalar>(
+        &self,
+        theta: &[f64],
+        seeds: &[usize],
+        seed: impl Fn(S, usize) -> S,
+    ) -> Result<Plant<S>, ProblemError> {
+        let (overrides, settings) = seeded(&self.parameters, &self.effects, theta, seeds, seed);
         assemble(&self.robot, &overrides, &settings).map_err(|e| failed(&e))
+    }
+
+    /// The plant without derivatives.
+    fn bare<S: Scalar>(&self, theta: &[f64]) -> Result<Plant<S>, ProblemError> {
+        self.plant(theta, &[], |number, _| number)
     }
 
     /// Whether the arm may be linearised along runs.
     pub(super) fn follows_courses(&self, theta: &[f64]) -> Result<bool, ProblemError> {
-        Ok(self.method.has_fixed_steps() && self.plant::<f64>(theta, &[])?.follows_courses())
+        Ok(self.method.has_fixed_steps() && self.bare::<f64>(theta)?.follows_courses())
     }
 
     /// Output of the logs `records`, and the run it comes from.
@@ -170,7 +176,7 @@ impl SimulationErrorProblem {
         records: &[usize],
         theta: &[f64],
     ) -> Result<(Vec<Vec<f64>>, SharedCourse), ProblemError> {
-        let plant = self.plant::<Lanes<LANES>>(theta, &[])?;
+        let plant = self.bare::<Lanes<LANES>>(theta)?;
         let joints = plant.joint_slots();
         let rates = plant.n_angles() + joints.start..plant.n_angles() + joints.end;
         let mut states = Vec::new();
@@ -195,11 +201,13 @@ impl SimulationErrorProblem {
         mut keep: Option<Keep<'_, S>>,
     ) -> Result<Traces, ProblemError> {
         let n_axes = plant.axes.len();
-        let inputs: Vec<&[f64]> = records
+        let packing = Packing::of(records.len());
+        let in_lanes = packing.fill(records);
+        let inputs: Vec<&[f64]> = in_lanes
             .iter()
             .map(|r| &self.records[*r].input[..])
             .collect();
-        let targets: Vec<&[f64]> = records
+        let targets: Vec<&[f64]> = in_lanes
             .iter()
             .map(|r| &self.records[*r].target[..])
             .collect();
@@ -241,7 +249,7 @@ impl SimulationErrorProblem {
                     let slot = lane * n_axes + axis;
                     traces[0][slot].push(y.lane(lane));
                     for seed in 0..n_seeds {
-                        traces[seed + 1][slot].push(y.partial(seed, lane));
+                        traces[seed + 1][slot].push(packing.slope(y, seed, lane));
                     }
                 }
             }
@@ -264,11 +272,11 @@ impl SimulationErrorProblem {
         seeds: &[usize],
         arm: &Arm<'_>,
     ) -> Result<Traces, ProblemError> {
-        match seeds.len() {
+        match Packing::of(records.len()).partials(seeds.len()) {
             0 => self.run::<Lanes<LANES>>(records, theta, seeds, arm),
             1 => self.run::<Dual<Lanes<LANES>, 1>>(records, theta, seeds, arm),
             2 => self.run::<Dual<Lanes<LANES>, 2>>(records, theta, seeds, arm),
-            _ => self.run::<Dual<Lanes<LANES>, SEEDS>>(records, theta, seeds, arm),
+            _ => self.run::<Dual<Lanes<LANES>, PARTIALS>>(records, theta, seeds, arm),
         }
     }
 
@@ -279,7 +287,8 @@ impl SimulationErrorProblem {
         seeds: &[usize],
         arm: &Arm<'_>,
     ) -> Result<Traces, ProblemError> {
-        let plant = self.plant::<S>(theta, seeds)?;
+        let packing = Packing::of(records.len());
+        let plant = self.plant::<S>(theta, seeds, |number, seed| packing.seeded(number, seed))?;
         let mut stepper = match arm {
             Arm::Exact => Stepper::new(&plant),
             Arm::Along(course) => Stepper::along(&plant, course).map_err(|e| failed(&e))?,
@@ -363,7 +372,7 @@ impl SimulationErrorProblem {
             return Ok(exact());
         }
         if let Some(courses) = &self.courses {
-            let joints = self.plant::<f64>(theta, &[])?.chain.len();
+            let joints = self.bare::<f64>(theta)?.chain.len();
             if !courses.fit(joints, batches.len()) {
                 return Ok(exact());
             }
@@ -408,32 +417,31 @@ impl Problem for SimulationErrorProblem {
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
         let batches = self.batches();
         let prepared = self.prepared(&batches, theta, columns.len())?;
-        let mut chunks: Vec<&[usize]> = columns.chunks(SEEDS).collect();
-        if chunks.is_empty() {
-            chunks.push(&[]);
-        }
         let tasks: Vec<_> = batches
             .iter()
             .zip(&prepared)
-            .flat_map(|batch| chunks.iter().enumerate().map(move |(i, c)| (i, batch, *c)))
+            .flat_map(|(batch, prepared)| {
+                let passes = Packing::of(batch.len()).passes(columns.len());
+                passes.map(move |range| (batch, prepared, range))
+            })
             .collect();
         let done: Vec<_> = tasks
             .par_iter()
-            .map(|(_, (batch, prepared), seeds)| {
-                let traces = self.output(batch, theta, seeds, prepared)?;
+            .map(|(batch, prepared, range)| {
+                let traces = self.output(batch, theta, &columns[range.clone()], prepared)?;
                 Ok(self.whiten(batch, traces))
             })
             .collect::<Result<_, ProblemError>>()?;
         let mut residual = Vec::new();
         let mut derivatives = vec![Vec::new(); columns.len()];
-        for ((chunk, _, seeds), series) in tasks.iter().zip(done) {
+        for ((_, _, range), series) in tasks.iter().zip(done) {
             let mut series = series.into_iter();
             let first = series.next().unwrap_or_default();
-            if *chunk == 0 {
+            if range.start == 0 {
                 residual.extend(first.into_iter().flatten());
             }
-            for (i, column) in series.take(seeds.len()).enumerate() {
-                derivatives[chunk * SEEDS + i].extend(column.into_iter().flatten());
+            for (column, values) in derivatives[range.clone()].iter_mut().zip(series) {
+                column.extend(values.into_iter().flatten());
             }
         }
         Ok(Evaluation {

@@ -63,6 +63,8 @@ pub enum Reach {
 const NEAR_ZERO: f64 = 1e-3;
 /// Share of its scale by which a parameter on a bound may be off it.
 const ON_BOUND: f64 = 1e-9;
+/// Of the largest slope: one that leads nowhere.
+const SLIGHT: f64 = 1e-6;
 
 impl Limits {
     /// Where a step of parameter `i` ends, bounds apart.
@@ -112,9 +114,10 @@ impl Limits {
 /// Damped Gauss-Newton steps of a problem within its limits.
 ///
 /// Marquardt (1963) with his scaling by the diagonal, which makes the units of the parameters
-/// irrelevant; steps are projected on the bounds, as by Kanzow, Yamashita, Fukushima (2004). A
-/// parameter that a step takes beyond a bound goes to the bound, and the step of the others is found
-/// anew: what they were to make up for does not happen.
+/// irrelevant. A parameter that a step takes beyond a bound goes to the bound, and the step of the
+/// others is found anew: what they were to make up for does not happen. Where that pulls it back
+/// from the bound it is let go again, so that a step ends where the damped parabola is least within
+/// the bounds.
 pub struct Bounded<'a, P: LeastSquares> {
     problem: &'a mut P,
     limits: &'a Limits,
@@ -123,6 +126,8 @@ pub struct Bounded<'a, P: LeastSquares> {
     change: Vec<f64>,
     /// Moves of parameters that go to a bound, or stay on it.
     held: Vec<Option<f64>>,
+    /// Which bound that is: one for the upper, minus one for the lower.
+    side: Vec<f64>,
     trial: Option<P::Trial>,
 }
 
@@ -137,6 +142,7 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
             theta,
             change: vec![0.0; n],
             held: vec![None; n],
+            side: vec![0.0; n],
             trial: None,
         }
     }
@@ -160,10 +166,34 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
             let beyond = wanted < lower || wanted > upper;
             if beyond && self.held[i].is_none() {
                 self.held[i] = Some(self.change[i]);
+                self.side[i] = if wanted > upper { 1.0 } else { -1.0 };
                 hit = true;
             }
         }
         hit
+    }
+
+    /// Let go of the held parameter that the slope at the end of `step` pulls back from its bound
+    /// most; whether there is one.
+    fn let_go(&mut self, step: &DVector<f64>, damping: f64) -> bool {
+        let normal = self.problem.normal();
+        let size = |i: usize| normal.matrix[(i, i)].sqrt();
+        let slope = &normal.gradient + &normal.matrix * step;
+        let largest = (0..step.len())
+            .filter(|i| size(*i) > 0.0)
+            .map(|i| (normal.gradient[i] / size(i)).abs())
+            .fold(0.0, f64::max);
+        let held = (0..step.len()).filter(|i| self.held[*i].is_some() && size(*i) > 0.0);
+        let pull = |i: usize| {
+            let damped = slope[i] + damping * normal.matrix[(i, i)] * step[i];
+            self.side[i] * damped / size(i)
+        };
+        let most = held.max_by(|i, j| pull(*i).total_cmp(&pull(*j)));
+        let Some(i) = most.filter(|i| pull(*i) > SLIGHT * largest) else {
+            return false;
+        };
+        self.held[i] = None;
+        true
     }
 }
 
@@ -176,12 +206,17 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
 
     fn step(&mut self, damping: f64) -> Result<Option<Step>, P::Error> {
         self.held.fill(None);
-        // Every round holds one more.
+        // Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again.
+        let mut rounds = 3 * self.theta.len();
         loop {
             let Some(step) = damped(self.problem.normal(), damping, &self.held) else {
                 return Ok(None);
             };
             if self.cut(&step) {
+                continue;
+            }
+            rounds = rounds.saturating_sub(1);
+            if rounds > 0 && self.let_go(&step, damping) {
                 continue;
             }
             self.problem.land(&self.theta, &mut self.next);

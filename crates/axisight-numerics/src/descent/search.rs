@@ -75,7 +75,8 @@ pub enum Progress {
     /// What a step promises, before it is tried.
     Promised,
     /// What a step has gained, after it was accepted; not believed after failures, which make
-    /// steps short, unless `always`. Nor is a step tried then that promises less than it has to gain.
+    /// steps short, unless `always`. Nor is a step tried that promises less than it has to gain:
+    /// none at all, or, with `always`, none after a failure.
     Gained {
         /// Believed after failures too.
         always: bool,
@@ -170,10 +171,19 @@ fn advance<D: Descent>(
     let mut failures = 0;
     loop {
         let step = descent.step(damper.value)?;
-        // A longer step has failed, and this one would not gain enough if it kept its promise.
+        // It would not gain enough if it kept its promise.
         let little = step.is_some_and(|s| s.promise > 0.0 && s.promise < enough);
-        if failures > 0 && little && rules.progress != Progress::Promised {
-            return Ok(Advance::Ended(at_end(descent, rules)?));
+        let counts = match rules.progress {
+            Progress::Promised => false,
+            Progress::Gained { always } => failures > 0 || !always,
+        };
+        if little && counts {
+            // A step that failures have made short says nothing of a minimum.
+            return Ok(Advance::Ended(if failures == 0 && damper.value < STRONG {
+                Status::LossConverged
+            } else {
+                at_end(descent, rules)?
+            }));
         }
         if let Some(step) = step
             && let Some(status) = end(descent, rules, step, damper.value)?

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.faults import Finding, RefusedInputError, refused
@@ -44,16 +45,14 @@ def check_inputs(
     found = check_machine(robot, logs)
     if refused(found):
         return tuple(found)
-    for log in logs:
-        found += check_log_alone(log)
+    found += _of_each(check_log_alone, logs)
     found += check_copies(estimation, validation)
     if refused(found):
         return tuple(found)
     found += _references(robot, logs)
     closed = is_closed_loop(robot, logs)
     if closed:
-        for log in logs:
-            found += check_closed_loop(robot, log)
+        found += _of_each(lambda log: check_closed_loop(robot, log), logs)
     else:
         found += check_inverse(robot, logs)
     if refused(found):
@@ -71,9 +70,14 @@ def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding,
     """
     found = [] if robot is None else check_machine(robot, logs)
     out = [f for f in found if f.name != "sample_time_differs"]
-    for log in logs:
-        out += check_log_alone(log)
+    out += _of_each(check_log_alone, logs)
     return (*out, *check_copies(logs, ()))
+
+
+def _of_each(check: Callable[[Log], list[Finding]], logs: Sequence[Log]) -> list[Finding]:
+    """Return what a check finds in each log, in their order; they are looked at beside one another."""
+    with ThreadPoolExecutor() as pool:
+        return [finding for found in pool.map(check, logs) for finding in found]
 
 
 def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
