@@ -117,13 +117,13 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _worth_refining(self, trials, done, crooked):
             return [t for t in trials if t.label not in done]
 
-    def settled(fitter, free_, start, *, rough):
-        assert rough is None
+    def settled(fitter, free_, start):
         if start is whole.evidence:
             raise InputError("the simulation failed")
         return start
 
     field = Field({})
+    field.settings = Settings()
     field.bench = SimpleNamespace(skipped={})
     field.screen = SimpleNamespace(bench=field.bench)
     field.fitter = None

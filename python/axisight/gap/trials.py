@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -56,6 +57,8 @@ _ALONE = 0.5
 # more than this share of the loss in the end.
 _RENEWALS = 1
 _SETTLED = 1e-3
+# Steps on all data of a fit that was settled on part of them, where it is to be compared only.
+_LOOKS = 2
 # Share of a gain that another candidate may have on the same axis and not count as felt.
 _FELT = 0.2
 
@@ -267,23 +270,35 @@ class Trials:
         done: set[str] = set()
         label = f"refining the leaders, round {number}"
         crooked = self._crooked(trials)
-        while todo := next(iter(self._worth_refining(trials, done, crooked)), None):
-            self.progress(label, len(done), len(done) + 1)
-            done.add(todo.label)
-            better = self._refined(todo)
-            with_it = (better if t is todo else t for t in trials)
-            trials = [t for t in with_it if t is not None]
+        # Where the leader bends the simulator, several are; else mostly one.
+        at_once = self.settings.threads if crooked else 1
+        with self._threads() as pool:
+            while todo := self._worth_refining(trials, done, crooked)[:at_once]:
+                self.progress(label, len(done), len(done) + len(todo))
+                done.update(t.label for t in todo)
+                better = dict(zip(map(id, todo), pool.map(self._refined, todo), strict=True))
+                with_them = (better.get(id(t), t) for t in trials)
+                trials = [t for t in with_them if t is not None]
         self.progress(label, 1, 1)
         return trials
 
     def _refined(self, one: Trial) -> Trial | None:
         """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
         try:
-            evidence = settled(self.fitter, one.evidence.free, one.evidence, rough=self.rough)
+            evidence = self._compared(one.evidence)
         except InputError as error:
             self.skipped[one.label] = str(error)
             return None
         return trial(one.candidate, evidence)
+
+    def _compared(self, start: Evidence) -> Evidence:
+        """Return a fit good enough to be compared: settled on part of the data, looked at on all."""
+        if self.rough is None or start.renewed:
+            return settled(self.fitter, start.free, start)
+        begun = settled(self.rough, start.free, start)
+        found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
+        # What is taken in is fitted on.
+        return replace(found, renewed=False)
 
     def _crooked(self, trials: Sequence[Trial]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
