@@ -1,10 +1,13 @@
 """One effect at a time withheld from the complete simulator of a real machine: is it named?
 
 Run: python benches/leave_one_out.py DATA [--machine emps kr300 tx40] [--json out.json]
+         [--score FOLDER]
 
 DATA holds emps/, kuka_kr300/ and staubli_tx40/ (see real_arms.py). Each machine is identified from
 its estimation logs; then it is diagnosed without friction, complete, and without one effect of
-one axis, each in turn. Prints a table in Markdown.
+one axis, each in turn. Prints a table in Markdown. With --score, truths and verdicts go to a folder
+as those of the benchmark do, and `axisight blind score FOLDER/cases --truth FOLDER/truths --verdicts
+FOLDER/verdicts` counts them by its rules.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ import numpy as np
 from real_arms import MACHINES, Machine
 
 from axisight import Diagnosis, Robot, Settings, diagnose
+from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.gap.inverse import predicted_torque
 from axisight.gap.motion import motion
 from axisight.gap.torques import AS_GIVEN
@@ -117,6 +121,42 @@ def row(machine: Machine, case: Case, found: Diagnosis, seconds: float) -> Row:
     )
 
 
+def add_to_score(folder: Path, machine: Machine, case: Case, found: Diagnosis) -> None:
+    """Write a sealed truth and its verdict as the benchmark has them.
+
+    Severity: the torque that is withheld over what sensor noise leaves in the error, both relative
+    to the torque.
+    """
+    effect, _, axis = case.label.partition("@")
+    place = int(axis) if axis else None
+    floor = float(found.gap.floor_per_axis[place - 1]) if place else found.gap.floor
+    nothing = case.label == "nothing"
+    truth = {
+        "schema": TRUTH_SCHEMA,
+        "engine": "measured",
+        "arm": machine.name,
+        "motions": "rigid",
+        "seed": 0,
+        "number": 0,
+        "effects": []
+        if nothing
+        else [{"effect": effect, "axis": place, "parameters": {case.parameter: case.value}}],
+        "severity": [0.0 if nothing else case.share / max(floor, 1e-300)],
+    }
+    name = f"{machine.name}_{case.label}".replace("@", "_").lower()
+    text = json.dumps(truth, indent=1)
+    files = {
+        folder / "cases" / name / SEAL: seal_of(text) + "\n",
+        folder / "truths" / f"{name}.json": text,
+    }
+    for path, content in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+    verdicts = folder / "verdicts"
+    verdicts.mkdir(exist_ok=True)
+    found.save_verdict(verdicts / f"{name}.json")
+
+
 def least_squares_gap(machine: Machine, robot: Robot, cutoff_hz: float) -> float:
     """Return the held-out gap of viscous and Coulomb friction and an offset fitted to the residual."""
 
@@ -176,6 +216,7 @@ def main() -> None:
     parser.add_argument("--machine", nargs="+", choices=MACHINES, default=list(MACHINES))
     parser.add_argument("--only", nargs="+", help="labels of the cases to run")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--score", type=Path, help="folder for truths and verdicts")
     arguments = parser.parse_args()
     rows: list[Row] = []
     for name in arguments.machine:
@@ -196,6 +237,8 @@ def main() -> None:
                 continue
             result, found = diagnosed(machine, case)
             rows.append(result)
+            if arguments.score and case.label != "all friction":
+                add_to_score(arguments.score, machine, case, found)
             print(report([result]).splitlines()[-1], flush=True)
             if case.label == "all friction":
                 reference = least_squares_gap(machine, bare, float(found.provenance["cutoff_hz"]))

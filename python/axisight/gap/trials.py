@@ -53,9 +53,9 @@ _FAR = 0.3
 # One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
 _ALONE = 0.5
-# How often sensitivities are renewed in a fit that is to last, and at every step where it promises
-# more than this share of the loss in the end.
+# How often sensitivities are renewed in a fit that is to last.
 _RENEWALS = 1
+# Share of the loss that it may promise then: where it is more, they are renewed at every step.
 _SETTLED = 1e-3
 # Steps on all data of a fit that was settled on part of them, where it is to be compared only.
 _LOOKS = 2

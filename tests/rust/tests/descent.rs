@@ -552,3 +552,25 @@ fn what_promises_too_little_costs_no_trial() {
     assert_eq!(model.trials, 1);
     assert!(again.status.converged());
 }
+
+/// A sum that is known a thousand times better than the difference: damping in units of the
+/// curvature holds the difference back, and what is left of a step promises next to nothing.
+#[test]
+fn damping_is_not_taken_for_a_minimum() {
+    #[allow(clippy::unnecessary_wraps)]
+    fn valley(t: &[f64]) -> Rows {
+        let residual = vec![1e3 * (t[0] + t[1] - 2.0), t[0] - t[1] - 1.0, 30.0];
+        let rows = vec![vec![1e3, 1e3], vec![1.0, -1.0], vec![0.0, 0.0]];
+        Some((residual, rows))
+    }
+    let start = [1.0, 1.0];
+    let rules = Rules {
+        loss_tolerance: 1e-5,
+        ..RULES[1]
+    };
+    let mut model = Model::new(valley, &start);
+    let (outcome, theta) = run(&mut model, &wide(2), &rules, &start);
+    assert!(outcome.status.converged(), "{:?}", outcome.status);
+    // A step has to be worth 1e-5 of a loss of 901: a tenth of the difference.
+    assert!((theta[0] - theta[1] - 1.0).abs() < 0.1, "{theta:?}");
+}

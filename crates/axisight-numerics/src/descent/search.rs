@@ -178,12 +178,15 @@ fn advance<D: Descent>(
             Progress::Gained { always } => failures > 0 || !always,
         };
         if little && counts {
-            // A step that failures have made short says nothing of a minimum.
-            return Ok(Advance::Ended(if failures == 0 && damper.value < STRONG {
-                Status::LossConverged
-            } else {
-                at_end(descent, rules)?
-            }));
+            if failures > 0 {
+                return Ok(Advance::Ended(at_end(descent, rules)?));
+            }
+            // Damping may be what leaves so little: along a flat valley it holds everything back.
+            let undamped = descent.step(0.0)?;
+            if undamped.is_some_and(|s| s.promise > enough) && damper.relaxed() {
+                continue;
+            }
+            return Ok(Advance::Ended(Status::LossConverged));
         }
         if let Some(step) = step
             && let Some(status) = end(descent, rules, step, damper.value)?
@@ -301,6 +304,17 @@ impl Damper {
             }
             Damping::Constant { shrink, least, .. } => (self.value * shrink).max(least),
         };
+    }
+
+    /// Damp the next step less, if there is less.
+    fn relaxed(&mut self) -> bool {
+        match self.rule {
+            Damping::Constant { shrink, least, .. } if self.value > least => {
+                self.value = (self.value * shrink).max(least);
+                true
+            }
+            _ => false,
+        }
     }
 
     fn failed(&mut self) {
