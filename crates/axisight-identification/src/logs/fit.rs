@@ -191,11 +191,11 @@ pub fn fit<P: Problem>(
         } else {
             search.descend(&options, iterations, Patience::LONG)?
         };
-        let little = search.promise()? <= options.loss_tolerance * search.normal.loss;
         let over = status == Status::Exact || iterations == options.max_iterations;
         if !lazy || left == 0 || over {
             break;
         }
+        let little = search.promise()? <= options.loss_tolerance * search.normal.loss;
         if little && !search.gone_far(before) {
             status = Status::LossConverged;
             break;
