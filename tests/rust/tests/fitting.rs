@@ -216,8 +216,7 @@ fn logs_of_different_length_do_not_disturb_each_other() {
     assert_eq!(start, together.residual.len());
 }
 
-/// Lanes that logs leave carry derivatives by other parameters: the numbers are those of the same
-/// logs in as many lanes as there are, but for rounding where each carries fewer.
+/// Lanes that logs leave carry derivatives by other parameters: the same numbers, but for rounding.
 #[test]
 fn derivatives_do_not_depend_on_how_many_logs_share_the_lanes() {
     let mut problem = arm_problem(3, SIGMA);
