@@ -444,6 +444,9 @@ class FitResult:
     def condition(self) -> float:
         """Condition number of the normal matrix scaled to unit diagonal."""
     @property
+    def up_to_date(self) -> bool:
+        """Whether all columns of the Jacobian were computed where the fit ended."""
+    @property
     def at_bound(self) -> list[int]:
         """Indices (from 0) of the free parameters that ended on a bound."""
     @property

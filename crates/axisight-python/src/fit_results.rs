@@ -106,6 +106,10 @@ impl FitResult {
         self.fit.condition
     }
     #[getter]
+    fn up_to_date(&self) -> bool {
+        self.fit.up_to_date
+    }
+    #[getter]
     fn at_bound(&self) -> Vec<usize> {
         self.fit.at_bound.clone()
     }

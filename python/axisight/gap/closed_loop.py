@@ -22,6 +22,7 @@ from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
 from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.own_controller import other_controllers
+from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
@@ -68,11 +69,7 @@ class ClosedLoopView(View):
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
         kept_on_log = self.tracking.with_effects(own)
-        certain = certainties(self.tracking, logs, floor.weighting)
-        data = [
-            (_contiguous(log.position_rad), _contiguous(log.torque_nm), c)
-            for log, c in zip(logs, certain, strict=True)
-        ]
+        data = records_of(self.tracking, logs, floor.weighting)
         fitter = ClosedLoopFitter(
             kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
         )
@@ -120,10 +117,21 @@ class ClosedLoopView(View):
         )
         return replace(self.floor.weighting, weight=1.0 / np.sqrt(total))
 
-    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+    def followed(self, found: Search, logs: Sequence[Log]) -> float:
+        """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
+        there = self.fitter.along(records_of(self.tracking, logs, self.floor.weighting))
+        before = there.loss([], found.baseline)
+        left = there.loss(found.model.free, found.model)
+        noise = float(there.counted_by_axis() @ self.floor.expected)
+        return (before - left) / max(before - noise, 1e-300)
+
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
+        effects = {e.label: e for e in (*self._noisy.effects, *variant.effects)}.values()
         return noise_torques(
-            self._noisy,
+            self._noisy.with_parameters(variant.robot_values).with_effects(list(effects)),
             logs,
             self.floor.position_std_rad,
             self.settings.seed,
@@ -167,6 +175,15 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
     return out
 
 
+def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
+    """Return what a simulator that is kept on logs is compared with."""
+    certain = certainties(tracking, logs, weighting)
+    return [
+        (_contiguous(log.position_rad), _contiguous(log.torque_nm), c)
+        for log, c in zip(logs, certain, strict=True)
+    ]
+
+
 # Seconds that a log is not cut below.
 _LEAST_S = 4.0
 
@@ -198,11 +215,15 @@ class ClosedLoopFitter(ModelFitter):
 
     def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        return np.concatenate([row for log in self._counted_by_log() for row in log.T])
+
+    def counted_by_axis(self) -> Array:
+        """Return the sum of the same by axis (n_axes,)."""
+        return np.asarray(np.sum([log.sum(axis=0) for log in self._counted_by_log()], axis=0))
+
+    def _counted_by_log(self) -> list[Array]:
         step = self.weighting.decimation
-        parts: list[Array] = []
-        for *_, factor in self.records:
-            parts += list(factor[: len(factor) // step * step : step].T ** 2)
-        return np.concatenate(parts)
+        return [c[: len(c) // step * step : step] ** 2 for *_, c in self.records]
 
     def along(self, records: list[Record]) -> ClosedLoopFitter:
         """Return the same for other runs, as ``records`` are."""

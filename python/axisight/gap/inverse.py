@@ -74,8 +74,11 @@ class InverseView(View):
         """Return the predicted torque of every log."""
         return [predicted_torque(self.robot, variant, self.filtering(x)) for x in logs]
 
-    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
         """Return the error that noise of position and torque causes, for every log."""
+        del variant
         return [self.noise.error(log, run) for run, log in enumerate(logs, start=first_run)]
 
     def remarks(self) -> tuple[str, ...]:

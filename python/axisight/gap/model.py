@@ -123,7 +123,7 @@ class Evidence(Linearized):
     fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
     ``size`` (n_blocks,) of the blocks, ``samples`` (n_blocks,) what their residuals count for in
     all: fewer where some are weighed down. ``renewed``: the sensitivities are the model's own,
-    none is another's; ``fresh``: they were renewed at every step.
+    none is another's; ``up_to_date``: all of them were computed where the fit ended.
     """
 
     effects: tuple[Effect, ...]
@@ -140,7 +140,7 @@ class Evidence(Linearized):
     samples: Array
     residual: Array
     columns: dict[tuple[str | None, str], _core.Column]
-    fresh: bool = False
+    up_to_date: bool = False
 
     def part(self, logs: Sequence[int]) -> Evidence:
         """Return the same of some logs, by their numbers; what was fitted stays."""
@@ -165,6 +165,11 @@ class Evidence(Linearized):
     def converged(self) -> bool:
         """Whether the fit ended where no step lowers the loss further."""
         return self.status in ("loss_converged", "step_converged", "exact")
+
+    @property
+    def stuck(self) -> bool:
+        """Whether no step lowers the loss, whatever its sensitivities promise: another fit ends here too."""
+        return self.status == "stalled" and self.up_to_date
 
 
 @dataclass(frozen=True)
@@ -253,6 +258,12 @@ class ModelFitter(ABC):
         other._keep(logs)
         return other
 
+    def within(self, tolerances: float) -> ModelFitter:
+        """Return the same with the simulator's own parameters kept within so many of their tolerances."""
+        other = copy(self)
+        other.own = [_kept_within(p, tolerances) for p in self.own]
+        return other
+
     def beginnings(self) -> ModelFitter | None:
         """Return the same for the first halves of the logs; None where only the whole will do."""
         return None
@@ -336,7 +347,7 @@ class ModelFitter(ABC):
             tolerance = worth / max(start.total, worth)
         options = self._options(max_iterations, refreshes, tolerance)
         renewed = not lazy and near is None
-        return replace(self._solved(setup, free, options, near, renewed=renewed), fresh=fresh)
+        return self._solved(setup, free, options, near, renewed=renewed)
 
     def _solved(
         self,
@@ -439,7 +450,7 @@ class ModelFitter(ABC):
             if p.name in same
             else replace(
                 p,
-                initial=begin.get(p.name, p.initial),
+                initial=min(max(begin.get(p.name, p.initial), p.lower), p.upper),
                 nuisance=not fresh,
             )
             for p in self.own
@@ -478,6 +489,15 @@ class ModelFitter(ABC):
             scale=parameter.scale if self.natural is None else self.natural.of(effects[i], name),
             prior=free.priors.get(name),
         )
+
+
+def _kept_within(parameter: Parameter, tolerances: float) -> Parameter:
+    if parameter.prior is None:
+        return parameter
+    mean, std = parameter.prior
+    reach = tolerances * std
+    lower, upper = max(parameter.lower, mean - reach), min(parameter.upper, mean + reach)
+    return replace(parameter, lower=lower, upper=upper)
 
 
 def _first_halves(model: Evidence) -> list[tuple[int, int]]:
@@ -561,6 +581,7 @@ def _evidence(
         std={n: float(s) for n, s in zip(at.parameters, std, strict=True)},
         status=result.status,
         renewed=renewed,
+        up_to_date=result.up_to_date,
         condition=result.condition,
         log=blocks[:, 0],
         axis=blocks[:, 1],

@@ -18,8 +18,9 @@ from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
+from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.detection import detection_limits
-from axisight.gap.edge import bent, parameters_at_edge
+from axisight.gap.edge import parameters_at_edge
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
@@ -31,6 +32,7 @@ from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
+from axisight.gap.straight import bent_for
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
@@ -175,10 +177,12 @@ def _stands_out(logs: Sequence[ErrorLog]) -> bool:
 class Reach:
     """The gap on the validation logs before, re-fitted and with the causes one after another.
 
-    ``change``: what all of it changes of the simulator's torque there.
+    ``judged``: the same with the floor of a machine that chatters; ``change``: what all of it changes
+    of the simulator's torque there.
     """
 
     stages: Stages
+    judged: Stages
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
     left: tuple[ErrorLog, ...]
@@ -218,8 +222,10 @@ def _reach(
         for a, b in zip(earlier, stages, strict=False)
     ]
     remaining = zip(logs, _errors(steps[-1], measured), noise, strict=True)
+    reached = Stages(given, refitted, after, floor)
     return Reach(
-        Stages(given, refitted, after, floor),
+        reached,
+        with_chance(view, found, logs, reached, simulators[-1], measure),
         reductions,
         overlays(logs, before, steps[-1]),
         tuple(ErrorLog(*each) for each in remaining),
@@ -278,10 +284,11 @@ def _assemble(
     bands = band_map(error_logs, settings.block_s)
     regimes = regime_maps(error_logs, settings.bandwidth_hz, settings.block_s)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
+    judged = gap_figures(reach.judged)
     names = [log.name for log in held_logs]
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
-    share = bent(view.fitter, found.model)
-    conclusion = carried_over(conclusion, reach.stages, gap, names, settings, own, share)
+    share = bent_for(view.fitter, found)
+    conclusion = carried_over(conclusion, reach.judged, judged, names, settings, own, share)
     causes = _causes(conclusion, reach.reductions)
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     # Where nothing was named, `after` is the simulator re-fitted alone.
@@ -302,11 +309,15 @@ def _assemble(
         regime_maps=regimes,
         overlays=reach.overlays,
         refit={k: _relative(fitted, k, nominal[k]) for k in fitted.robot_values},
-        checks=(*conclusion.checks, *view.remarks()),
+        checks=(
+            *conclusion.checks,
+            *chance_check(reach.stages, reach.judged),
+            *view.remarks(),
+        ),
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
-        remainder=remainder_of(reach.stages, gap, reach.left, settings),
+        remainder=remainder_of(reach.judged, judged, reach.left, settings),
         detection_limits=detection_limits(found, view),
         findings=(
             *noted,

@@ -339,7 +339,7 @@ def _finish(fitter: ModelFitter, state: Search) -> None:
     as that of a load and the mass of the link that carries it.
     """
     model = state.model
-    if not model.free or linear_gain(model) < _OPEN:
+    if not model.free or model.stuck or linear_gain(model) < _OPEN:
         return
     with suppress(InputError):
         state.model = fitter.fit(

@@ -99,10 +99,7 @@ def settled(
 
 def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evidence:
     """Return a fit, with sensitivities renewed at every step where it has not settled without."""
-    if found.converged or linear_gain(found) < _SETTLED * found.total:
-        return found
-    # Those may stall too: no fit gets further.
-    if found.fresh and found.status == "stalled":
+    if found.converged or found.stuck or linear_gain(found) < _SETTLED * found.total:
         return found
     return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
 

@@ -15,9 +15,10 @@ from axisight.gap.noise import Floor
 from axisight.gap.orders import Turning
 from axisight.gap.result import Mode
 from axisight.gap.scales import NaturalSizes
+from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
-from axisight.gap.torques import Variant
+from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -103,8 +104,19 @@ class View(ABC):
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
     @abstractmethod
-    def noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
         """Return the torque error of noise alone on each log (n, n_axes) [Nm].
 
-        The noise of log ``i`` is that of run ``first_run + i``.
+        The noise of log ``i`` is that of run ``first_run + i``. ``variant``: the machine that it acts on,
+        where it goes round a loop.
         """
+
+    def followed(self, found: Search, logs: Sequence[Log]) -> float:
+        """Return the share of the explainable error that causes remove on ``logs`` that they are kept on.
+
+        1 where all of it is, 0 where nothing keeps a simulator on a log.
+        """
+        del found, logs
+        return 0.0

@@ -97,6 +97,8 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// Jacobian columns of the free parameters.
     pub columns: Vec<Column>,
+    /// Whether all columns were computed at `theta`.
+    pub up_to_date: bool,
 }
 
 /// Share of the loss that a step has to be worth where a search that no longer moves has not settled.
@@ -184,6 +186,8 @@ pub fn fit<P: Problem>(
     let mut search = Search::new(problem, parameters, options.loss, start);
     let lazy = search.fresh.len() < search.free.len();
     let mut before = search.normal.loss;
+    // Steps after which all columns were computed.
+    let mut renewed = warm.is_empty().then_some(0);
     let (mut status, mut iterations) = (Status::MaxIterations, 0);
     for left in (0..=options.nuisance_refreshes).rev() {
         (status, iterations) = if lazy {
@@ -192,7 +196,8 @@ pub fn fit<P: Problem>(
             search.descend(&options, iterations, Patience::LONG)?
         };
         let over = status == Status::Exact || iterations == options.max_iterations;
-        if !lazy || left == 0 || over {
+        // The same columns at the same point would lead nowhere again.
+        if !lazy || left == 0 || over || renewed == Some(iterations) {
             break;
         }
         let little = search.promise()? <= options.loss_tolerance * search.normal.loss;
@@ -202,13 +207,15 @@ pub fn fit<P: Problem>(
         }
         before = search.normal.loss;
         search.refresh()?;
+        renewed = Some(iterations);
     }
     // Columns that are no longer good point no longer where the loss is least.
     let astray = lazy && options.nuisance_refreshes > 0 && search.gone_far(before);
     if astray && status.advice().is_none() {
         status = Status::MaxIterations;
     }
-    Ok(search.finish(status, initial_loss, iterations))
+    let up_to_date = !lazy || renewed == Some(iterations);
+    Ok(search.finish(status, initial_loss, iterations, up_to_date))
 }
 
 impl<'a, P: Problem> Search<'a, P> {
@@ -362,7 +369,7 @@ impl<'a, P: Problem> Search<'a, P> {
         priors.sum()
     }
 
-    fn finish(self, status: Status, initial_loss: f64, iterations: usize) -> Fit {
+    fn finish(self, status: Status, initial_loss: f64, iterations: usize, up_to_date: bool) -> Fit {
         let scale = limits(self.parameters, &self.free).scale;
         let n = self.free.len();
         let total = self.total();
@@ -400,6 +407,7 @@ impl<'a, P: Problem> Search<'a, P> {
             blocks: self.blocks,
             residual: self.residual,
             columns: self.columns,
+            up_to_date,
         }
     }
 }

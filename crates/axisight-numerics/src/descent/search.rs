@@ -117,6 +117,37 @@ pub struct Outcome {
 /// From here on damping shortens every step, and short steps say nothing of a minimum.
 const STRONG: f64 = 1.0;
 
+/// Share of the promise of a step that failed below which another step is another step.
+const ANOTHER: f64 = 0.5;
+/// Share of its error below which the error of another step has to be.
+const SMOOTH: f64 = 0.75;
+/// Most steps that are passed over at a time.
+const PASSED_OVER: usize = 10;
+
+/// A step that failed.
+#[derive(Debug, Clone, Copy)]
+struct Failure {
+    promise: f64,
+    /// Error of the linear model: how much more the loss is than promised.
+    error: f64,
+}
+
+impl Failure {
+    /// Whether a step is hardly another one: it would fail as well.
+    fn is_nearly(&self, step: Step) -> bool {
+        self.promise.is_finite() && step.promise > ANOTHER * self.promise
+    }
+
+    /// Whether a shorter step failed by about as much.
+    ///
+    /// The error of a linear model falls at least as steps do. Where it does not, the loss is rough, as
+    /// that of a machine which chatters through its play: no shorter step is any better.
+    fn as_much_as(&self, shorter: Self) -> bool {
+        let another = shorter.promise <= ANOTHER * self.promise;
+        another && shorter.error > SMOOTH * self.error
+    }
+}
+
 /// Steps until one of the stopping rules holds.
 ///
 /// Every step that is accepted lowers the loss. The damping is in units of the curvature, as
@@ -169,6 +200,8 @@ fn advance<D: Descent>(
     let loss = descent.loss();
     let enough = rules.loss_tolerance * loss;
     let mut failures = 0;
+    let mut failed: Option<Failure> = None;
+    let mut passed_over = 0;
     loop {
         let step = descent.step(damper.value)?;
         // It would not gain enough if it kept its promise.
@@ -193,6 +226,13 @@ fn advance<D: Descent>(
         {
             return Ok(Advance::Ended(status));
         }
+        let again = failed.zip(step).is_some_and(|(f, s)| f.is_nearly(s));
+        if again && passed_over < PASSED_OVER {
+            damper.failed();
+            passed_over += 1;
+            continue;
+        }
+        passed_over = 0;
         // A step that was cut may lead uphill: a shorter one is cut less.
         if let Some(step) = step.filter(|s| s.promise > 0.0)
             && let Some(new) = descent.attempt()?
@@ -212,6 +252,14 @@ fn advance<D: Descent>(
                 });
             }
             descent.reject();
+            let now = Failure {
+                promise: step.promise,
+                error: new - loss + step.promise,
+            };
+            if failed.is_some_and(|before| before.as_much_as(now)) {
+                return Ok(Advance::Ended(at_end(descent, rules)?));
+            }
+            failed = Some(now);
         }
         damper.failed();
         failures += 1;
