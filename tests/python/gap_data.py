@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from axisight import Effect, Log, Robot, load_robot, simulate
-from axisight.gap.model import Evidence
+from axisight.gap.evidence import Evidence
 
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
 HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}

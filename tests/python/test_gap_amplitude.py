@@ -9,8 +9,8 @@ import scipy
 from axisight.effects import Effect
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.by_axis import OwnAxes
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.howfar import Stage
-from axisight.gap.model import Evidence, FreeEffect
 from gap_data import linear_evidence
 
 BLOCK = 20

@@ -8,8 +8,8 @@ import scipy.optimize
 
 from axisight.effects import Effect
 from axisight.gap.decide import Standing, Trial, clearly_worse, stand
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout, layout_of
-from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss, linear_gain
 from gap_data import linear_evidence
 

@@ -7,8 +7,8 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.kept import Bordered, KeptColumns
-from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import linear_gain
 from axisight.gap.screening import Bench, Screen
 from gap_data import bare_axis, logs_of, scattered

@@ -6,9 +6,9 @@ import pytest
 from axisight import Effect, Settings
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.decide import likelier
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import layout_of
 from axisight.gap.merged import one_for_several, several_together
-from axisight.gap.model import Evidence, FreeEffect
 from gap_data import bare_axis, logs_of
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}

@@ -11,8 +11,8 @@ from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView
+from axisight.gap.evidence import Evidence, FreeEffect, Linearized
 from axisight.gap.layout import Layout, layout_of
-from axisight.gap.model import Evidence, FreeEffect, Linearized
 from axisight.gap.score import linear_gain, linear_step
 from axisight.gap.screening import Bench, Screen, _first_halves, _tell, loudest_logs, thinned
 from gap_data import bare_axis, linear_evidence, logs_of, scattered

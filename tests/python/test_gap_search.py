@@ -10,8 +10,8 @@ import pytest
 from axisight import Effect, Settings
 from axisight.errors import InputError
 from axisight.gap import search, trials
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.model import FreeEffect
 from axisight.gap.screening import Start
 from axisight.gap.trials import Trials
 from gap_data import linear_evidence

@@ -11,8 +11,8 @@ from axisight.blind.case_files import CaseFolder
 from axisight.cli import app
 from axisight.excitation import read_references
 from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import layout_of
-from axisight.gap.model import FreeEffect
 from axisight.gap.separate.design import separating
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard

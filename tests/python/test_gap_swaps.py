@@ -9,8 +9,8 @@ from axisight import Effect, load_robot
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial
 from axisight.gap.edge import BENT, bent
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.model import FreeEffect
 from axisight.gap.swaps import straightened, weighed_again
 from gap_data import linear_evidence
 

@@ -7,7 +7,7 @@ import pytest
 
 from axisight import Effect
 from axisight.gap.decide import trial
-from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.terms import idle_terms
 from gap_data import linear_evidence
 

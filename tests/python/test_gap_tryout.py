@@ -7,8 +7,8 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import layout_of
-from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.search import _refitted

@@ -4,8 +4,8 @@ import numpy as np
 
 from axisight import Effect
 from axisight.fitting import Weighting
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.inverse import InverseDynamicsFitter, block_s
-from axisight.gap.model import FreeEffect
 from axisight.gap.motion import motion
 from axisight.gap.settings import Settings
 from rigid_arm import arm, log_of

@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.gap.model import Evidence
+from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
 
 Array = NDArray[np.float64]

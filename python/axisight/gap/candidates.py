@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
-from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
 from axisight.gap.starts import STARTS, Response, Situation, Trial
 from axisight.logs import Log

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.gap.amplitude import amplitude_significance
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect
 from axisight.gap.score import held_out_loss
 from axisight.gap.terms import idle_terms
 

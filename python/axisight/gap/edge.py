@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from axisight.fitting import robot_parameters
+from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
-from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.tolerances import tolerance_of
 
 # A parameter this many of its tolerances off is one machine in four hundred: rather something

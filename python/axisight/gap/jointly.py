@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, stand, trial
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.settings import Settings
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.model import Evidence, FreeEffect, Linearized
+from axisight.gap.evidence import Evidence, FreeEffect, Linearized
 
 Array = NDArray[np.float64]
 

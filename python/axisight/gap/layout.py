@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from axisight.gap.model import Evidence
+from axisight.gap.evidence import Evidence
 
 Array = NDArray[np.float64]
 

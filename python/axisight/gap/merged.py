@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, likelier, numbers, stand, trial
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss
 from axisight.gap.settings import Settings
 

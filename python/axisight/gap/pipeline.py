@@ -21,11 +21,11 @@ from axisight.gap.carried import carried_over
 from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
+from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
-from axisight.gap.model import Evidence
 from axisight.gap.modes import view_of
 from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.fitting import PRIOR_REACH
-from axisight.gap.model import Evidence, Linearized
+from axisight.gap.evidence import Evidence, Linearized
 
 Array = NDArray[np.float64]
 

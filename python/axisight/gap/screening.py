@@ -16,9 +16,10 @@ from scipy.optimize import minimize_scalar
 from axisight._core import Courses
 from axisight.effects import effect_info
 from axisight.errors import InputError
+from axisight.gap.evidence import Evidence, FreeEffect, Linearized
 from axisight.gap.kept import Bordered, KeptColumns
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, Linearized, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.score import linear_falls, linear_gain
 from axisight.gap.sensitivity import Sensitivity, sensitivity
 

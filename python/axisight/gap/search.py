@@ -14,11 +14,12 @@ from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
 from axisight.gap.edge import BENT, bent
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
 from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.merged import one_for_several
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.screening import kept_beside
 from axisight.gap.sensitivity import Sensitivity

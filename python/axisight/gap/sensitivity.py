@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.gap.model import FreeEffect, Linearized
+from axisight.gap.evidence import FreeEffect, Linearized
 from axisight.gap.score import linear_step, predicted_loss
 
 Array = NDArray[np.float64]

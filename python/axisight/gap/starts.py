@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo
-from axisight.gap.model import FreeEffect
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.orders import Complex, Turning, passed, strongest_orders
 from axisight.logs import Log
 from axisight.robot import Robot

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, stand, trial
 from axisight.gap.edge import BENT, bent
+from axisight.gap.evidence import Evidence
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import kept_beside
 from axisight.gap.trials import settled

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from axisight.effects import effect_info
-from axisight.gap.model import Evidence
+from axisight.gap.evidence import Evidence
 
 
 def idle_terms(evidence: Evidence, pays: Callable[[float, float], bool]) -> int:

@@ -15,9 +15,10 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity

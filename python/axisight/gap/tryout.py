@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from axisight.gap.decide import Trial, trial
-from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.screening import Bench, Screen, Start
 
 # Steps of the fit of a candidate; leaders go on from there.

@@ -10,8 +10,8 @@ import numpy as np
 from axisight.effects import Effect, effect_info
 from axisight.gap.advice import separating_experiment
 from axisight.gap.decide import Ranked, Standing
+from axisight.gap.evidence import Evidence
 from axisight.gap.intervals import intervals
-from axisight.gap.model import Evidence
 from axisight.gap.named import NamedCause
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss

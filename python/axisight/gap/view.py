@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
-from axisight.gap.model import Evidence, FreeEffect, ModelFitter
+from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.orders import Turning
 from axisight.gap.result import Mode

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from axisight.excitation import References
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
 from axisight.gap.decide import log_ratio
-from axisight.gap.model import Evidence, FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.search import Search
 from axisight.gap.separate.experiment import ENOUGH, Experiment
 from axisight.gap.separate.rivals import Rivals, rivals_of

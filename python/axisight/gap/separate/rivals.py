@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.model import Evidence
+from axisight.gap.evidence import Evidence
 from axisight.gap.search import Search
 
 Array = NDArray[np.float64]
