@@ -22,7 +22,7 @@ from axisight.blind import (
     pinocchio_engine,
 )
 from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
-from axisight.blind.formulas import ConstantTorque, DelayLine, Formula
+from axisight.blind.formulas import ConstantTorque, DelayLine, Formula, ResonantLoop
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
 from axisight.blind.make import make_cases
@@ -109,6 +109,11 @@ def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
     ("native", "laws", "ours"),
     [
         (Native(lag_s=6.2e-4), [], Effect("actuator_bandwidth", 1, {"time_constant_s": 6.2e-4})),
+        (
+            Native(),
+            [ResonantLoop(1e-3, 0.4)],
+            Effect("current_loop", 1, {"time_constant_s": 1e-3, "damping": 0.4}),
+        ),
         (Native(), [DelayLine(1.2e-3)], Effect("input_delay", 1, {"delay_s": 1.2e-3})),
         (Native(), [ConstantTorque(0.4)], Effect("torque_offset", 1, {"offset_nm": 0.4})),
         (Native(gear=0.05), [], Effect("torque_constant", 1, {"relative_error": 0.05})),

@@ -7,6 +7,7 @@ import pytest
 import scipy.integrate
 
 from axisight import Robot, load_robot
+from axisight.blind import laws
 from axisight.blind.drawing import scattered
 from axisight.blind.formulas import (
     CurrentLimit,
@@ -22,6 +23,7 @@ from axisight.blind.formulas import (
     Play,
     Push,
     ResolverImbalance,
+    ResonantLoop,
     RoundedKnee,
     StaleSensor,
     TanhStribeck,
@@ -143,6 +145,17 @@ def test_drives_are_late_by_what_they_say():
     # Mean of 1 - exp(-t / T) over each step.
     exact = 1 - 2.0 * (np.exp(-starts / 2e-3) - np.exp(-(starts + 1e-3) / 2e-3))
     assert means == pytest.approx(exact, rel=1e-12)
+    loops = ResonantLoop(2e-3, 0.4), laws.ResonantLoop(2e-3, 0.4)
+    loops[0].begin(at(), 1e-4)
+    loops[1].begin(1e-4)
+    loops[0].command(np.zeros(1))
+    loops[1].command(0.0)
+    found = [(float(loops[0].command(np.ones(1))[0]), loops[1].command(1.0)) for _ in range(200)]
+    # Its step response (Ogata 2010, section 5.3), in the middle of every step; means over steps and the
+    # midpoint rule are off by a share of the square of a step of a twentieth.
+    t, swing = (np.arange(200) + 0.5) * 0.05, np.sqrt(1 - 0.4**2)
+    wave = np.cos(swing * t) + 0.4 / swing * np.sin(swing * t)
+    assert np.abs(np.array(found) - (1 - np.exp(-0.4 * t) * wave)[:, None]).max() < 1e-3
     stale = StaleSensor(2)
     stale.begin(at(), 1e-3)
     said = [k + float(np.asarray(stale.sensor(np.array([float(k)])))[0]) for k in range(6)]

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -333,6 +334,31 @@ class Lag(Formula):
         self.made = torque + left * (before - torque)
         share = (1 - left) * self.time_constant_s / self.step_s
         return np.asarray(torque + share * (before - torque))
+
+
+class ResonantLoop(Formula):
+    """A drive with a current loop of second order, T^2 y'' + 2 D T y' + y = u; exact over every step."""
+
+    def __init__(self, time_constant_s: float, damping: float) -> None:
+        self.time_constant_s, self.damping = time_constant_s, damping
+        self.ahead = np.eye(4)
+        self.state: Array | None = None
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin in balance."""
+        del place
+        # Of torque, its rate in units of the time constant, their mean over the step, and the command.
+        share, d = step_s / self.time_constant_s, self.damping
+        rates = [[0, share, 0, 0], [-share, -2 * d * share, 0, share], [1, 0, 0, 0], [0, 0, 0, 0]]
+        self.ahead, self.state = scipy.linalg.expm(np.array(rates, np.float64)), None
+
+    def command(self, torque: Array) -> Array:
+        """Return the mean torque over the step."""
+        still = np.zeros_like(torque)
+        made, rate = (torque, still) if self.state is None else self.state
+        made, rate, mean, _ = self.ahead @ np.array([made, rate, still, torque])
+        self.state = np.array([made, rate])
+        return np.asarray(mean)
 
 
 class StaleSensor(Formula):

@@ -239,6 +239,33 @@ class Delay(Law):
         return self.line[0]
 
 
+class ResonantLoop(Law):
+    """A drive whose torque swings about its command before it follows: T^2 y'' + 2 D T y' + y = u.
+
+    One implicit midpoint step each.
+    """
+
+    def __init__(self, time_constant_s: float, damping: float) -> None:
+        self.time_constant_s, self.damping = time_constant_s, damping
+        self.half = 0.0
+        self.made: float | None = None
+        self.rate = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Begin in balance."""
+        self.half = 0.5 * step_s / self.time_constant_s
+        self.made, self.rate = None, 0.0
+
+    def command(self, torque: float) -> float:
+        """Return the mean torque over the step."""
+        before = torque if self.made is None else self.made
+        h, damped = self.half, 1 + 2 * self.damping * self.half
+        # The rate half a step on, in units of the time constant.
+        rate = (self.rate + h * (torque - before)) / (damped + h * h)
+        self.made, self.rate = before + 2 * h * rate, 2 * rate - self.rate
+        return before + h * rate
+
+
 class LateSensor(Law):
     """A sensor that says where the motor was some samples ago; it is asked once a sample."""
 

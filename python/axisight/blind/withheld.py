@@ -150,6 +150,13 @@ def _lag(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag + held}, Native(lag_s=lag))
 
 
+def _loop(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    # Of a drive that is tuned to overshoot by a tenth, or hardly.
+    lag, damping = between(rng, 0.5e-3, 2e-3), float(rng.uniform(0.3, 0.8))
+    values = {"time_constant_s": lag, "damping": damping}
+    return Drawn("current_loop", axis, values, laws=[laws.ResonantLoop(lag, damping)])
+
+
 def _constant(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     share = sign(rng) * between(rng, 0.03, 0.1)
     return Drawn("torque_constant", axis, {"relative_error": share}, Native(gear=share))
@@ -296,6 +303,7 @@ KINDS: Mapping[str, Kind] = {
     "resolver_ripple": Kind(_resolver_ripple),
     "input_delay": Kind(_delay),
     "actuator_bandwidth": Kind(_lag),
+    "current_loop": Kind(_loop),
     "torque_constant": Kind(_constant),
     "torque_offset": Kind(_offset),
     "motor_inertia": Kind(_inertia),

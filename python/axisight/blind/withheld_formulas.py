@@ -147,6 +147,9 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
             "piecewise_stiffness": _knee,
             "transmission_error": _gear_error,
             "sensor_delay": _stale,
+            "current_loop": lambda _r, _s, _a, v: formulas.ResonantLoop(
+                v["time_constant_s"], v["damping"]
+            ),
             "torque_offset": lambda _r, _s, _a, v: formulas.ConstantTorque(v["offset_nm"]),
             "torque_sensor_gain": lambda _r, _s, _a, v: formulas.WrongReport(
                 share=1 + v["relative_error"]

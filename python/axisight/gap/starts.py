@@ -418,5 +418,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "sensor_delay": _as_its_twin,
     "torque_sensor_offset": _as_its_twin,
     "feedforward_missing": _shown_by_logs,
+    "current_loop": _neutral,
 }
 """By effect."""

@@ -171,15 +171,21 @@ fn derivatives_agree_with_finite_differences() {
 #[test]
 fn timing_effects_have_a_derivative_at_zero() {
     let robot = robot(PRESET);
-    for (name, tolerance) in [("input_delay", 1e-4), ("actuator_bandwidth", 1e-2)] {
-        let mut setting = effect::<Dual<f64, 1>>(name, Some(0), &[0.0]);
+    for (name, shape, tolerance) in [
+        ("input_delay", &[][..], 1e-4),
+        ("actuator_bandwidth", &[], 1e-2),
+        ("current_loop", &[0.7], 1e-2),
+    ] {
+        let parameters = |x: f64| [&[x], shape].concat();
+        let mut setting = effect::<Dual<f64, 1>>(name, Some(0), &parameters(0.0));
         setting.parameters[0] = setting.parameters[0].seeded(0);
         let exact: Vec<f64> = closed_loop(&robot, &[setting])
             .command
             .iter()
             .map(|u| u.partials[0])
             .collect();
-        let at = |x: f64| closed_loop::<f64>(&robot, &[effect(name, Some(0), &[x])]).command;
+        let at =
+            |x: f64| closed_loop::<f64>(&robot, &[effect(name, Some(0), &parameters(x))]).command;
         let base = at(0.0);
         let slope =
             |h: f64| -> Vec<f64> { at(h).iter().zip(&base).map(|(a, b)| (a - b) / h).collect() };

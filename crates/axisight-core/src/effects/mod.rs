@@ -108,6 +108,7 @@ effect_table!(
     sensor_delay,
     torque_sensor_offset,
     feedforward_missing,
+    current_loop,
 );
 
 /// Description of effect `name`.

@@ -184,8 +184,12 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn delay(&self) -> Option<S> {
         None
     }
-    /// Time constant of the current loop [s].
+    /// Time constant of the current loop [s], of first order.
     fn lag(&self) -> Option<S> {
+        None
+    }
+    /// Time constant [s] and damping ratio of the current loop, of second order.
+    fn current_loop(&self) -> Option<(S, S)> {
         None
     }
 

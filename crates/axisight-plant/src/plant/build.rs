@@ -201,6 +201,9 @@ impl<S: Scalar> Plant<S> {
         if info.acts == Acts::Arm && link.is_none() {
             return Err(needs("an axis that moves a link with mass", "massless").into());
         }
+        if one_too_many(&axis.kernels, &own.kernel) {
+            return Err(needs("an axis with no other current loop", "it has one").into());
+        }
         let (stiffness, damping) = match &mut axis.gear {
             Some(gear) => (Some(&mut gear.stiffness), Some(&mut gear.damping)),
             None => (None, None),
@@ -233,6 +236,14 @@ impl<S: Scalar> Plant<S> {
             .map_or(self.chain.len(), |next| next.joint);
         (self.axes[index].joint..end).find(|i| self.chain.joints[*i].body.is_some())
     }
+}
+
+/// Whether an axis would have a current loop of second order beside another one.
+fn one_too_many<S: Scalar>(others: &[Arc<dyn Kernel<S>>], new: &Arc<dyn Kernel<S>>) -> bool {
+    let first = |k: &Arc<dyn Kernel<S>>| k.lag().is_some();
+    let second = |k: &Arc<dyn Kernel<S>>| k.current_loop().is_some();
+    let any = others.iter().any(|k| first(k) || second(k));
+    (second(new) && any) || (first(new) && others.iter().any(second))
 }
 
 fn misplaced(info: &'static EffectInfo, n_axes: usize, place: Place) -> EffectError {

@@ -2,6 +2,7 @@
 
 mod closed_loop;
 mod controller;
+mod current_loop;
 mod dormand_prince;
 mod implicit;
 mod method;

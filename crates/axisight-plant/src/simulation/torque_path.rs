@@ -7,6 +7,7 @@
 //! on those two moments only, are then exact for the motor inertia, whatever
 //! the delay or lag, and the result is smooth in both parameters.
 
+use super::current_loop::{CurrentLoop, Delivered, Moments};
 use crate::effect::Kernel;
 use crate::plant::Axis;
 use axisight_scalar::Scalar;
@@ -41,15 +42,13 @@ impl<S: Scalar> Line<S> {
     }
 }
 
-/// Keeps a lag of zero from dividing by zero; far below any time that matters.
-const SHORTEST_LAG_S: f64 = 1e-18;
-
 /// Torque path of one axis.
 pub struct TorquePath<S> {
-    sample_time: f64,
     kernels: Vec<Arc<dyn Kernel<S>>>,
     delay: Option<Delay<S>>,
-    lag: Option<Lag<S>>,
+    lag: Option<CurrentLoop<S>>,
+    /// Of the lag, at the start of the sample.
+    state: Delivered<S>,
 }
 
 struct Delay<S> {
@@ -58,17 +57,6 @@ struct Delay<S> {
     /// The commands the drive still has to apply, oldest first: the one in force at
     /// the start of the sample, the one it switches to, and those to come.
     history: Vec<S>,
-}
-
-struct Lag<S> {
-    time_constant: S,
-    state: S,
-}
-
-/// Zeroth and first moment of a torque over part of a sub-step.
-struct Moments<S> {
-    zeroth: S,
-    first: S,
 }
 
 impl<S: Scalar> TorquePath<S> {
@@ -82,14 +70,15 @@ impl<S: Scalar> TorquePath<S> {
         let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);
         let delay = total(kernels.iter().filter_map(|k| k.delay()).collect());
         let lag = total(kernels.iter().filter_map(|k| k.lag()).collect());
+        let first_order = lag.map(|t| CurrentLoop::new(t, None, sample_time));
+        let second_order = kernels.iter().find_map(|k| k.current_loop());
         Self {
-            sample_time,
-            kernels,
             delay: delay.map(|d| Delay::new(d * (1.0 / sample_time), rest)),
-            lag: lag.map(|time_constant| Lag {
-                time_constant: time_constant + SHORTEST_LAG_S,
-                state: rest,
+            lag: second_order.map_or(first_order, |(t, damping)| {
+                Some(CurrentLoop::new(t, Some(damping), sample_time))
             }),
+            state: Delivered::settled(rest),
+            kernels,
         }
     }
 
@@ -110,17 +99,12 @@ impl<S: Scalar> TorquePath<S> {
         self.delay.is_some() || self.lag.is_some()
     }
 
-    /// Delivered torque after the lag, which starts the sample or step in `state`.
-    fn lag_state(&self) -> Option<S> {
-        self.lag.as_ref().map(|lag| lag.state)
-    }
-
     fn delivered(&self, torque: S) -> S {
         self.kernels.iter().fold(torque, |t, k| k.drive(t))
     }
 
     /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
-    fn line(&self, command: S, from: f64, to: f64, state: &mut S) -> Line<S> {
+    fn line(&self, command: S, from: f64, to: f64, state: &mut Delivered<S>) -> Line<S> {
         let width = to - from;
         let mut zeroth = S::zero();
         let mut first = S::zero();
@@ -166,26 +150,18 @@ impl<S: Scalar> TorquePath<S> {
 
     /// Moments over a piece of length `width` that starts `start` into the
     /// sub-step (both in samples), command constant at `torque`.
-    fn moments(&self, torque: S, start: S, width: S, state: &mut S) -> Moments<S> {
-        let middle = start + width * 0.5;
+    fn moments(&self, torque: S, start: S, width: S, state: &mut Delivered<S>) -> Moments<S> {
         let held = Moments {
             zeroth: torque * width,
-            first: torque * width * middle,
+            first: torque * width * (start + width * 0.5),
         };
         let Some(lag) = &self.lag else {
             return held;
         };
-        let t_c = lag.time_constant * (1.0 / self.sample_time);
-        let ratio = width / t_c;
-        let decay = (-ratio).exp();
-        let gone = S::one() - decay;
-        let excess = *state - torque;
-        *state = torque + excess * decay;
-        let zeroth = t_c * gone;
-        let own_first = t_c * t_c * (S::one() - decay * (ratio + 1.0));
+        let excess = lag.excess(torque, start, width, state);
         Moments {
-            zeroth: held.zeroth + excess * zeroth,
-            first: held.first + excess * (start * zeroth + own_first),
+            zeroth: held.zeroth + excess.zeroth,
+            first: held.first + excess.first,
         }
     }
 }
@@ -201,19 +177,19 @@ pub struct SampleTorque<'a, S> {
 pub struct TorqueBuffers<S> {
     commands: Vec<S>,
     /// Lag states at the start of the span in hand and at its end.
-    at_start: Vec<S>,
-    at_end: Vec<S>,
+    at_start: Vec<Delivered<S>>,
+    at_end: Vec<Delivered<S>>,
     lines: Vec<Line<S>>,
 }
 
 impl<S: Scalar> TorqueBuffers<S> {
     /// For `n_axes` axes.
     pub fn new(n_axes: usize) -> Self {
-        let zeros = vec![S::zero(); n_axes];
+        let states = vec![Delivered::settled(S::zero()); n_axes];
         Self {
-            commands: zeros.clone(),
-            at_start: zeros.clone(),
-            at_end: zeros,
+            commands: vec![S::zero(); n_axes],
+            at_start: states.clone(),
+            at_end: states,
             lines: Vec::with_capacity(n_axes),
         }
     }
@@ -283,16 +259,14 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
     /// Go back to the start of the sample.
     pub fn rewind(&mut self) {
         for (state, path) in self.buffers.at_start.iter_mut().zip(&*self.paths) {
-            *state = path.lag_state().unwrap_or_else(S::zero);
+            *state = path.state;
         }
     }
 
     /// The sample is over.
     pub fn finish(self) {
         for (path, state) in self.paths.iter_mut().zip(&self.buffers.at_start) {
-            if let Some(lag) = &mut path.lag {
-                lag.state = *state;
-            }
+            path.state = *state;
         }
     }
 }

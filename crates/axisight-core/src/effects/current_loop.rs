@@ -1,0 +1,62 @@
+//! A current loop of second order.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "current_loop",
+    summary: "the drive follows the commanded torque with a lag of second order, and may overshoot",
+    equation: "T^2 tau'' + 2 D T tau' + tau = u,  natural frequency 1 / (2 pi T)",
+    source: "Leonhard (2001), Control of Electrical Drives, section 7.2 (closed current loop)",
+    scope: Scope::Axis,
+    acts: Acts::TorquePath,
+    family: Family::Timing,
+    contains: &["actuator_bandwidth"],
+    parts: &[],
+    usual: &["actuator_bandwidth", "input_delay"],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::Path,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::WideBand],
+    parameters: &[
+        ParameterInfo {
+            name: "time_constant_s",
+            unit: "s",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 0.1,
+            typical: 1e-3,
+        },
+        ParameterInfo {
+            name: "damping",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.7,
+            lower: 0.1,
+            upper: 0.95,
+            typical: 0.7,
+        },
+    ],
+};
+
+struct Loop<S> {
+    time_constant: S,
+    damping: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Loop {
+        time_constant: p[0],
+        damping: p[1],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Loop<S> {
+    fn current_loop(&self) -> Option<(S, S)> {
+        Some((self.time_constant, self.damping))
+    }
+}
