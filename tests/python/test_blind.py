@@ -119,6 +119,11 @@ def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
         (Native(gear=0.05), [], Effect("torque_constant", 1, {"relative_error": 0.05})),
         (Native(spring=-0.2), [], Effect("joint_stiffness", 1, {"relative_change": -0.2})),
         (Native(armature=0.2), [], Effect("motor_inertia", 1, {"relative_change": 0.2})),
+        (
+            Native(longer_m=(0.03, -0.02, 0.04)),
+            [],
+            Effect("link_geometry", 1, {"x_m": 0.03, "y_m": -0.02, "z_m": 0.04}),
+        ),
         (Native(damper=0.7), [], Effect("joint_damping", 1, {"relative_change": 0.7})),
         (
             Native(kp=0.1, ki=-0.2),

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from axisight.blind.machine import NOTHING, Ends, Native
-from axisight.robot import Robot
+from axisight.blind.machine import NOTHING, Machine, Native
 from axisight.robot.description import Joint
 
 STEPS_PER_SAMPLE = 2
@@ -29,12 +28,12 @@ class _Parts:
     axes: list[str] = field(default_factory=list)
 
 
-def mjcf(robot: Robot, native: Mapping[int, Native], ends: Ends, step_s: float) -> str:
-    """Return the model (MJCF) of a robot: rotors on tendons that pull at their joints.
+def mjcf(machine: Machine, step_s: float) -> str:
+    """Return the model (MJCF) of a machine: rotors on tendons that pull at their joints.
 
-    ``native``: changes by axis, from 0. Positions are motor angles, then those of the base's springs,
-    then joint angles.
+    Positions are motor angles, then those of the base's springs, then joint angles.
     """
+    robot, ends = machine.robot, machine.ends
     parts = _Parts()
     for axis, stiffness in ends.springs:
         parts.bodies += (
@@ -42,8 +41,8 @@ def mjcf(robot: Robot, native: Mapping[int, Native], ends: Ends, step_s: float) 
             f"{_NEARLY_MASSLESS}"
         )
         parts.close += "</body>"
-    for joint in robot.joints:
-        _add_joint(parts, joint, native)
+    for joint, origin in zip(robot.joints, machine.origins(), strict=True):
+        _add_joint(parts, joint, origin, machine.native)
     if ends.tip_kg:
         parts.bodies += (
             f'<body pos="{_vector(ends.tip_m)}">'
@@ -56,11 +55,13 @@ def mjcf(robot: Robot, native: Mapping[int, Native], ends: Ends, step_s: float) 
     <tendon>{parts.tendons}</tendon><actuator>{parts.actuators}</actuator></mujoco>"""
 
 
-def _add_joint(parts: _Parts, joint: Joint, native: Mapping[int, Native]) -> None:
+def _add_joint(
+    parts: _Parts, joint: Joint, origin: tuple[float, ...], native: Mapping[int, Native]
+) -> None:
     spring = ""
     if joint.drive is None and joint.spring is not None:
         spring = f'stiffness="{joint.spring.stiffness!r}" damping="{joint.spring.damping!r}"'
-    parts.bodies += f'<body pos="{_vector(joint.origin_m)}">'
+    parts.bodies += f'<body pos="{_vector(origin)}">'
     change = native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
     # A position counts from where the bodies stand as they are written.
     kind = "slide" if joint.prismatic else "hinge"

@@ -26,7 +26,8 @@ class Native:
     ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
     added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
     ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
-    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad].
+    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad]; ``longer_m``: by how much
+    the next axis lies elsewhere in the link.
     """
 
     half_width_rad: float = 0.0
@@ -43,6 +44,7 @@ class Native:
     zero_rad: float = 0.0
     for_rate: float = 0.0
     for_speed: float = 0.0
+    longer_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 NOTHING = Native()
@@ -79,6 +81,18 @@ class Machine:
     native: Mapping[int, Native] = field(default_factory=dict)
     ends: Ends = PLAIN
     laws: Mapping[int, Sequence[object]] = field(default_factory=dict)
+
+    def origins(self) -> list[tuple[float, ...]]:
+        """Return where every joint lies in the link before [m]."""
+        own, axis, out = self.of_axes(), -1, []
+        for joint in self.robot.joints:
+            where = tuple(float(x) for x in joint.origin_m)
+            if joint.drive is not None:
+                if axis >= 0:
+                    where = tuple(x + d for x, d in zip(where, own[axis].longer_m, strict=True))
+                axis += 1
+            out.append(where)
+        return out
 
     def of_axes(self) -> list[Native]:
         """Return the native changes of every axis."""

@@ -53,7 +53,7 @@ class _Loop:
         self.n = robot.n_axes
         self.sample_s = robot.sample_time_s
         self.step_s = self.sample_s / STEPS_PER_SAMPLE
-        text = mjcf(robot, machine.native, machine.ends, self.step_s)
+        text = mjcf(machine, self.step_s)
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
         self.joints = np.array(robot.axis_joints) + self.n + len(machine.ends.springs)

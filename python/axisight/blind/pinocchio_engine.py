@@ -93,15 +93,15 @@ def _chain(machine: Machine) -> _Chain:
     for k, (axis, stiffness) in enumerate(ends.springs):
         chain.add(f"base{k}", np.array(axis), np.zeros(3))
         chain.spring(stiffness, stiffness * ends.rocks_s)
-    for joint in robot.joints:
-        _add(chain, joint)
+    for joint, origin in zip(robot.joints, machine.origins(), strict=True):
+        _add(chain, joint, origin)
     if ends.tip_kg:
         chain.load(ends.tip_kg, np.array(ends.tip_m), np.array([1e-6] * 3 + [0.0] * 3))
     return chain
 
 
-def _add(chain: _Chain, joint: Joint) -> None:
-    chain.add(joint.name, joint.axis, joint.origin_m, slides=joint.prismatic)
+def _add(chain: _Chain, joint: Joint, origin: tuple[float, ...]) -> None:
+    chain.add(joint.name, joint.axis, np.array(origin), slides=joint.prismatic)
     if joint.drive is None and joint.spring is not None:
         chain.spring(joint.spring.stiffness, joint.spring.damping)
     if joint.link is not None:

@@ -22,6 +22,7 @@ from axisight.blind.scene import (
     Rng,
     Scene,
     between,
+    everywhere,
     sign,
     turning,
     unloaded,
@@ -219,6 +220,12 @@ def _link_com(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("link_com", axis, shift, changed=changed)
 
 
+def _length(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    shift = {f"{k}_m": sign(rng) * between(rng, 0.01, 0.05) * scene.reach for k in "xyz"}
+    native = Native(longer_m=(shift["x_m"], shift["y_m"], shift["z_m"]))
+    return Drawn("link_geometry", axis, shift, native)
+
+
 def _rocking(rng: Rng, scene: Scene, _axis: int) -> Drawn:
     about = [between(rng, 2e-8, 2e-7) / scene.weight for _ in range(2)]
     damping = between(rng, 5e-4, 4e-3)
@@ -316,6 +323,7 @@ KINDS: Mapping[str, Kind] = {
     "link_mass": Kind(_link_share("link_mass", "mass", 0.08, 0.3)),
     "link_inertia": Kind(_link_share("link_inertia", "inertia_scale", 0.2, 0.8)),
     "link_com": Kind(_link_com),
+    "link_geometry": Kind(_length, axes=lambda scene: everywhere(scene)[:-1]),
     "base_compliance": Kind(_rocking),
     "friction_warmup": Kind(_warmup),
     "piecewise_stiffness": Kind(_knee, axes=unloaded),

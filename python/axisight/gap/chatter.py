@@ -41,15 +41,16 @@ def with_chance(
     """Return the stages with the floor of the machine with its ``causes``, where that chatters.
 
     Unchanged where the gap with them stands at the floor as it is, where noise makes no more of
-    itself on that machine, and where the causes do not hold on ``logs`` that the simulator is kept on.
+    itself on that machine, or more than there was to explain, and where the causes do not hold on ``logs``
+    that the simulator is kept on.
     """
-    floor = stages.floor.mean()
-    if not causes.effects or stages.after.mean() <= _ABOVE * floor:
+    least = _ABOVE * stages.floor.mean()
+    if not causes.effects or stages.after.mean() <= least:
         return stages
     runs = measure(view.noises(logs, len(view.logs), causes))
-    if not runs.mean() > _ABOVE * floor or view.followed(found, logs) < _FOLLOWED:
+    if not least < runs.mean() < stages.refitted.mean():
         return stages
-    return replace(stages, floor=runs)
+    return replace(stages, floor=runs) if view.followed(found, logs) >= _FOLLOWED else stages
 
 
 def chance_check(stages: Stages, judged: Stages) -> tuple[str, ...]:

@@ -120,8 +120,12 @@ class ClosedLoopView(View):
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
         there = self.fitter.along(records_of(self.tracking, logs, self.floor.weighting))
-        before = there.loss([], found.baseline)
-        left = there.loss(found.model.free, found.model)
+        try:
+            before = there.loss([], found.baseline)
+            left = there.loss(found.model.free, found.model)
+        except InputError:
+            # One of them cannot be kept there.
+            return 0.0
         noise = float(there.counted_by_axis() @ self.floor.expected)
         return (before - left) / max(before - noise, 1e-300)
 

@@ -75,6 +75,11 @@ def _neutral(trial: Trial) -> FreeEffect:
     return FreeEffect(trial.effect(values), tuple(values))
 
 
+def _before_the_last(trial: Trial) -> FreeEffect | None:
+    """Begin at the neutral values; the last link carries no axis."""
+    return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
+
+
 def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
     """Begin at neutral values; speeds that shape a friction law are shares of the speeds seen."""
 
@@ -145,26 +150,56 @@ _SMALL_SHARE = 0.1
 _LEAST_DEFLECTION_RAD = 1e-4
 
 
+def _stiffness(trial: Trial) -> float:
+    robot = trial.robot
+    return robot.parameters()[f"{robot.axis_names[trial.index]}.stiffness"]
+
+
 def _deflection_rad(trial: Trial) -> float:
     """Return the deflection of the gear under the torque of the log that moves it most.
 
     Not less than what shapes of gears are stated for.
     """
-    robot, i = trial.robot, trial.index
-    stiffness = robot.parameters()[f"{robot.axis_names[i]}.stiffness"]
-    ratio = abs(float(robot.gear_ratio[i]))
+    ratio = abs(float(trial.robot.gear_ratio[trial.index]))
     most = max(float(np.std(torque)) for torque in trial.torque())
-    return max(most / ratio / stiffness, _LEAST_DEFLECTION_RAD)
+    return max(most / ratio / _stiffness(trial), _LEAST_DEFLECTION_RAD)
+
+
+# Largest half-width of the play of an industrial gear, 3 minutes of arc.
+_WIDEST_RAD = 9e-4
+# From one start to the next: the valley around the true width is narrow, impacts must stay in phase.
+_WIDER = 1.24
 
 
 def _play(trial: Trial) -> FreeEffect:
-    """Begin at several widths, as shares of the deflection the largest torque gives."""
+    """Begin at several widths, from a share of the deflection the largest torque gives.
+
+    Up to most of it, or the play of a gear that is stiffer than that.
+    """
     i, deflection = trial.index, _deflection_rad(trial)
-    # The valley around the true width is narrow: impacts must stay in phase.
-    worth_it = _axis_share(trial.at, i) > _SMALL_SHARE
-    shares = np.geomspace(0.04, 0.8, 15) if worth_it else ()
-    starts = tuple({"half_width_rad": float(s * deflection)} for s in shares)
-    return FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",), starts=starts)
+    begin = FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",))
+    if _axis_share(trial.at, i) <= _SMALL_SHARE:
+        return begin
+    widest = 0.8 * deflection
+    if not trial.robot.axis_is_prismatic[i]:
+        widest = max(widest, _WIDEST_RAD)
+    count = 1 + round(np.log(widest / (0.04 * deflection)) / np.log(_WIDER))
+    widths = np.geomspace(0.04 * deflection, widest, count)
+    return replace(begin, starts=tuple({"half_width_rad": float(w)} for w in widths))
+
+
+# A cube as stiff at the largest deflection as so many linear springs: beyond one, a step from none of it
+# says little.
+_HARDER = (1.0, 3.0, 10.0, 30.0)
+
+
+def _hardening(trial: Trial) -> FreeEffect:
+    """Begin without, or where the cube is most of the spring."""
+    begin = _neutral(trial)
+    if _axis_share(trial.at, trial.index) <= _SMALL_SHARE:
+        return begin
+    unit = _stiffness(trial) / _deflection_rad(trial) ** 2
+    return replace(begin, starts=tuple({"cubic_nm_rad3": share * unit} for share in _HARDER))
 
 
 # Where slipping begins in earnest, as shares of the deflection: far below, it is dry friction;
@@ -383,7 +418,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "stribeck_friction": _stribeck,
     "presliding_friction": _law(stribeck_speed_rad_s=_STRIBECK),
     "backlash": _play,
-    "nonlinear_stiffness": _neutral,
+    "nonlinear_stiffness": _hardening,
     "joint_stiffness": _neutral,
     "torque_ripple": _waves,
     "resolver_ripple": _waves,
@@ -419,5 +454,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "torque_sensor_offset": _as_its_twin,
     "feedforward_missing": _shown_by_logs,
     "current_loop": _neutral,
+    "link_geometry": _before_the_last,
 }
 """By effect."""

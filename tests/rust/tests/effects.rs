@@ -17,6 +17,8 @@ const SAMPLES: usize = 120;
 fn places(info: &EffectInfo, n_axes: usize) -> Vec<Option<usize>> {
     match info.scope {
         Scope::Arm => vec![None],
+        // The last link carries no axis.
+        Scope::Axis if info.name == "link_geometry" => (0..n_axes - 1).map(Some).collect(),
         Scope::Axis => (0..n_axes).map(Some).collect(),
         // None in the table yet; tests/points_of_action.rs has one.
         Scope::Axes => Vec::new(),

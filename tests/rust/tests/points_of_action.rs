@@ -373,6 +373,30 @@ fn a_zero_offset_turns_the_arm_beyond() {
     }
 }
 
+/// A link of another length: the machine of a description with the next joint elsewhere.
+#[test]
+fn a_link_of_another_length_carries_the_next_axis_elsewhere() {
+    let here = robot(PRESET);
+    for (axis, d) in [(0, [0.03, -0.02, 0.05]), (1, [-0.04, 0.01, 0.02])] {
+        let mut there = here.clone();
+        let (place, ..) = here.driven().nth(axis + 1).expect("an axis");
+        for (x, d) in there.joints[place].origin.iter_mut().zip(d) {
+            *x += d;
+        }
+        let longer = effect("link_geometry", Some(axis), &d);
+        let (got, want, plain) = (
+            run(&plant(&here, &[longer]), &here, RK4),
+            run(&plant(&there, &[]), &there, RK4),
+            run(&plant(&here, &[]), &here, RK4),
+        );
+        assert!(relative(&got.command, &want.command) < 1e-11, "axis {axis}");
+        assert!(
+            relative(&plain.command, &want.command) > 1e-3,
+            "axis {axis}"
+        );
+    }
+}
+
 /// A drive that reports a share of its torque moves the machine as any other does.
 #[test]
 fn a_reported_share_changes_the_report_alone() {

@@ -109,6 +109,7 @@ effect_table!(
     torque_sensor_offset,
     feedforward_missing,
     current_loop,
+    link_geometry,
 );
 
 /// Description of effect `name`.

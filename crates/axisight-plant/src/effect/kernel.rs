@@ -118,6 +118,11 @@ impl<S: Scalar> PlantParameters<'_, S> {
         self.chain.joints.get_mut(self.driven?)
     }
 
+    /// The joint that the link of the axis carries; `None` behind the last.
+    pub fn next_joint(&mut self) -> Option<&mut ChainJoint<S>> {
+        self.chain.joints.get_mut(self.link? + 1)
+    }
+
     /// The body that moves with the axis.
     pub fn body(&mut self) -> Option<&mut Body<S>> {
         self.chain.joints[self.link?].body.as_mut()

@@ -172,6 +172,7 @@ impl<S: Scalar> Plant<S> {
             let link = ChainJoint {
                 motion: joint.motion,
                 origin: None,
+                shift: None,
                 axis: joint.axis,
                 zero: S::zero(),
                 body: joint.body,

@@ -32,6 +32,8 @@ pub struct ChainJoint<S> {
     pub motion: Motion,
     /// Position in the parent link's frame [m]; `None` is its origin.
     pub origin: Option<[f64; 3]>,
+    /// By how much it lies elsewhere there [m]; `None` is nothing.
+    pub shift: Option<[S; 3]>,
     /// Unit vector of the axis in the parent link's frame.
     pub axis: [f64; 3],
     /// Angle [rad] or shift [m] that the joint has where it counts zero.
@@ -49,6 +51,7 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
                 .iter()
                 .any(|x| *x != 0.0)
                 .then_some(joint.origin),
+            shift: None,
             axis: joint.axis,
             zero: S::zero(),
             body: joint.link.as_ref().map(Body::from),
@@ -95,6 +98,7 @@ impl<S: Scalar> Chain<S> {
         let joint = |j: &ChainJoint<S>| ChainJoint {
             motion: j.motion,
             origin: j.origin,
+            shift: j.shift.map(|d| d.map(D::from_real)),
             axis: j.axis,
             zero: D::from_real(j.zero),
             body: j.body.as_ref().map(body),
@@ -105,8 +109,8 @@ impl<S: Scalar> Chain<S> {
         }
     }
 
-    /// Whether gravity, zeros of joints and all masses are those of `other` bit for bit, derivatives
-    /// aside.
+    /// Whether gravity, zeros and shifts of joints and all masses are those of `other` bit for bit,
+    /// derivatives aside.
     pub fn same_masses(&self, other: &Chain<S::Real>) -> bool {
         let same =
             |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l).to_bits() == b.lane(l).to_bits());
@@ -118,10 +122,15 @@ impl<S: Scalar> Chain<S> {
             }
             _ => false,
         };
-        let joints = self.joints.iter().zip(&other.joints);
-        let mut joints = joints.into_iter();
+        let shifts = |a: &Option<[S; 3]>, b: &Option<[S::Real; 3]>| match (a, b) {
+            (None, None) => true,
+            (Some(a), Some(b)) => all(a, b),
+            _ => false,
+        };
+        let mut joints = self.joints.iter().zip(&other.joints);
         all(&self.gravity, &other.gravity)
-            && joints.all(|(a, b)| same(&a.zero, &b.zero) && bodies(a, b))
+            && joints
+                .all(|(a, b)| same(&a.zero, &b.zero) && shifts(&a.shift, &b.shift) && bodies(a, b))
     }
 
     /// Number of joints.
@@ -142,7 +151,14 @@ impl<S: Scalar> Chain<S> {
         let bodies = self.joints.iter().filter_map(|joint| joint.body.as_ref());
         let mut numbers = bodies.flat_map(|b| [b.mass].into_iter().chain(b.com).chain(b.inertia));
         let mut zeros = self.joints.iter().map(|joint| &joint.zero);
-        numbers.any(|x| depends(&x)) || self.gravity.iter().any(depends) || zeros.any(depends)
+        let mut shifts = self
+            .joints
+            .iter()
+            .flat_map(|joint| joint.shift.iter().flatten());
+        numbers.any(|x| depends(&x))
+            || self.gravity.iter().any(depends)
+            || zeros.any(depends)
+            || shifts.any(depends)
     }
 
     /// Pose of every link frame at joint angles `q`.
@@ -157,6 +173,9 @@ impl<S: Scalar> Chain<S> {
             pose.axis = pose.rotation.apply_constant(&joint.axis);
             if let Some(origin) = &joint.origin {
                 pose.position += pose.rotation.apply_constant(origin);
+            }
+            if let Some(shift) = joint.shift {
+                pose.position += pose.rotation.apply(&Vec3(shift));
             }
             match joint.motion {
                 Motion::Revolute => {

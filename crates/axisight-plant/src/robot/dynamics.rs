@@ -104,6 +104,7 @@ impl<S: Scalar> Moments<S> {
 struct Segment<S> {
     turn: Turn,
     origin: Option<[f64; 3]>,
+    shift: Option<[S; 3]>,
     zero: S,
     body: Option<Moments<S>>,
 }
@@ -113,6 +114,7 @@ impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
         Self {
             turn: Turn::new(joint.motion, joint.axis),
             origin: joint.origin,
+            shift: joint.shift,
             zero: joint.zero,
             body: joint.body.as_ref().map(Moments::of),
         }
@@ -483,6 +485,9 @@ impl<S: Scalar> Dynamics<S> {
             if let Some(origin) = &segment.origin {
                 frame.position += frame.apply_constant(origin);
             }
+            if let Some(shift) = &segment.shift {
+                frame.position += frame.apply(shift);
+            }
             let (turned, screw) = (sized.trigonometry[i], &mut sized.axes[i]);
             match segment.turn {
                 Turn::X { reversed } => frame.turn::<0>(reversed, turned, screw),
@@ -575,6 +580,12 @@ impl<S: Scalar> Frame<S> {
             }
         }
         out
+    }
+
+    /// The vector with these components in this frame.
+    fn apply(&self, v: &[S; 3]) -> Vec3<S> {
+        let columns = self.columns.iter().zip(v);
+        columns.fold(Vec3::zero(), |sum, (column, x)| column.scale_add(*x, &sum))
     }
 
     #[inline(always)]

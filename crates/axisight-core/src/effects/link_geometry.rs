@@ -1,0 +1,52 @@
+//! A length of a link other than the simulator's: what it carries lies elsewhere.
+
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn shift(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "m (frame of the link)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -2.0,
+        upper: 2.0,
+        typical: 0.05,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "link_geometry",
+    summary: "the next axis does not lie where it is modelled in the link of this one: a length or an offset is wrong; behind the last axis there is none",
+    equation: "p + d, from this joint to the next",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
+    scope: Scope::Axis,
+    acts: Acts::Arm,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    usual: &["payload", "link_com"],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::Links],
+    shown_by: &[Experiment::Poses],
+    parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
+};
+
+struct Longer<S>([S; 3]);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Longer([p[0], p[1], p[2]]))
+}
+
+impl<S: Scalar> Kernel<S> for Longer<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(next) = plant.next_joint() {
+            let before = next.shift.unwrap_or([S::zero(); 3]);
+            next.shift = Some(std::array::from_fn(|i| before[i] + self.0[i]));
+        }
+    }
+}

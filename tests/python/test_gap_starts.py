@@ -1,0 +1,48 @@
+"""Where a step from nothing promises little, candidates begin where they may be."""
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.screening import Bench, Screen
+from gap_data import bare_axis, logs_of
+
+PLAN = {"multisine": ("multisine", 1)}
+
+
+def screened(effect: Effect):
+    """The candidate of an effect that is withheld, the screen, and what there is to explain."""
+    view = ClosedLoopView(bare_axis(), logs_of(bare_axis(), [effect], PLAN), Settings())
+    model = view.fitter.fit([], refreshes=1)
+    (option,) = [o for o in view.candidates(model) if o.effect.label == effect.label]
+    noise = float((view.floor.expected[model.axis] * model.samples).sum())
+    bench = Bench(view.fitter, model)
+    bench.begin_nominal()
+    return option, Screen(bench), model.total - noise
+
+
+def test_a_cube_that_is_most_of_its_spring_is_found():
+    """Ten times as stiff at the deflection of the largest torque: a step from none says little."""
+    robot = bare_axis()
+    stiffness = robot.parameters()[f"{robot.axis_names[0]}.stiffness"]
+    log = logs_of(robot, [], PLAN)[0]
+    ratio = abs(float(robot.gear_ratio[0]))
+    deflection = float(np.std(log.torque_nm)) / ratio / stiffness
+    cubic = 10.0 * stiffness / deflection**2
+    option, screen, explainable = screened(
+        Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": cubic})
+    )
+    begin, gain = screen.best_of_starts(option)
+    assert gain > 0.95 * explainable
+    assert (begin.effect.parameters or {})["cubic_nm_rad3"] == pytest.approx(cubic, rel=0.2)
+    (promise,) = screen.starts([option.at({"cubic_nm_rad3": 0.0})])
+    assert promise.gain == pytest.approx(gain)
+
+
+def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():
+    option, _, _ = screened(Effect("backlash", 1, {"half_width_rad": 2e-4}))
+    widths = np.array([s["half_width_rad"] for s in option.starts])
+    assert widths[-1] >= 9e-4 * (1 - 1e-12)
+    # Impacts stay in phase from one width to the next.
+    assert np.all(widths[1:] / widths[:-1] < 1.26)
