@@ -65,7 +65,7 @@ def facts(effect: Mapping[str, Any]) -> str:
     if effect["usual"]:
         usual = ", ".join(f"`{n}`" for n in effect["usual"])
         out.append(
-            f"Where speed, load or pose hardly change it looks like {usual}, which is met more often."
+            f"Where a motion asks little of it, it looks like {usual}, which is met more often."
         )
     if effect["parts"]:
         out.append(f"Two simpler ones imitate it: {', '.join(f'`{n}`' for n in effect['parts'])}.")
