@@ -69,7 +69,8 @@ def test_a_withheld_effect_is_named(effect):
     cause = found.causes[0]
     # An effect that gives the very same logs has its share.
     twins = [a for a in found.alternatives if a.effect in effect_info(effect.name).twins]
-    assert cause.probability + sum(a.probability for a in twins) > 0.8
+    # A current loop of second order is as good as a delay, and counts a quarter of it.
+    assert cause.probability + sum(a.probability for a in twins) > 0.75
     assert cause.gap_reduction.value > 0.9
     assert found.gap.after < 1.2 * found.gap.floor
     # With the cause in nothing stands out of the floor any more.

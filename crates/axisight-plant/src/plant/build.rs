@@ -239,10 +239,11 @@ impl<S: Scalar> Plant<S> {
     }
 }
 
-/// Whether an axis would have a current loop of second order beside another one.
+/// Whether an axis would have a current loop of second order beside another one, both at work.
 fn one_too_many<S: Scalar>(others: &[Arc<dyn Kernel<S>>], new: &Arc<dyn Kernel<S>>) -> bool {
-    let first = |k: &Arc<dyn Kernel<S>>| k.lag().is_some();
-    let second = |k: &Arc<dyn Kernel<S>>| k.current_loop().is_some();
+    let at_work = |t: S| (0..S::LANES).any(|lane| t.lane(lane) > 0.0);
+    let first = |k: &Arc<dyn Kernel<S>>| k.lag().is_some_and(at_work);
+    let second = |k: &Arc<dyn Kernel<S>>| k.current_loop().is_some_and(|(t, _)| at_work(t));
     let any = others.iter().any(|k| first(k) || second(k));
     (second(new) && any) || (first(new) && others.iter().any(second))
 }

@@ -46,10 +46,14 @@ impl<S: Scalar> Line<S> {
 pub struct TorquePath<S> {
     kernels: Vec<Arc<dyn Kernel<S>>>,
     delay: Option<Delay<S>>,
-    lag: Option<CurrentLoop<S>>,
-    /// Of the lag, at the start of the sample.
-    state: Delivered<S>,
+    /// Of first and of second order; one of them at most does anything.
+    loops: [Option<CurrentLoop<S>>; 2],
+    /// Of these, at the start of the sample.
+    state: States<S>,
 }
+
+/// What the loops of an axis deliver, one after the other.
+type States<S> = [Delivered<S>; 2];
 
 struct Delay<S> {
     /// Fraction of a sample at which the command changes.
@@ -70,14 +74,14 @@ impl<S: Scalar> TorquePath<S> {
         let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);
         let delay = total(kernels.iter().filter_map(|k| k.delay()).collect());
         let lag = total(kernels.iter().filter_map(|k| k.lag()).collect());
-        let first_order = lag.map(|t| CurrentLoop::new(t, None, sample_time));
-        let second_order = kernels.iter().find_map(|k| k.current_loop());
+        let second = kernels.iter().find_map(|k| k.current_loop());
         Self {
             delay: delay.map(|d| Delay::new(d * (1.0 / sample_time), rest)),
-            lag: second_order.map_or(first_order, |(t, damping)| {
-                Some(CurrentLoop::new(t, Some(damping), sample_time))
-            }),
-            state: Delivered::settled(rest),
+            loops: [
+                lag.map(|t| CurrentLoop::new(t, None, sample_time)),
+                second.map(|(t, damping)| CurrentLoop::new(t, Some(damping), sample_time)),
+            ],
+            state: [Delivered::settled(rest); 2],
             kernels,
         }
     }
@@ -96,7 +100,7 @@ impl<S: Scalar> TorquePath<S> {
 
     /// Whether the torque varies inside a sample.
     fn varies(&self) -> bool {
-        self.delay.is_some() || self.lag.is_some()
+        self.delay.is_some() || self.loops.iter().any(Option::is_some)
     }
 
     fn delivered(&self, torque: S) -> S {
@@ -104,7 +108,7 @@ impl<S: Scalar> TorquePath<S> {
     }
 
     /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
-    fn line(&self, command: S, from: f64, to: f64, state: &mut Delivered<S>) -> Line<S> {
+    fn line(&self, command: S, from: f64, to: f64, state: &mut States<S>) -> Line<S> {
         let width = to - from;
         let mut zeroth = S::zero();
         let mut first = S::zero();
@@ -150,19 +154,24 @@ impl<S: Scalar> TorquePath<S> {
 
     /// Moments over a piece of length `width` that starts `start` into the
     /// sub-step (both in samples), command constant at `torque`.
-    fn moments(&self, torque: S, start: S, width: S, state: &mut Delivered<S>) -> Moments<S> {
-        let held = Moments {
+    ///
+    /// The second loop takes what the first one ends at: exact where one of them does nothing,
+    /// derivatives included.
+    fn moments(&self, torque: S, start: S, width: S, states: &mut States<S>) -> Moments<S> {
+        let mut held = torque;
+        let mut sum = Moments {
             zeroth: torque * width,
             first: torque * width * (start + width * 0.5),
         };
-        let Some(lag) = &self.lag else {
-            return held;
-        };
-        let excess = lag.excess(torque, start, width, state);
-        Moments {
-            zeroth: held.zeroth + excess.zeroth,
-            first: held.first + excess.first,
+        for (own, state) in self.loops.iter().zip(states) {
+            if let Some(own) = own {
+                let excess = own.excess(held, start, width, state);
+                held = state.torque;
+                sum.zeroth += excess.zeroth;
+                sum.first += excess.first;
+            }
         }
+        sum
     }
 }
 
@@ -177,15 +186,15 @@ pub struct SampleTorque<'a, S> {
 pub struct TorqueBuffers<S> {
     commands: Vec<S>,
     /// Lag states at the start of the span in hand and at its end.
-    at_start: Vec<Delivered<S>>,
-    at_end: Vec<Delivered<S>>,
+    at_start: Vec<States<S>>,
+    at_end: Vec<States<S>>,
     lines: Vec<Line<S>>,
 }
 
 impl<S: Scalar> TorqueBuffers<S> {
     /// For `n_axes` axes.
     pub fn new(n_axes: usize) -> Self {
-        let states = vec![Delivered::settled(S::zero()); n_axes];
+        let states = vec![[Delivered::settled(S::zero()); 2]; n_axes];
         Self {
             commands: vec![S::zero(); n_axes],
             at_start: states.clone(),
