@@ -21,7 +21,8 @@ def bent_for(fitter: ModelFitter, found: Search) -> float:
     tell. Where the causes explain as much without, nothing that matters was bent.
     """
     share = bent(fitter, found.model)
-    return 0.0 if share >= BENT and _hold_straight(fitter, found) else share
+    asked = share >= BENT and len(found.model.free) > 0
+    return 0.0 if asked and _hold_straight(fitter, found) else share
 
 
 def _hold_straight(fitter: ModelFitter, found: Search) -> bool:

@@ -1,7 +1,7 @@
 //! Integrators, ends of a run, and the torque path against closed forms.
 
 use axisight_core::plant::assemble;
-use axisight_core::robot::{Controller, RobotDescription};
+use axisight_core::robot::{Controller, EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, SimulationError, Status, Stepper, simulate};
 use axisight_tests::{ARM, PRESET, ROTOR, effect, plant, relative, robot, sines, trace};
 use std::sync::atomic::AtomicBool;
@@ -463,8 +463,7 @@ fn current_loop_is_exact_on_a_rigid_inertia() {
     }
 }
 
-/// At critical damping a loop of second order is two equal lags one after the other, which a drive has
-/// not got twice: it is refused beside another one.
+/// Two of them at work on one axis are refused; one that does nothing is as if it were not there.
 #[test]
 fn an_axis_has_one_current_loop_of_second_order() {
     let robot = robot(ROTOR);
@@ -477,6 +476,18 @@ fn an_axis_has_one_current_loop_of_second_order() {
             error.to_string().contains("no other current loop"),
             "{error}"
         );
+    }
+    let torque = axisight_tests::Random(9).vector(40, 2.0);
+    let measured = |settings: &[EffectSetting<f64>]| {
+        let plant = plant::<f64>(&robot, settings);
+        let method = Method::RungeKutta4 { substeps: 1 };
+        trace(&plant, &robot, Drive::Torque(&[&torque]), &[], method).measured
+    };
+    let idle_first = effect("actuator_bandwidth", Some(0), &[0.0]);
+    let idle_second = effect("current_loop", Some(0), &[0.0, 0.7]);
+    for (own, idle) in [(first, idle_second), (second, idle_first)] {
+        let beside = measured(&[own.clone(), idle]);
+        assert!(relative(&beside, &measured(&[own])) < 1e-12);
     }
 }
 

@@ -1,19 +1,7 @@
 //! A length of a link other than the simulator's: what it carries lies elsewhere.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, Scope, shift};
 use axisight_scalar::Scalar;
-
-const fn shift(name: &'static str) -> ParameterInfo {
-    ParameterInfo {
-        name,
-        unit: "m (frame of the link)",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: -2.0,
-        upper: 2.0,
-        typical: 0.05,
-    }
-}
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "link_geometry",

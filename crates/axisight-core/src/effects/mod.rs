@@ -38,6 +38,19 @@ const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
     typical: 3.0,
 };
 
+/// How far something lies elsewhere in its link, along one axis of its frame.
+const fn shift(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "m (frame of the link)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -2.0,
+        upper: 2.0,
+        typical: 0.05,
+    }
+}
+
 macro_rules! effect_table {
     ($($module:ident),* $(,)?) => {
         $(mod $module;)*

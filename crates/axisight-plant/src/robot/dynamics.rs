@@ -12,13 +12,15 @@
 //! just below one of them is padded with joints that move nothing. Longer chains, and numbers
 //! with derivatives, whose arithmetic hides the loops, share the code for any number.
 
+mod frame;
+
+use self::frame::Frame;
 use super::along::Along;
 use super::chain::{Body, Chain, ChainJoint};
 use super::description::Motion;
 use super::linear_algebra::{factorize, solve_factorized};
-use super::vector::{Mat3, Vec3, rotate_inertia, rotation, shift_inertia};
+use super::vector::{Mat3, Vec3, shift_inertia};
 use axisight_scalar::Scalar;
-use std::array::from_fn;
 
 /// How a joint moves its link, coordinate axes told apart because they cost a third.
 #[derive(Debug, Clone, Copy)]
@@ -287,12 +289,6 @@ macro_rules! sized {
     };
 }
 
-/// Where a link is.
-struct Frame<S> {
-    columns: [Vec3<S>; 3],
-    position: Vec3<S>,
-}
-
 impl<S: Scalar> Dynamics<S> {
     /// Equations of motion of `chain`.
     pub fn new(chain: &Chain<S>) -> Self {
@@ -520,91 +516,5 @@ impl<S: Scalar> Dynamics<S> {
         for i in self.len()..sized.n {
             sized.inertia[i][i] = S::one();
         }
-    }
-}
-
-impl<S: Scalar> Frame<S> {
-    #[inline(always)]
-    fn base() -> Self {
-        let (zero, one) = (S::zero(), S::one());
-        Self {
-            columns: [
-                Vec3([one, zero, zero]),
-                Vec3([zero, one, zero]),
-                Vec3([zero, zero, one]),
-            ],
-            position: Vec3::zero(),
-        }
-    }
-
-    /// Turn about column `K`; `screw` becomes the axis.
-    #[inline(always)]
-    fn turn<const K: usize>(&mut self, reversed: bool, (s, c): (S, S), screw: &mut Screw<S>) {
-        let (axis, s) = if reversed {
-            (self.columns[K].negate(), -s)
-        } else {
-            (self.columns[K], s)
-        };
-        let (a, b) = (self.columns[(K + 1) % 3], self.columns[(K + 2) % 3]);
-        self.columns[(K + 1) % 3] = b.scale_add(s, &a.scale(c));
-        self.columns[(K + 2) % 3] = a.scale_sub(s, &b.scale(c));
-        screw.angular = axis;
-        screw.linear = self.position.cross(&axis);
-    }
-
-    #[inline(never)]
-    fn turn_about(&mut self, axis: &[f64; 3], (s, c): (S, S), screw: &mut Screw<S>) {
-        let turned = rotation(axis, s, c);
-        let axis = self.apply_constant(axis);
-        let r = self.matrix();
-        self.columns = from_fn(|j| r.apply(&Vec3(from_fn(|i| turned[i][j]))));
-        screw.angular = axis;
-        screw.linear = self.position.cross(&axis);
-    }
-
-    #[inline(never)]
-    fn slide(&mut self, axis: &[f64; 3], q: S, screw: &mut Screw<S>) {
-        let axis = self.apply_constant(axis);
-        self.position += axis.scale(q);
-        screw.angular = Vec3::zero();
-        screw.linear = axis;
-    }
-
-    /// The vector with constant components in this frame; zero components cost nothing.
-    #[inline(always)]
-    fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
-        let mut out = Vec3::zero();
-        for (column, x) in self.columns.iter().zip(v) {
-            if *x != 0.0 {
-                out = column.scale_add(S::constant(*x), &out);
-            }
-        }
-        out
-    }
-
-    /// The vector with these components in this frame.
-    fn apply(&self, v: &[S; 3]) -> Vec3<S> {
-        let columns = self.columns.iter().zip(v);
-        columns.fold(Vec3::zero(), |sum, (column, x)| column.scale_add(*x, &sum))
-    }
-
-    #[inline(always)]
-    fn matrix(&self) -> Mat3<S> {
-        let [x, y, z] = &self.columns;
-        let row = |i: usize| [x.0[i], y.0[i], z.0[i]];
-        Mat3([row(0), row(1), row(2)])
-    }
-
-    /// Moments of a link about the base origin.
-    #[inline(always)]
-    fn moments(&self, body: &Moments<S>) -> Moments<S> {
-        let r = self.matrix();
-        let mut moments = Moments {
-            mass: body.mass,
-            first: r.apply(&body.first),
-            second: rotate_inertia(&r, &body.second),
-        };
-        moments.shift(&self.position);
-        moments
     }
 }
