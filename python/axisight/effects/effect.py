@@ -55,6 +55,15 @@ class Effect:
         """Axis, axes, or None for the whole arm."""
         return self.axis if self.axes is None else self.axes
 
+    @property
+    def first_axis(self) -> int | None:
+        """The axis, or the first of two; None for the whole arm."""
+        return self.axis if self.axes is None else self.axes[0]
+
+    def acts_on(self, axis: int) -> bool:
+        """Whether it belongs to an axis (from 1), alone, with another one or with the whole arm."""
+        return self.place is None or axis in (self.axis, *(self.axes or ()))
+
     def with_values(self, values: Mapping[str, float]) -> Effect:
         """Return the same effect with some parameters replaced."""
         return replace(self, parameters={**(self.parameters or {}), **values})

@@ -94,6 +94,9 @@ SPEED_FILTER = ("velocity_filter", "time_constant_s")
 FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad"))
 """What torque fed forward is, and its parameters: for the rate of the reference, for the reference."""
 
+CLOCK = ("clock_drift", "relative_rate")
+"""What a clock of its own is, and its parameter."""
+
 TORQUE_CONSTANT = ("torque_constant", "relative_error")
 """What a motor with another torque constant is, and its parameter."""
 

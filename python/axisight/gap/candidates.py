@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
-from axisight.gap.starts import STARTS, Response, Situation, Trial
+from axisight.gap.starts import STARTS, Place, Response, Situation, Trial
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -62,11 +62,11 @@ def all_candidates(
     What an effect does elsewhere, it does on its own axis too: one without a gap needs none.
     """
     trials = [
-        Trial(info, axis, robot, logs, at)
+        Trial(info, place, robot, logs, at)
         for info in effect_table().values()
         if not info.stiff and (info.inverse_dynamics or not inverse_dynamics)
-        for axis in _axes(robot, info)
-        if axis is None or at.is_left(axis - 1)
+        for place in _places(robot, info)
+        if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
     ]
     with ThreadPoolExecutor(threads) as pool:
         found = pool.map(lambda t: STARTS[t.info.name](t), trials)
@@ -75,16 +75,17 @@ def all_candidates(
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
 
 
-def _axes(robot: Robot, info: EffectInfo) -> list[int | None]:
-    """Return the axes on which an effect can act; None for the arm."""
+def _places(robot: Robot, info: EffectInfo) -> list[Place]:
+    """Return the axes on which an effect can act, or neighbours among them; None for the arm."""
     if info.scope == "arm":
         return [None]
+    if info.scope == "axes":
+        return [(axis, axis + 1) for axis in robot.axis_numbers()[:-1]]
     rigid = robot.axis_is_rigid
     return [
         axis
         for axis in robot.axis_numbers()
-        if info.scope == "axis"
-        and not (info.acts == "transmission" and rigid[axis - 1])
+        if not (info.acts == "transmission" and rigid[axis - 1])
         and _has_what_changes(robot, info, axis)
     ]
 

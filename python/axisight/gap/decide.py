@@ -143,9 +143,11 @@ class Standing:
         """
         effect = self.best.trial.candidate.effect
         usual = [effect_info(name) for name in effect_info(effect.name).usual]
+        axes = [effect.axis] if effect.axes is None else list(effect.axes)
         odds = {
-            Effect(i.name, None if i.scope == "arm" else effect.axis).label: _ODDS[i.scope]
+            Effect(i.name, None if i.scope == "arm" else axis).label: _ODDS[i.scope]
             for i in usual
+            for axis in axes
         }
         weighed = [
             replace(r, probability=odds.get(r.trial.label, 1.0) * r.probability)
@@ -266,7 +268,7 @@ def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explai
     of it has a size too, whatever the cause is.
     """
     gain = layout.significance(current, t.held_out, axis)
-    own = t.candidate.effect.axis in (None, axis + 1)
+    own = t.candidate.effect.acts_on(axis + 1)
     return (
         max(gain, amplitude_significance(t.evidence, layout.stretch)) if own and explains else gain
     )

@@ -74,7 +74,7 @@ def _not_tried(found: Search, view: View) -> dict[str, Sensitivity]:
 
 def _order(sensitivity: Sensitivity) -> tuple[str, int]:
     effect = sensitivity.option.effect
-    return effect.name, effect.axis or 0
+    return effect.name, effect.first_axis or 0
 
 
 def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
@@ -83,6 +83,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     ``shows`` (n_axes,): loss that is seen; ``tolerated``: change of the quantity that is scatter.
     """
     effect = s.option.effect
+    place = effect.first_axis
     info = next(p for p in effect_info(effect.name).parameters if p.name == s.parameter)
     largest = max(abs(info.lower), abs(info.upper))
 
@@ -95,10 +96,10 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         at_most = low - float(np.log1p(missing(low)))
     if at_most > high and missing(high) < 0.0:
         # Larger than the effect can be: these logs do not show it at all.
-        return DetectionLimit(effect.name, effect.axis, s.parameter, None, info.unit)
+        return DetectionLimit(effect.name, place, s.parameter, None, info.unit, effect.axes)
     at_most = min(at_most, high)
     if at_most > low:
         bounded = missing(at_most) > _PRECISION
         low = scipy.optimize.brentq(missing, low, at_most, xtol=_PRECISION) if bounded else at_most
     value = max(float(np.exp(low)), tolerated)
-    return DetectionLimit(effect.name, effect.axis, s.parameter, value, info.unit)
+    return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes)

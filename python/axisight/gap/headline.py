@@ -63,7 +63,7 @@ def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) 
     present = {(e.name, e.axis) for e in own if e.acts}
     axes: dict[str, list[int]] = {}
     for c in in_order(causes):
-        axes.setdefault(c.effect, []).extend([] if c.axis is None else [c.axis])
+        axes.setdefault(c.effect, []).extend(c.axes or ([] if c.axis is None else [c.axis]))
     phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
     for effect, mine in axes.items():
         known = any((c.effect, c.axis) in present for c in causes if c.effect == effect)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from axisight.gap.result import Interval
+from axisight.gap.result import Interval, label
 
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause before its effect on the validation logs is measured."""
+    """A cause before its effect on the validation logs is measured.
+
+    ``axes``: both, where it acts between two; ``axis`` is the first of them.
+    """
 
     effect: str
     axis: int | None
@@ -18,3 +21,9 @@ class NamedCause:
     units: dict[str, str]
     family: str
     family_probability: float
+    axes: tuple[int, int] | None = None
+
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return label(self.effect, self.axis, self.axes)

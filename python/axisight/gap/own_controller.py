@@ -7,16 +7,17 @@ other one. The simulator that is kept on a log does not see it: its feedback is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from axisight.effects.stated import FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
+from axisight.effects.stated import CLOCK, FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
 from axisight.gap.feedback import before, gain_shares
 from axisight.gap.gate.control_law import free_of_limits
+from axisight.gap.own_clock import drifting_clock
 from axisight.gap.result import Interval
 from axisight.gap.shown import ShownCause
 from axisight.logs import Log, lowpass
@@ -110,15 +111,42 @@ def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ..
     controllers = (OTHER_GAINS[0], SPEED_FILTER[0], FEEDFORWARD[0])
     known = {e.axis for e in robot.effects if e.name in controllers}
     axes = [i for i in range(robot.n_axes) if i + 1 not in known]
-    found = (_of_axis(i, [_Piece(robot, log, i) for log in logs]) for i in axes)
-    return tuple(cause for causes in found for cause in causes)
+    pieces = {i: [_Piece(robot, log, i) for log in logs] for i in axes}
+    stated = {i: _law(pieces[i], np.ones(2), 0.0) for i in axes}
+    off = [i for i in axes if stated[i].total > _NOTHING * float(_power(pieces[i]).sum())]
+    clock = _clock(robot, logs, pieces, stated, off)
+    if clock is not None:
+        return (clock,)
+    return tuple(cause for i in off for cause in _of_axis(i, stated[i], pieces[i]))
 
 
-def _of_axis(axis: int, pieces: Sequence[_Piece]) -> list[ShownCause]:
-    power = sum(float(p.torque @ p.torque) for p in pieces)
-    stated = _law(pieces, np.ones(2), 0.0)
-    if not power > 0 or not stated.total > _NOTHING * power:
-        return []
+def _clock(
+    robot: Robot,
+    logs: Sequence[Log],
+    pieces: Mapping[int, Sequence[_Piece]],
+    stated: Mapping[int, _Law],
+    off: Sequence[int],
+) -> ShownCause | None:
+    """Return what a clock of its own explains on all axes whose commands are off."""
+    if not off or any(e.name == CLOCK[0] for e in robot.effects):
+        return None
+
+    def missed(log: Log, axis: int) -> float:
+        return _law([_Piece(robot, log, axis)], np.ones(2), 0.0).total
+
+    left = np.zeros((robot.n_axes, len(logs)))
+    shows = np.zeros(left.shape, bool)
+    for i in off:
+        left[i] = stated[i].left
+        shows[i] = stated[i].left > _NOTHING * _power(pieces[i])
+    return drifting_clock(logs, left, shows, missed) if shows.any() else None
+
+
+def _power(pieces: Sequence[_Piece]) -> Array:
+    return np.array([float(p.torque @ p.torque) for p in pieces])
+
+
+def _of_axis(axis: int, stated: _Law, pieces: Sequence[_Piece]) -> list[ShownCause]:
     for law in _others(pieces):
         if _holds(law, stated, pieces):
             return _causes(axis, law, stated, pieces)
@@ -184,7 +212,7 @@ def _holds(law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> bool:
     A filter resembles positions that are read a sample late, which it is not; so does feedforward
     where the machine keeps to its reference.
     """
-    power = np.array([float(p.torque @ p.torque) for p in pieces])
+    power = _power(pieces)
     shows = stated.left > _NOTHING * power
     if np.any(law.left[shows] > _LEFT * stated.left[shows]):
         return False

@@ -340,6 +340,7 @@ def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cau
             r,
             c.family,
             c.family_probability,
+            c.axes,
         )
         for c, r in zip(conclusion.causes, reductions, strict=False)
     )

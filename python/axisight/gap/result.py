@@ -94,9 +94,20 @@ class Remainder:
     varies_with: str | None = None
 
 
+def label(effect: str, axis: int | None, axes: tuple[int, int] | None = None) -> str:
+    """Return ``effect@axis`` or ``effect@5,6``; the effect alone when it belongs to the whole arm."""
+    if axes is not None:
+        return f"{effect}@{axes[0]},{axes[1]}"
+    return effect if axis is None else f"{effect}@{axis}"
+
+
 @dataclass(frozen=True)
 class Cause:
-    """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm."""
+    """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm.
+
+    ``axes``: both of an effect between two, of which ``axis`` is the first; None of others, as in
+    `Candidate` and `DetectionLimit`.
+    """
 
     effect: str
     axis: int | None
@@ -106,11 +117,12 @@ class Cause:
     gap_reduction: Interval
     family: str = ""
     family_probability: float = 1.0
+    axes: tuple[int, int] | None = None
 
     @property
     def label(self) -> str:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
-        return self.effect if self.axis is None else f"{self.effect}@{self.axis}"
+        return label(self.effect, self.axis, self.axes)
 
 
 @dataclass(frozen=True)
@@ -144,11 +156,12 @@ class Candidate:
     score: float
     significance: float
     status: str
+    axes: tuple[int, int] | None = None
 
     @property
     def label(self) -> str:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
-        return self.effect if self.axis is None else f"{self.effect}@{self.axis}"
+        return label(self.effect, self.axis, self.axes)
 
 
 @dataclass(frozen=True)
@@ -164,6 +177,7 @@ class DetectionLimit:
     parameter: str
     value: float | None
     unit: str
+    axes: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -238,7 +252,7 @@ class Diagnosis:
             "where": [_where(w) for w in self.where],
             "causes": [_cause(c) for c in self.causes],
             "alternatives": [
-                {"effect": c.effect, "axis": c.axis, "probability": c.probability}
+                {"effect": c.effect, **_place(c), "probability": c.probability}
                 for c in self.alternatives
             ],
             "equivalent": [list(group) for group in self.equivalent],
@@ -247,7 +261,7 @@ class Diagnosis:
             "p_unknown": self.p_unknown,
             "axes": [_axis(a, self.gap) for a in self.axes],
             "remainder": None if self.remainder is None else _remainder(self.remainder),
-            "detection_limits": [asdict(limit) for limit in self.detection_limits],
+            "detection_limits": [_limit(limit) for limit in self.detection_limits],
             "refit": {name: _interval(change) for name, change in self.refit.items()},
             "ranking": [_ranked(c) for c in self.ranking],
             "checks": list(self.checks),
@@ -314,6 +328,16 @@ def _remainder(remainder: Remainder) -> dict[str, Any]:
     }
 
 
+def _place(item: Cause | Candidate | DetectionLimit) -> dict[str, Any]:
+    """Return ``axis``, and ``axes`` beside it where there are two."""
+    return {"axis": item.axis} | ({} if item.axes is None else {"axes": list(item.axes)})
+
+
+def _limit(limit: DetectionLimit) -> dict[str, Any]:
+    rest = {name: getattr(limit, name) for name in ("parameter", "value", "unit")}
+    return {"effect": limit.effect, **_place(limit), **rest}
+
+
 def _interval(interval: Interval) -> dict[str, Any]:
     return {"value": interval.value, "ci95": [interval.low, interval.high]}
 
@@ -321,7 +345,7 @@ def _interval(interval: Interval) -> dict[str, Any]:
 def _ranked(candidate: Candidate) -> dict[str, Any]:
     return {
         "effect": candidate.effect,
-        "axis": candidate.axis,
+        **_place(candidate),
         "probability": candidate.probability,
         "score": candidate.score,
         "significance": candidate.significance,
@@ -332,7 +356,7 @@ def _ranked(candidate: Candidate) -> dict[str, Any]:
 def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.effect,
-        "axis": cause.axis,
+        **_place(cause),
         "probability": cause.probability,
         "family": cause.family,
         "family_probability": cause.family_probability,

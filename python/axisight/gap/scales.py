@@ -75,7 +75,7 @@ class NaturalSizes:
         if of is None or parameter.role != "amplitude":
             return parameter.typical
         # What acts on the arm is felt where least moves, too.
-        axes = self.axes if effect.axis is None else [self.axes[effect.axis - 1]]
+        axes = [a for i, a in enumerate(self.axes, 1) if effect.acts_on(i)]
         most = _SHARE * min(of(a) for a in axes)
         return min(parameter.typical, most) if most > 0 else parameter.typical
 

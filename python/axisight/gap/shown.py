@@ -11,14 +11,14 @@ from axisight.gap.result import Interval
 
 @dataclass(frozen=True)
 class ShownCause:
-    """An effect of one axis (from 1) that logs show by themselves.
+    """An effect of one axis (from 1), or of the arm, that logs show by themselves.
 
     ``values``: its parameters; ``samples``: how many show it; ``explained``: share of what the
     torque is off the controller's command that it takes away [1]; ``says``: what was seen, a sentence.
     """
 
     name: str
-    axis: int
+    axis: int | None
     values: Mapping[str, Interval]
     samples: int
     explained: float

@@ -24,6 +24,10 @@ Response = Callable[[str, int, Array], Complex]
 """Of the weighted residual on an axis (from 0) to an effect there, by its name, at frequencies [Hz]."""
 
 
+Place = int | tuple[int, int] | None
+"""Of an effect: an axis from 1, two of them, or the arm."""
+
+
 @dataclass(frozen=True)
 class Situation:
     """What start values are taken from.
@@ -46,22 +50,25 @@ class Situation:
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect to be tried at a place: ``axis`` from 1, None for the arm."""
+    """An effect to be tried at a place: ``axis`` from 1, two of them, or None for the arm."""
 
     info: EffectInfo
-    axis: int | None
+    place: Place
     robot: Robot
     logs: Sequence[Log]
     at: Situation
 
     @property
     def index(self) -> int:
-        """Column of the axis."""
-        return 0 if self.axis is None else self.axis - 1
+        """Column of the axis, of the first of two."""
+        axis = self.place[0] if isinstance(self.place, tuple) else self.place
+        return 0 if axis is None else axis - 1
 
     def effect(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with these parameters."""
-        return Effect(self.info.name, self.axis, values)
+        if isinstance(self.place, tuple):
+            return Effect(self.info.name, None, values, self.place)
+        return Effect(self.info.name, self.place, values)
 
     def torque(self) -> list[Array]:
         """Return the torque of the axis in every log [Nm]."""
@@ -235,6 +242,34 @@ def _knee(trial: Trial) -> FreeEffect:
     begin = trial.effect({"step": 0.0, "within": 0.0, **starts[1]})
     further = (starts[0], starts[2])
     return FreeEffect(begin, ("step", "within", name), bounds=bounds, starts=further)
+
+
+# Half-widths of a soft middle, as shares of the deflection: its corner has to be passed.
+_MIDDLES = (0.05, 0.15, 0.45)
+
+
+def _soft(trial: Trial) -> FreeEffect:
+    """Begin at several widths of a middle that is as stiff as the rest."""
+    name, deflection = "half_width_rad", _deflection_rad(trial)
+    starts = tuple({name: share * deflection} for share in _MIDDLES)
+    bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
+    begin = trial.effect({"softness": 0.0, **starts[1]})
+    further = (starts[0], starts[2])
+    return FreeEffect(begin, ("softness", name), bounds=bounds, starts=further)
+
+
+def _coupled(trial: Trial) -> FreeEffect:
+    """Begin without; both motors have the same part in the speed, counted at their joints.
+
+    A gear that is turned along has to give way: a rigid one has its friction alone.
+    """
+    assert isinstance(trial.place, tuple)  # by its scope
+    first, second = (axis - 1 for axis in trial.place)
+    ratio = trial.robot.gear_ratio
+    begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
+    effect = begin.effect.with_values({"speed_ratio": float(ratio[second] / ratio[first])})
+    fixed = {"speed_ratio"} | ({"share"} if trial.robot.axis_is_rigid[second] else set())
+    return replace(begin, effect=effect, free=tuple(n for n in begin.free if n not in fixed))
 
 
 def _axis_share(at: Situation, index: int) -> float:
@@ -455,5 +490,10 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "feedforward_missing": _shown_by_logs,
     "current_loop": _neutral,
     "link_geometry": _before_the_last,
+    "lost_motion": _soft,
+    "encoder_eccentricity": _neutral,
+    "power_supply_sag": _neutral,
+    "axis_coupling": _coupled,
+    "clock_drift": _shown_by_logs,
 }
 """By effect."""

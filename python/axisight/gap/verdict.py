@@ -89,7 +89,7 @@ def conclude(
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
-    named = {c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in causes}
+    named = {c.label for c in causes}
     return Conclusion(
         verdict=verdict,
         causes=less_their_twins(causes),
@@ -141,7 +141,7 @@ def _axes(
     samples = found.layout.samples()
     out = []
     for i in range(found.layout.n_axes):
-        mine = tuple(k for k, c in enumerate(causes) if c.axis in (i + 1, None))
+        mine = tuple(k for k, c in enumerate(causes) if i + 1 in (c.axes or ()) or c.axis in (i + 1, None))
         share = float(removed[i] / excess[i]) if excess[i] > 0 else 0.0
         if not gap or excess[i] / samples[i] <= settings.largest_scatter:
             verdict: VerdictKind = "explained" if any(causes[k].axis for k in mine) else "none"
@@ -168,11 +168,12 @@ def _candidate(ranked: Ranked) -> Candidate:
     effect = ranked.trial.candidate.effect
     return Candidate(
         effect.name,
-        effect.axis,
+        effect.first_axis,
         ranked.probability,
         ranked.score,
         ranked.significance,
         ranked.trial.evidence.status,
+        effect.axes,
     )
 
 
@@ -193,11 +194,12 @@ def _named(
     # cause beside it is no rival.
     rivals = [r for r in standing.ranked if r is ranked or r.trial.label not in accepted]
     whole = max(sum(r.probability for r in rivals), 1e-300)
-    place = effect.axis
-    kin = [r for r in rivals if r.family == info.family and r.trial.candidate.effect.axis == place]
+    place = effect.place
+    kin = [r for r in rivals if r.family == info.family and r.trial.candidate.effect.place == place]
     alone = ranked.probability / whole
     family = min(max(sum(r.probability for r in kin) / whole, alone), 1.0)
-    return NamedCause(effect.name, effect.axis, alone, found, units, info.family, family)
+    where, axes = effect.first_axis, effect.axes
+    return NamedCause(effect.name, where, alone, found, units, info.family, family, axes)
 
 
 def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, ...]:

@@ -201,7 +201,7 @@ def _values(causes: Sequence[Cause]) -> dict[str, Any]:
         for row in [r for r in parameters if r["name"] not in shapes] or parameters:
             effect = plain_name(cause.effect)
             unit = "" if row["unit"] == NO_VALUE else row["unit"]
-            shown = {"title": "" if effect == title else effect, "place": place(cause.axis)}
+            shown = {"title": "" if effect == title else effect, "place": place(cause.axis, cause.axes)}
             rows.append({**row, **shown, "unit": unit})
             title = effect
     return {"rows": rows[:_MOST_VALUES], "left_out": max(0, len(rows) - _MOST_VALUES)}
@@ -275,7 +275,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
 def _candidate(candidate: Candidate) -> dict[str, str]:
     return {
         "effect": plain_name(candidate.effect),
-        "place": place(candidate.axis),
+        "place": place(candidate.axis, candidate.axes),
         "probability": probability(candidate.probability),
         "score": percent(candidate.score),
         "significance": standard_errors(candidate.significance),

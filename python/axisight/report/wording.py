@@ -27,14 +27,16 @@ def plain_name(name: str) -> str:
     return title(name)
 
 
-def place(axis: int | None) -> str:
-    """``axis 2``, or ``whole arm``."""
+def place(axis: int | None, axes: tuple[int, int] | None = None) -> str:
+    """``axis 2``, ``axes 5 and 6``, or ``whole arm``."""
+    if axes is not None:
+        return f"axes {axes[0]} and {axes[1]}"
     return "whole arm" if axis is None else f"axis {axis}"
 
 
 def title_of(item: Candidate | Cause) -> str:
     """The effect and its place in words."""
-    return f"{plain_name(item.effect)}, {place(item.axis)}"
+    return f"{plain_name(item.effect)}, {place(item.axis, item.axes)}"
 
 
 def title_of_label(label: str) -> str:
@@ -42,6 +44,9 @@ def title_of_label(label: str) -> str:
     effect, at, axis = label.rpartition("@")
     if at and axis.isdigit():
         return f"{plain_name(effect)}, axis {axis}"
+    if at and axis.replace(",", "").isdigit():
+        first, _, second = axis.partition(",")
+        return f"{plain_name(effect)}, axes {first} and {second}"
     return plain_name(label)
 
 

@@ -2,6 +2,7 @@
 // A helper that cannot go on is a failed test.
 #![allow(clippy::panic, missing_docs)]
 
+use axisight_core::effects::{Scope, info};
 use axisight_core::plant::{Plant, assemble};
 use axisight_core::robot::{EffectSetting, Place, RobotDescription};
 use axisight_core::robot_file::read_robot;
@@ -90,11 +91,17 @@ pub fn plant<S: Scalar>(robot: &RobotDescription, settings: &[EffectSetting<S>])
     assemble(robot, &[], settings).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// One effect at constant parameters.
+/// One effect at constant parameters; one between axes acts between `axis` and the next.
 pub fn effect<S: Scalar>(name: &str, axis: Option<usize>, parameters: &[f64]) -> EffectSetting<S> {
+    let between = info(name).is_ok_and(|info| info.scope == Scope::Axes);
+    let place = match axis {
+        None => Place::Arm,
+        Some(axis) if between => Place::Axes(axis, axis + 1),
+        Some(axis) => Place::Axis(axis),
+    };
     EffectSetting {
         name: name.to_owned(),
-        place: axis.map_or(Place::Arm, Place::Axis),
+        place,
         parameters: parameters.iter().map(|p| S::constant(*p)).collect(),
     }
 }

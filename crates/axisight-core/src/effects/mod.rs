@@ -123,6 +123,11 @@ effect_table!(
     feedforward_missing,
     current_loop,
     link_geometry,
+    lost_motion,
+    encoder_eccentricity,
+    power_supply_sag,
+    axis_coupling,
+    clock_drift,
 );
 
 /// Description of effect `name`.

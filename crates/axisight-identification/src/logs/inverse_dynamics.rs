@@ -8,7 +8,7 @@ use super::gram::{Block, blocks};
 use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
 };
-use axisight_core::effects::Motor;
+use axisight_core::effects::{CoupledAxis, Motor};
 use axisight_core::plant::{Axis, Plant, PlantError, assemble};
 use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
 use axisight_numerics::Weighting;
@@ -101,7 +101,7 @@ impl InverseDynamics {
             seeded::<S>(&self.parameters, &self.effects, theta, seeds, S::seeded);
         let failed = |e: PlantError| ProblemError::Failed(e.to_string());
         let plant = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
-        if plant.chain.carries_derivatives() {
+        if plant.arm_carries_derivatives() {
             return Ok(predicted(
                 &plant,
                 record,
@@ -196,6 +196,9 @@ impl<'a, S: Scalar> Arm<'a, S> {
         for (target, source) in self.motion.iter_mut().zip(sources) {
             for (axis, x) in self.plant.axes.iter().zip(&source[k * n_axes..]) {
                 target[axis.joint] = S::constant(x * axis.ratio);
+                for (first, by) in &axis.led_by {
+                    target[axis.joint] += *by * source[k * n_axes + first];
+                }
             }
         }
         let [q, v, a] = &self.motion;
@@ -219,7 +222,9 @@ fn predicted<S: Scalar, T: Scalar>(
     for k in 0..n_samples {
         let forces = arm.forces(record, k);
         for (i, axis) in plant.axes.iter().enumerate() {
-            let command = drive(axis, record, k * n_axes + i, lifted(&forces[axis.joint]));
+            let turned = reaction(plant, forces, i) + coupled(plant, record, k, i);
+            let force = lifted(&forces[axis.joint]);
+            let command = drive(axis, record, k * n_axes + i, force, turned);
             out[0][i].push(command.lane(0));
             for (seed, series) in out[1..].iter_mut().enumerate() {
                 series[i].push(command.partial(seed, 0));
@@ -227,6 +232,41 @@ fn predicted<S: Scalar, T: Scalar>(
         }
     }
     out
+}
+
+/// Torque that a motor gives to gears it turns along [Nm].
+fn reaction<S: Scalar, T: Scalar>(plant: &Plant<S>, forces: &[T], motor: usize) -> S {
+    let mut torque = S::zero();
+    for axis in &plant.axes {
+        for (_, by) in axis.led_by.iter().filter(|(first, _)| *first == motor) {
+            torque += lifted::<T, S>(&forces[axis.joint]) * *by;
+        }
+    }
+    torque
+}
+
+/// Torque that a motor gives to effects between axes in sample `k` [Nm].
+fn coupled<S: Scalar>(plant: &Plant<S>, record: &MotionRecord, k: usize, motor: usize) -> S {
+    let first = k * plant.axes.len();
+    let state = |i: usize| {
+        let (angle, speed) = (record.position[first + i], record.velocity[first + i]);
+        let ratio = plant.axes[i].ratio;
+        let [motor_angle, motor_speed, joint_angle, joint_speed] =
+            [angle, speed, angle * ratio, speed * ratio].map(S::constant);
+        CoupledAxis {
+            motor_angle,
+            motor_speed,
+            joint_angle,
+            joint_speed,
+        }
+    };
+    let mut torque = S::zero();
+    for (axes, added) in plant.between_axes(state) {
+        for (_, added) in axes.iter().zip(added).filter(|(i, _)| **i == motor) {
+            torque -= added.motor + added.joint * plant.axes[motor].ratio;
+        }
+    }
+    torque
 }
 
 /// The same number over another scalar; derivatives go along where there are any.
@@ -237,8 +277,9 @@ fn lifted<T: Scalar, S: Scalar>(x: &T) -> S {
     })
 }
 
-/// Torque commanded in entry `i` of a record, where the arm asks for `force` on the joint.
-fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S) -> S {
+/// Torque commanded in entry `i` of a record, where the arm asks for `force` on the joint and other
+/// axes for `turned` on the motor.
+fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S, turned: S) -> S {
     let at = |x: &[f64]| S::constant(x[i]);
     let (angle, speed) = (at(&record.position), at(&record.velocity));
     let joint_force = force - axis.joint_torque_of(angle * axis.ratio, speed * axis.ratio);
@@ -251,7 +292,8 @@ fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S) -
     };
     let mut torque = joint_force * axis.ratio
         + axis.motor_inertia * at(&record.acceleration)
-        + axis.viscous_friction * speed;
+        + axis.viscous_friction * speed
+        + turned;
     for kernel in &axis.kernels {
         torque -= kernel.motor_torque(&motor);
     }

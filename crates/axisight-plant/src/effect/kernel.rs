@@ -240,6 +240,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn pair_torque(&self, _pair: &Pair<'_, S>) -> [AxisTorque<S>; 2] {
         [AxisTorque::zero(); 2]
     }
+    /// Share of the first axis' turn (joint side) by which the gear of the second one is turned.
+    fn turns_next(&self) -> Option<S> {
+        None
+    }
     /// Rates of the effect's own states between two axes [1/s].
     fn pair_rates(&self, _pair: &Pair<'_, S>, _rates: &mut [S]) {}
 
@@ -248,6 +252,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Rates of the effect's own states on the arm [1/s].
     fn arm_rates(&self, _arm: &Arm<'_, S>, _rates: &mut [S]) {}
 
+    /// By how much the controller's clock is fast against that of the logs [1].
+    fn clock_drift(&self) -> Option<S> {
+        None
+    }
     /// Factors of the controller's proportional and integral gain [1].
     fn controller_gains(&self) -> Option<[S; 2]> {
         None
@@ -268,6 +276,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     }
     /// Error added to the measured motor position [rad].
     fn sensor(&self, _angle: S) -> S {
+        S::zero()
+    }
+    /// Error added to the measured joint angle [rad], from which the motor position is taken.
+    fn joint_sensor(&self, _angle: S) -> S {
         S::zero()
     }
 }

@@ -36,6 +36,8 @@ pub struct Axis<S> {
     pub(super) on_motor: Vec<Own<S>>,
     pub(super) on_gear: Vec<Own<S>>,
     pub(super) on_joint: Vec<Own<S>>,
+    /// Axes whose turn turns this gear along: which, and by how much per motor angle there.
+    pub led_by: Vec<(usize, S)>,
 }
 
 impl<S: Scalar> Axis<S> {
@@ -223,6 +225,7 @@ pub(super) fn axes<S: Scalar>(
                 on_motor: Vec::new(),
                 on_gear: Vec::new(),
                 on_joint: Vec::new(),
+                led_by: Vec::new(),
             }
         })
         .collect()

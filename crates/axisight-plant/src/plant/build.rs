@@ -126,6 +126,10 @@ impl<S: Scalar> Plant<S> {
             }
             (Scope::Axes, Place::Axes(a, b)) if a != b && a.max(b) < self.axes.len() => {
                 let own = self.with_states(own);
+                if let Some(share) = own.kernel.turns_next() {
+                    let by = share * self.axes[a].ratio;
+                    self.axes[b].led_by.push((a, by));
+                }
                 self.on_pairs.push(OnPair { axes: [a, b], own });
             }
             _ => return Err(misplaced(info, self.axes.len(), place).into()),

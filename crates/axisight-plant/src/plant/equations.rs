@@ -7,7 +7,7 @@
 
 use super::axis::Axis;
 use super::own::{OnPair, Own};
-use crate::effect::{Arm, CoupledAxis, Motor, Pair};
+use crate::effect::{Arm, AxisTorque, CoupledAxis, Motor, Pair};
 use crate::robot::{Chain, Dynamics, DynamicsScratch};
 use axisight_scalar::Scalar;
 use std::ops::Range;
@@ -67,6 +67,37 @@ impl<S: Scalar> Plant<S> {
             Some(gear) => rates[gear.slot],
             None => rates[self.n_motors + axis.joint] * (1.0 / axis.ratio),
         }
+    }
+
+    /// Angle of the joint that an axis drives in state `x` [rad].
+    pub fn joint_angle(&self, axis: &Axis<S>, x: &[S]) -> S {
+        x[self.n_motors + axis.joint]
+    }
+
+    /// What effects between axes add in the states that `state` tells of each axis: their axes, the torques.
+    pub fn between_axes(
+        &self,
+        state: impl Fn(usize) -> CoupledAxis<S>,
+    ) -> impl Iterator<Item = ([usize; 2], [AxisTorque<S>; 2])> {
+        self.on_pairs.iter().map(move |pair| {
+            let axes = pair.axes.map(&state);
+            let internal = &[];
+            let at = Pair { axes, internal };
+            (pair.axes, pair.own.kernel.pair_torque(&at))
+        })
+    }
+
+    /// Whether what moves the arm, or its links, carries derivatives.
+    pub fn arm_carries_derivatives(&self) -> bool {
+        let seeded = |by: &S| (0..S::PARTIALS).any(|seed| by.partial(seed, 0) != 0.0);
+        let mut turned = self.axes.iter().flat_map(|axis| &axis.led_by);
+        self.chain.carries_derivatives() || turned.any(|(_, by)| seeded(by))
+    }
+
+    /// By how much the controller's clock is fast against that of the references; `None` for one clock.
+    pub fn clock_drift(&self) -> Option<S> {
+        let drifts = self.on_arm.iter().filter_map(|on| on.kernel.clock_drift());
+        drifts.reduce(|a, b| a + b)
     }
 
     /// Index of an axis's motor angle among the states; `None` for a rigid transmission.
@@ -145,6 +176,10 @@ impl<S: Scalar> Plant<S> {
                 force[joint] += torque.motor * (1.0 / axis.ratio);
             }
         }
+        let accelerations = &mut place[m + n..];
+        self.each_reaction(x, |first, torque| {
+            self.hold_back(first, torque, force, accelerations);
+        });
         for pair in &self.on_pairs {
             self.couple(pair, x, force, &mut place[m + n..], own_rates);
         }
@@ -199,6 +234,7 @@ impl<S: Scalar> Plant<S> {
             let free = self.driven(axis, x, S::zero(), *command, &mut []).motor;
             *out = free + axis.viscous_friction * self.motor_speed(axis, x);
         }
+        self.each_reaction(x, |first, torque| out[first] -= torque);
         for pair in &self.on_pairs {
             let torque = pair.own.kernel.pair_torque(&self.pair_state(pair, x));
             for (axis, torque) in pair.axes.iter().zip(torque) {
@@ -231,7 +267,12 @@ impl<S: Scalar> Plant<S> {
                 }
             }
             delta -= x[m + axis.joint];
-            let rate = speed * slope - x[m + n + m + axis.joint];
+            let mut rate = speed * slope - x[m + n + m + axis.joint];
+            for (first, by) in &axis.led_by {
+                let first = &self.axes[*first];
+                delta += self.motor_angle(first, x) * *by;
+                rate += self.motor_speed(first, x) * *by;
+            }
             let torque = axis.gear_torque(gear, delta, rate, own, own_rates);
             (angle, speed, torque, torque * back)
         } else {
@@ -270,6 +311,28 @@ impl<S: Scalar> Plant<S> {
         }
     }
 
+    /// What motors feel of the gears they turn along [Nm]: `take(axis, torque against it)`.
+    #[inline]
+    fn each_reaction(&self, x: &[S], mut take: impl FnMut(usize, S)) {
+        for second in self.axes.iter().filter(|axis| !axis.led_by.is_empty()) {
+            let none = S::zero();
+            let gear = self.driven(second, x, none, none, &mut []).gear;
+            for (first, by) in &second.led_by {
+                take(*first, gear * *by);
+            }
+        }
+    }
+
+    /// Take a torque off a motor.
+    fn hold_back(&self, axis: usize, torque: S, force: &mut [S], accelerations: &mut [S]) {
+        let axis = &self.axes[axis];
+        if let Some(gear) = &axis.gear {
+            accelerations[gear.slot] -= torque * axis.inverse_motor_inertia;
+        } else {
+            force[axis.joint] -= torque * (1.0 / axis.ratio);
+        }
+    }
+
     /// Add the torques of an effect between two axes.
     fn couple(
         &self,
@@ -283,11 +346,7 @@ impl<S: Scalar> Plant<S> {
         for (i, torque) in pair.axes.iter().zip(pair.own.kernel.pair_torque(&state)) {
             let axis = &self.axes[*i];
             force[axis.joint] += torque.joint;
-            if let Some(gear) = &axis.gear {
-                accelerations[gear.slot] += torque.motor * axis.inverse_motor_inertia;
-            } else {
-                force[axis.joint] += torque.motor * (1.0 / axis.ratio);
-            }
+            self.hold_back(*i, -torque.motor, force, accelerations);
         }
         if let Some(rates) = own_rates.get_mut(pair.own.internal.clone()) {
             pair.own.kernel.pair_rates(&state, rates);

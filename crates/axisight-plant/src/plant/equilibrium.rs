@@ -1,7 +1,8 @@
 //! Static equilibrium: elastic joints settled under gravity, motors holding.
 
+use super::axis::Axis;
 use super::equations::Plant;
-use crate::effect::{Arm, AxisTorque, CoupledAxis, Pair};
+use crate::effect::{Arm, AxisTorque, CoupledAxis};
 use axisight_scalar::Scalar;
 
 /// A plant at rest.
@@ -147,12 +148,14 @@ fn hold<S: Scalar>(
     q: &[S],
     load: &[S],
 ) -> Result<Equilibrium<S>, EquilibriumError> {
-    let mut added = vec![AxisTorque::zero(); plant.axes.len()];
-    let mut motors = hold_axes(plant, q, load, &added)?;
+    let n_axes = plant.axes.len();
+    let mut added = vec![AxisTorque::zero(); n_axes];
+    let mut motors = hold_axes(plant, q, load, &added, &vec![S::zero(); n_axes])?;
     if !plant.on_pairs.is_empty() {
         for _ in 0..PAIR_PASSES {
             added = pair_torques(plant, q, &motors.0);
-            motors = hold_axes(plant, q, load, &added)?;
+            add_reactions(plant, q, load, &mut added);
+            motors = hold_axes(plant, q, load, &added, &motors.0)?;
         }
     }
     let (motor_angle, motor_torque) = motors;
@@ -165,20 +168,22 @@ fn hold<S: Scalar>(
 }
 
 /// Motor angles and torque commands that hold the joints; `added` is what effects between axes
-/// add.
+/// add, `motors` are the angles [rad] of the pass before.
 fn hold_axes<S: Scalar>(
     plant: &Plant<S>,
     q: &[S],
     load: &[S],
     added: &[AxisTorque<S>],
+    motors: &[S],
 ) -> Result<(Vec<S>, Vec<S>), EquilibriumError> {
     let mut motor_angle = Vec::with_capacity(plant.axes.len());
     let mut motor_torque = Vec::with_capacity(plant.axes.len());
     for (number, (axis, added)) in plant.axes.iter().zip(added).enumerate() {
         let joint_angle = q[axis.joint];
-        let own = axis.joint_torque_of(joint_angle, S::zero());
-        let load = load[axis.joint] - own - added.joint;
-        let angle = axis.motor_angle_at_rest(joint_angle, load);
+        let load = gear_load(axis, q, load) - added.joint;
+        let turned = axis.led_by.iter().map(|(first, by)| motors[*first] * *by);
+        let by_motor = turned.fold(joint_angle, |angle, by| angle - by);
+        let angle = axis.motor_angle_at_rest(by_motor, load);
         if (0..S::LANES).any(|lane| !angle.lane(lane).is_finite()) {
             return Err(EquilibriumError::NoDeflection { axis: number + 1 });
         }
@@ -192,20 +197,32 @@ fn hold_axes<S: Scalar>(
     Ok((motor_angle, motor_torque))
 }
 
+/// Load on the gear of an axis at rest [Nm, joint side], without effects between axes.
+fn gear_load<S: Scalar>(axis: &Axis<S>, q: &[S], load: &[S]) -> S {
+    load[axis.joint] - axis.joint_torque_of(q[axis.joint], S::zero())
+}
+
+/// Take off each motor what it carries of the gears that it turns along.
+fn add_reactions<S: Scalar>(plant: &Plant<S>, q: &[S], load: &[S], added: &mut [AxisTorque<S>]) {
+    for (second, axis) in plant.axes.iter().enumerate() {
+        let torque = gear_load(axis, q, load) - added[second].joint;
+        for (first, by) in &axis.led_by {
+            added[*first].motor -= torque * *by;
+        }
+    }
+}
+
 fn pair_torques<S: Scalar>(plant: &Plant<S>, q: &[S], motor_angle: &[S]) -> Vec<AxisTorque<S>> {
     let mut added = vec![AxisTorque::zero(); plant.axes.len()];
     let zero = S::zero();
-    for pair in &plant.on_pairs {
-        let state = Pair {
-            axes: pair.axes.map(|i| CoupledAxis {
-                motor_angle: motor_angle[i],
-                motor_speed: zero,
-                joint_angle: q[plant.axes[i].joint],
-                joint_speed: zero,
-            }),
-            internal: &[],
-        };
-        for (i, torque) in pair.axes.iter().zip(pair.own.kernel.pair_torque(&state)) {
+    let state = |i: usize| CoupledAxis {
+        motor_angle: motor_angle[i],
+        motor_speed: zero,
+        joint_angle: q[plant.axes[i].joint],
+        joint_speed: zero,
+    };
+    for (axes, torques) in plant.between_axes(state) {
+        for (i, torque) in axes.iter().zip(torques) {
             added[*i].motor += torque.motor;
             added[*i].joint += torque.joint;
         }

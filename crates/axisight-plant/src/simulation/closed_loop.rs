@@ -4,7 +4,7 @@ use super::controller::{ControlLoop, OwnLaw};
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
-use crate::plant::{EquilibriumError, Plant, equilibrium};
+use crate::plant::{Axis, EquilibriumError, Plant, equilibrium};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -137,6 +137,7 @@ pub fn simulate<S: Scalar>(
 ) -> Result<Status, SimulationError> {
     let n_axes = plant.axes.len();
     let n_samples = check(run, n_axes, S::LANES)?;
+    check_turned(plant)?;
     if run.method.may_be_implicit() && !stepper.has_jacobian() {
         return Err(SimulationError::NoJacobian(run.method));
     }
@@ -196,6 +197,23 @@ pub fn simulate<S: Scalar>(
     Ok(Status::Completed)
 }
 
+/// Refuse a rigid gear that another axis turns along: it would be a constraint.
+fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
+    let turned = |axis: &Axis<S>| {
+        let lanes = 0..S::LANES;
+        let by = |(_, by): &(usize, S)| lanes.clone().any(|lane| by.lane(lane) != 0.0);
+        axis.gear.is_none() && axis.led_by.iter().any(by)
+    };
+    match plant.axes.iter().position(turned) {
+        None => Ok(()),
+        Some(axis) => Err(EffectError::Axis {
+            effect: "axis_coupling",
+            expected: "a second axis with a compliant transmission where the first one turns it".to_owned(),
+            got: format!("axis {} (rigid)", axis + 1),
+        }),
+    }
+}
+
 /// Whether no state is infinite or NaN: zero times the sum of all would be NaN.
 fn all_finite<S: Scalar>(x: &[S]) -> bool {
     let zero = S::Real::zero();
@@ -214,6 +232,8 @@ pub struct Signals<S> {
     pub torque_disturbance: Vec<S>,
     /// Error of the measured positions, noise included [rad].
     pub position_disturbance: Vec<S>,
+    /// By how much the controller's clock is fast against that of the references; none where they are one.
+    clock_drift: Option<S>,
     /// Share of each command that the drive reports, and what it reports [Nm]; empty where all
     /// report what they are told.
     reported_share: Vec<S>,
@@ -230,6 +250,7 @@ impl<S: Scalar> Signals<S> {
             reference: zeros.clone(),
             torque_disturbance: zeros.clone(),
             position_disturbance: zeros,
+            clock_drift: None,
             reported_share: Vec::new(),
             reported: Vec::new(),
         }
@@ -239,6 +260,7 @@ impl<S: Scalar> Signals<S> {
     fn of(plant: &Plant<S>) -> Self {
         let n_axes = plant.axes.len();
         let mut signals = Self::new(n_axes);
+        signals.clock_drift = plant.clock_drift();
         let share = |i: usize| {
             let shares = plant.axes[i]
                 .kernels
@@ -263,6 +285,7 @@ impl<S: Scalar> Signals<S> {
             let mut error = lane_value(run.noise, k, i, plant.axes.len());
             for kernel in &axis.kernels {
                 error += kernel.sensor(angle);
+                error += kernel.joint_sensor(plant.joint_angle(axis, x)) * (1.0 / axis.ratio);
             }
             self.read(i, angle, error, run.resolution);
         }
@@ -302,7 +325,10 @@ impl<S: Scalar> Signals<S> {
             }
             Drive::Reference(reference) => {
                 for i in 0..n {
-                    self.reference[i] = lane_value(reference, k, i, n);
+                    self.reference[i] = match self.clock_drift {
+                        Some(drift) => value_at(reference, k, drift, i, n),
+                        None => lane_value(reference, k, i, n),
+                    };
                 }
                 controller.command(&self.measured, &self.reference, &mut self.command);
             }
@@ -353,6 +379,28 @@ pub fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: u
             .copied()
             .unwrap_or(0.0)
     })
+}
+
+/// Entry of each lane's array at sample `(1 + drift) k`, between samples in a line; the first or
+/// last one beyond them.
+fn value_at<S: Scalar>(arrays: &[&[f64]], k: usize, drift: S, axis: usize, n_axes: usize) -> S {
+    let late = drift * k as f64;
+    let whole = S::from_lanes(|lane| late.lane(lane).floor());
+    let at = |further: f64| {
+        S::from_lanes(|lane| {
+            let Some(array) = arrays.get(lane).or_else(|| arrays.last()) else {
+                return 0.0;
+            };
+            let last = (array.len() / n_axes).saturating_sub(1);
+            // Drifts are bounded, and runs have far fewer samples than numbers have digits.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let sample = (k as f64 + whole.lane(lane) + further).max(0.0) as usize;
+            let entry = array.get(sample.min(last) * n_axes + axis);
+            entry.copied().unwrap_or(0.0)
+        })
+    };
+    let before = at(0.0);
+    (late - whole).fma(at(1.0) - before, before)
 }
 
 /// Number of samples of a run of `n_axes` axes in at most `lanes` lanes.

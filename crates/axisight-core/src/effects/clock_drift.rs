@@ -1,0 +1,45 @@
+//! Controller and logger that run on clocks of their own.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "clock_drift",
+    summary: "the machine's clock is not that of the references in its logs: the two drift apart",
+    equation: "phi_r'(t) -> phi_r'((1 + e) t)",
+    source: "Eidson (2006), Measurement, Control and Communication Using IEEE 1588, chapter 2 (clock rates)",
+    scope: Scope::Arm,
+    acts: Acts::Controller,
+    family: Family::Timing,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::References],
+    parameters: &[ParameterInfo {
+        name: "relative_rate",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.01,
+        upper: 0.01,
+        typical: 1e-3,
+    }],
+};
+
+struct Drift<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Drift(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Drift<S> {
+    fn clock_drift(&self) -> Option<S> {
+        Some(self.0)
+    }
+}

@@ -1,0 +1,50 @@
+//! Encoder on the joint whose disc is not centred.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+const fn wave(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "rad (joint side)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.5,
+        upper: 0.5,
+        typical: 2e-2,
+    }
+}
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "encoder_eccentricity",
+    summary: "the position is taken from an encoder on the joint that sits off centre: an error once a turn of the joint",
+    equation: "v_phi = (a cos(q) + b sin(q)) / r",
+    source: "Heidenhain, Rotary Encoders catalogue: measuring error of eccentric mounting, e / R once a turn",
+    scope: Scope::Axis,
+    acts: Acts::Sensor,
+    family: Family::Periodic,
+    contains: &[],
+    parts: &[],
+    usual: &["joint_zero_offset"],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::SlowTurns],
+    parameters: &[wave("cosine_rad"), wave("sine_rad")],
+};
+
+struct Eccentric<S>([S; 2]);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Eccentric([p[0], p[1]]))
+}
+
+impl<S: Scalar> Kernel<S> for Eccentric<S> {
+    fn joint_sensor(&self, angle: S) -> S {
+        let (sine, cosine) = angle.sin_cos();
+        self.0[0].fma(cosine, self.0[1] * sine)
+    }
+}

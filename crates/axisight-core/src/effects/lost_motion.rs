@@ -1,0 +1,65 @@
+//! Gear that gives way around its middle: play that carries part of the torque.
+
+use super::formulas::dead_zone;
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "lost_motion",
+    summary: "the gear is soft around its middle, where few of its teeth carry, and as stiff as modelled beyond",
+    equation: "tau_g = k (delta - s clip(delta, -b, b)),  its corners rounded over b/20",
+    source: "Nabtesco, RV series catalogue: lost motion, the torsion at 3 % of the rated torque",
+    scope: Scope::Axis,
+    acts: Acts::Transmission,
+    family: Family::Transmission,
+    contains: &[],
+    parts: &[],
+    usual: &["backlash", "nonlinear_stiffness"],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::Amplitudes],
+    parameters: &[
+        ParameterInfo {
+            name: "softness",
+            unit: "1",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            // All but play, which a spring at rest could not carry a load with.
+            upper: 0.98,
+            typical: 0.5,
+        },
+        ParameterInfo {
+            name: "half_width_rad",
+            unit: "rad (joint side)",
+            role: Role::Shape,
+            neutral: 3e-4,
+            lower: 1e-6,
+            upper: 0.05,
+            typical: 3e-4,
+        },
+    ],
+};
+
+struct Soft<S> {
+    softness: S,
+    within: S,
+}
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Soft {
+        softness: p[0],
+        within: p[1],
+    })
+}
+
+impl<S: Scalar> Kernel<S> for Soft<S> {
+    fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
+        let (beyond, _) = dead_zone(spring.loaded, self.within);
+        -(spring.stiffness * self.softness * (spring.loaded - beyond))
+    }
+}

@@ -1,0 +1,51 @@
+//! Supply whose voltage gives way under power, and the drive's torque with it.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "power_supply_sag",
+    summary: "the drive gives less of its torque the more power it draws: its supply gives way",
+    equation: "tau = u / (1 + s max(u phi', 0))",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.2 (power supply and amplifier)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    family: Family::TorquePath,
+    contains: &[],
+    parts: &[],
+    usual: &["torque_constant", "viscous_friction"],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::Speeds],
+    parameters: &[ParameterInfo {
+        name: "sag_1_w",
+        unit: "1/W",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 10.0,
+        typical: 1e-3,
+    }],
+};
+
+struct Sag<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Sag(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Sag<S> {
+    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
+        let power = motor.command * motor.speed;
+        let sag = self.0 * power.if_positive(power, S::zero());
+        -(motor.command * sag / (S::one() + sag))
+    }
+
+    fn uses_command(&self) -> bool {
+        true
+    }
+}
