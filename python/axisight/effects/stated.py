@@ -97,6 +97,9 @@ FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad
 CLOCK = ("clock_drift", "relative_rate")
 """What a clock of its own is, and its parameter."""
 
+STEPS = ("position_quantization", "increment_rad")
+"""What an encoder of few lines is, and its parameter."""
+
 TORQUE_CONSTANT = ("torque_constant", "relative_error")
 """What a motor with another torque constant is, and its parameter."""
 

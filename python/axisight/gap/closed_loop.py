@@ -143,6 +143,12 @@ class ClosedLoopView(View):
             threads=self.settings.threads,
         )
 
+    def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the torque that noise of the stated sensor causes through the loop, for every log."""
+        std = np.full(self.robot.n_axes, self.robot.position_noise_std)
+        seed, threads = self.settings.seed, self.settings.threads
+        return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
+
 
 def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)

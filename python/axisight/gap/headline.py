@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from axisight.effects import Effect, article, noun, phrase
+from axisight.effects.stated import STEPS
 from axisight.gap.result import Cause, Gap, Where
 from axisight.gap.verdict import Conclusion
 
@@ -45,6 +46,11 @@ def headline(
         rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])
         return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
     missing = named(causes, own, len(gap.before_per_axis))
+    if all(c.effect == STEPS[0] for c in causes):
+        return (
+            f"The simulator lacks {missing}: the steps of the encoders are the noise at which the gap of "
+            f"{percent(gap.refitted)} of the torque stands (noise and steps: {percent(gap.floor)})."
+        )
     return f"The simulator lacks {missing}: {shrinks}"
 
 

@@ -19,6 +19,7 @@ from axisight.fitting import robot_parameters
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
 from axisight.gap.chatter import chance_check, with_chance
+from axisight.gap.coarse import with_coarse_encoders
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
@@ -289,7 +290,15 @@ def _assemble(
     nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
     share = bent_for(view.fitter, found)
     conclusion = carried_over(conclusion, reach.judged, judged, names, settings, own, share)
-    causes = _causes(conclusion, reach.reductions)
+    measured = [view.measured(log) for log in held_logs]
+    conclusion, of_steps = with_coarse_encoders(
+        conclusion,
+        view,
+        held_logs,
+        reach.judged,
+        lambda errors: stage(held_logs, errors, settings.block_s, measured),
+    )
+    causes = _causes(conclusion, reach.reductions or of_steps)
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline

@@ -439,7 +439,7 @@ def _link_place(trial: Trial) -> FreeEffect:
 
 
 def _shown_by_logs(_trial: Trial) -> None:
-    """Offer nothing: what the controller does is algebra of the logs, no fit of a machine."""
+    """Offer nothing: controllers, clocks and steps are algebra of the logs, no fit of a machine."""
 
 
 def _as_its_twin(_trial: Trial) -> None:
@@ -495,5 +495,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "power_supply_sag": _neutral,
     "axis_coupling": _coupled,
     "clock_drift": _shown_by_logs,
+    "position_quantization": _shown_by_logs,
 }
 """By effect."""

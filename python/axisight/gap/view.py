@@ -114,6 +114,10 @@ class View(ABC):
         where it goes round a loop.
         """
 
+    def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the same of the noise that the robot file states, whatever the logs have."""
+        return self.noises(logs, first_run)
+
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that causes remove on ``logs`` that they are kept on.
 

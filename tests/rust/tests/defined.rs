@@ -238,3 +238,20 @@ fn lost_motion_is_soft_around_the_middle() {
         assert!((got - want).abs() < tolerance, "{delta}: {got} {want}");
     }
 }
+
+/// An encoder of few lines reads the nearest of its steps.
+#[test]
+fn a_coarse_encoder_reads_steps() {
+    const STEP: f64 = 2e-3;
+    let robot = robot(PRESET);
+    let coarse = plant::<f64>(&robot, &[effect("position_quantization", Some(1), &[STEP])]);
+    let reference = sines(100, 3, robot.sample_time, 1.5);
+    let got = trace(&coarse, &robot, Drive::Reference(&[&reference]), &[], METHOD);
+    for (k, x) in got.states.iter().enumerate() {
+        let read = &got.measured[3 * k..3 * (k + 1)];
+        assert!((read[0] - x[0]).abs() == 0.0 && (read[2] - x[2]).abs() == 0.0, "{k}");
+        assert!((read[1] - x[1]).abs() < 0.5 * STEP * (1.0 + 1e-9), "{k}");
+        let steps = read[1] / STEP;
+        assert!((steps - steps.round()).abs() < 1e-9, "{k}: {steps} steps");
+    }
+}

@@ -128,6 +128,7 @@ effect_table!(
     power_supply_sag,
     axis_coupling,
     clock_drift,
+    position_quantization,
 );
 
 /// Description of effect `name`.

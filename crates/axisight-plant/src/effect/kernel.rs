@@ -278,6 +278,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn sensor(&self, _angle: S) -> S {
         S::zero()
     }
+    /// Step of the position sensor [rad].
+    fn resolution(&self) -> Option<S> {
+        None
+    }
     /// Error added to the measured joint angle [rad], from which the motor position is taken.
     fn joint_sensor(&self, _angle: S) -> S {
         S::zero()

@@ -287,19 +287,25 @@ impl<S: Scalar> Signals<S> {
                 error += kernel.sensor(angle);
                 error += kernel.joint_sensor(plant.joint_angle(axis, x)) * (1.0 / axis.ratio);
             }
-            self.read(i, angle, error, run.resolution);
+            let steps = axis.kernels.iter().filter_map(|k| k.resolution());
+            let coarsest = steps.fold(S::constant(run.resolution), |a, b| (a - b).if_positive(a, b));
+            self.read(i, angle, error, coarsest);
         }
     }
 
     /// Reading of an axis at motor angle `angle`, to the nearest step of the sensor.
     #[inline(always)]
-    pub fn read(&mut self, axis: usize, angle: S, mut error: S, resolution: f64) {
-        if resolution > 0.0 {
+    pub fn read(&mut self, axis: usize, angle: S, mut error: S, resolution: S) {
+        if (0..S::LANES).any(|lane| resolution.lane(lane) > 0.0) {
             let exact = angle + error;
             // Rounding is flat between its jumps: derivatives pass as if it were not there.
             error += S::from_lanes(|lane| {
-                let x = exact.lane(lane);
-                (x / resolution).round_ties_even() * resolution - x
+                let (x, step) = (exact.lane(lane), resolution.lane(lane));
+                if step > 0.0 {
+                    (x / step).round_ties_even() * step - x
+                } else {
+                    0.0
+                }
             });
         }
         self.position_disturbance[axis] = error;

@@ -1,0 +1,45 @@
+//! Encoder of few lines: positions come in steps.
+
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "position_quantization",
+    summary: "the measured position comes in steps: an encoder of few lines",
+    equation: "phi_m = s round(phi / s)",
+    source: "Widrow, Kollar (2008), Quantization Noise, chapter 1",
+    scope: Scope::Axis,
+    acts: Acts::Sensor,
+    family: Family::Sensor,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    twins: &[],
+    stands_for: None,
+    linear: Linear::No,
+    inverse_dynamics: false,
+    stiff: false,
+    absorbed_by: &[],
+    shown_by: &[Experiment::SlowTurns],
+    parameters: &[ParameterInfo {
+        name: "increment_rad",
+        unit: "rad",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 1.0,
+        typical: 1.5e-3,
+    }],
+};
+
+struct Steps<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Steps(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Steps<S> {
+    fn resolution(&self) -> Option<S> {
+        Some(self.0)
+    }
+}

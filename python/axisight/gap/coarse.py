@@ -1,0 +1,110 @@
+"""Positions that come in steps: a cause that is noise.
+
+What steps of an encoder do to the torque differs from run to run, and no simulator can repeat it: they raise
+the floor. Where a simulator leaves no more than that floor, and the noise of its own sensor would leave
+much less, the steps are what the gap is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.effects.stated import STEPS
+from axisight.gap.howfar import Stage, Stages, gap_reduction
+from axisight.gap.named import NamedCause
+from axisight.gap.result import Interval
+from axisight.gap.settings import Settings
+from axisight.gap.verdict import Conclusion
+from axisight.gap.view import View
+from axisight.logs import Log
+from axisight.logs.quality import quantization
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Squares of the floor over those that the stated sensor would leave, from where the steps make it.
+_MOSTLY = 2.0
+# Of steps that every log shows.
+_SURE = 0.99
+_OF_A_STEP = 0.01
+
+
+def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
+    """Return the step of each position (n_axes,) [rad], where its noise exceeds the sensor's; else zero.
+
+    Not where the simulator has steps itself, and not where a log shows none.
+    """
+    known = {e.axis for e in robot.effects if e.name == STEPS[0] and e.acts}
+    out = np.zeros(robot.n_axes)
+    for i in range(robot.n_axes):
+        found = [quantization(log.position_rad[:, i]) for log in logs]
+        steps = [0.0 if q is None else q.step for q in found]
+        felt = 0 < robot.position_noise_std < min(steps) / np.sqrt(12.0)
+        alike = max(steps) < (1 + _OF_A_STEP) * min(steps)
+        if felt and alike and i + 1 not in known:
+            out[i] = float(np.median(steps))
+    return out
+
+
+def with_coarse_encoders(
+    conclusion: Conclusion,
+    view: View,
+    logs: Sequence[Log],
+    stages: Stages,
+    measure: Callable[[Sequence[Array]], Stage],
+) -> tuple[Conclusion, list[Interval]]:
+    """Return *explained* by the steps of encoders instead of *none*, and what each explains of the gap.
+
+    ``logs``: of validation, ``stages`` of them. Unchanged where nothing is made of steps.
+    """
+    steps = encoder_steps(view.robot, view.logs) if conclusion.verdict == "none" else np.zeros(1)
+    if not steps.any():
+        return conclusion, []
+    quiet = measure(view.sensor_noises(logs, len(view.logs)))
+    loud = np.mean(stages.floor.per_log(), axis=0) > _MOSTLY * np.mean(quiet.per_log(), axis=0)
+    axes = np.flatnonzero((steps > 0) & loud).tolist()
+    if not axes:
+        return conclusion, []
+    shares = [_share(i, stages, quiet, view.settings) for i in axes]
+    causes = tuple(_named(i, float(steps[i])) for i in axes)
+    verdicts = tuple(
+        replace(a, verdict="explained", causes=(axes.index(a.axis - 1),))
+        if a.axis - 1 in axes
+        else a
+        for a in conclusion.axes
+    )
+    named = replace(
+        conclusion, verdict="explained", causes=causes, p_none=0.0, p_unknown=1.0 - _SURE, axes=verdicts
+    )
+    return named.with_checks([_says(i, float(steps[i])) for i in axes]), shares
+
+
+def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Interval:
+    """Return how much of the gap above the noise of the stated sensor the noise of steps is."""
+
+    def of(stage: Stage) -> Stage:
+        return replace(stage, blocks=tuple(b[:, [axis]] for b in stage.blocks))
+
+    floor, still, given = of(stages.floor), of(quiet), of(stages.given)
+    return gap_reduction(
+        floor, still, given, still, draws=settings.bootstrap, seed=settings.seed
+    )
+
+
+def _named(axis: int, step: float) -> NamedCause:
+    info = effect_info(STEPS[0])
+    value = Interval(step, step * (1 - _OF_A_STEP), step * (1 + _OF_A_STEP))
+    units = {p.name: p.unit for p in info.parameters}
+    return NamedCause(info.name, axis + 1, _SURE, {STEPS[1]: value}, units, info.family, _SURE)
+
+
+def _says(axis: int, step: float) -> str:
+    return (
+        f"Axis {axis + 1}: positions come in steps of {step:.4g} rad, more than the noise of the stated "
+        f"sensor. What they do to the torque no two runs repeat: the floor has it, and no simulator removes it."
+    )
