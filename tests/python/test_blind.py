@@ -22,7 +22,7 @@ from axisight.blind import (
     pinocchio_engine,
 )
 from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
-from axisight.blind.formulas import ConstantTorque, DelayLine, Formula, ResonantLoop
+from axisight.blind.formulas import ConstantTorque, DelayLine, Formula, ResonantLoop, RunOut
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
 from axisight.blind.make import make_cases
@@ -125,6 +125,16 @@ def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
             Effect("link_geometry", 1, {"x_m": 0.03, "y_m": -0.02, "z_m": 0.04}),
         ),
         (Native(damper=0.7), [], Effect("joint_damping", 1, {"relative_change": 0.7})),
+        (Native(turns_next=0.1), [], Effect("axis_coupling", None, {"share": 0.1}, (1, 2))),
+        (
+            Native(),
+            [RunOut(0.1, 0.4)],
+            Effect(
+                "encoder_eccentricity",
+                1,
+                {"cosine_rad": 0.1 * np.sin(0.4), "sine_rad": 0.1 * np.cos(0.4)},
+            ),
+        ),
         (
             Native(kp=0.1, ki=-0.2),
             [],
@@ -156,6 +166,29 @@ def test_what_has_one_formula_only_is_what_ours_is(
     size = np.sqrt(np.mean((expected - bare)[:, 0] ** 2))
     # It settles for a second before, ours for ever: a hundredth of an offset is still to come.
     assert np.sqrt(np.mean((torque - expected)[:, 0] ** 2)) < 0.02 * size
+
+
+@pytest.mark.parametrize("engine", sorted(RUN))
+def test_a_machine_with_a_fast_clock_is_ours(engine: str, robot: Robot):
+    reference = short(robot, 0.5)
+    fast = Effect("clock_drift", None, {"relative_rate": 8e-3})
+    torque = torque_of(engine, Machine(robot, fast=8e-3), reference)
+    expected = simulate(robot, reference, effects=[fast])["torque_cmd_nm"].values
+    bare = simulate(robot, reference)["torque_cmd_nm"].values
+    # Splines against lines between samples, and half a step of the engine.
+    off, size = (np.sqrt(np.mean((x - expected) ** 2)) for x in (torque, bare))
+    assert off < 0.1 * size
+
+
+@pytest.mark.parametrize("engine", sorted(RUN))
+def test_a_gear_that_is_turned_along_is_ours_in_every_engine(engine: str, robot: Robot):
+    reference = short(robot, 0.5)
+    coupled = Effect("axis_coupling", None, {"share": 0.1}, (2, 3))
+    torque = torque_of(engine, Machine(robot, {1: Native(turns_next=0.1)}), reference)
+    expected = simulate(robot, reference, effects=[coupled])["torque_cmd_nm"].values
+    bare = simulate(robot, reference)["torque_cmd_nm"].values
+    off, size = (np.sqrt(np.mean((x - expected) ** 2)) for x in (torque, bare))
+    assert off < 0.1 * size
 
 
 def test_runs_of_a_machine_do_not_feel_one_another(robot: Robot):

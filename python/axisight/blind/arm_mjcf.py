@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from axisight.blind.machine import NOTHING, Machine, Native
@@ -42,7 +42,7 @@ def mjcf(machine: Machine, step_s: float) -> str:
         )
         parts.close += "</body>"
     for joint, origin in zip(robot.joints, machine.origins(), strict=True):
-        _add_joint(parts, joint, origin, machine.native)
+        _add_joint(parts, joint, origin, machine)
     if ends.tip_kg:
         parts.bodies += (
             f'<body pos="{_vector(ends.tip_m)}">'
@@ -55,14 +55,12 @@ def mjcf(machine: Machine, step_s: float) -> str:
     <tendon>{parts.tendons}</tendon><actuator>{parts.actuators}</actuator></mujoco>"""
 
 
-def _add_joint(
-    parts: _Parts, joint: Joint, origin: tuple[float, ...], native: Mapping[int, Native]
-) -> None:
+def _add_joint(parts: _Parts, joint: Joint, origin: tuple[float, ...], machine: Machine) -> None:
     spring = ""
     if joint.drive is None and joint.spring is not None:
         spring = f'stiffness="{joint.spring.stiffness!r}" damping="{joint.spring.damping!r}"'
     parts.bodies += f'<body pos="{_vector(origin)}">'
-    change = native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
+    change = machine.native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
     # A position counts from where the bodies stand as they are written.
     kind = "slide" if joint.prismatic else "hinge"
     zero = f'ref="{-change.zero_rad!r}"' if change.zero_rad else ""
@@ -78,13 +76,16 @@ def _add_joint(
         )
     parts.close += "</body>"
     if joint.drive is not None:
-        _add_drive(parts, joint, change)
+        _add_drive(parts, joint, change, machine.along()[len(parts.axes)].tolist())
 
 
-def _add_drive(parts: _Parts, joint: Joint, change: Native) -> None:
+def _add_drive(parts: _Parts, joint: Joint, change: Native, along: Sequence[float]) -> None:
     drive, spring, name = joint.drive, joint.spring, joint.name
     if drive is None or spring is None:
         raise ValueError(f"{name}: expected an elastic gear")
+    # Drives of earlier axes that turn this gear along.
+    others = [(other, by) for other, by in zip(parts.axes, along, strict=False) if by]
+    turned = "".join(f'<joint joint="{other}_rotor" coef="{by!r}"/>' for other, by in others)
     parts.axes.append(name)
     inertia = drive.motor_inertia
     parts.rotors += (
@@ -98,7 +99,7 @@ def _add_drive(parts: _Parts, joint: Joint, change: Native) -> None:
         f'<fixed name="{name}_gear" stiffness="{spring.stiffness * (1 + change.spring)!r}"'
         f' damping="{spring.damping * (1 + change.damper)!r}"'
         f' springlength="{-width!r} {width!r}">'
-        f'<joint joint="{name}_rotor" coef="{drive.gear_ratio!r}"/>'
+        f'<joint joint="{name}_rotor" coef="{drive.gear_ratio!r}"/>{turned}'
         f'<joint joint="{name}" coef="-1"/></fixed>'
     )
     lag = f' dyntype="filterexact" dynprm="{change.lag_s!r}"' if change.lag_s else ""

@@ -114,7 +114,7 @@ def _effects(
     there = {name: kind for name, kind in kinds.items() if kind.axes(scene)}
     first = str(rng.choice(list(there)))
     out = [there[first].draw(rng, scene, int(rng.choice(there[first].axes(scene))))]
-    if number % _ONE_IN["pair"] == 1 and there[first].in_library:
+    if number % _ONE_IN["pair"] == 1 and there[first].in_library and not there[first].alone:
         out += _second(rng, scene, there, first, out[0])
     return tuple(out)
 
@@ -126,7 +126,7 @@ def _second(
     rooms = {
         name: [axis for axis in kind.axes(scene) if axis != taken.axis]
         for name, kind in kinds.items()
-        if kind.in_library and name != first
+        if kind.in_library and not kind.alone and name != first
     }
     names = [name for name, axes in rooms.items() if axes]
     if not names or scene.robot.n_axes == 1:
@@ -164,7 +164,7 @@ def machine_of(robot: Robot, effects: Sequence[Drawn]) -> Machine:
     out = Machine(robot)
     for effect in effects:
         if effect.axis is None:
-            out = replace(out, ends=effect.ends)
+            out = replace(out, ends=effect.ends, fast=effect.fast)
             continue
         out = replace(out, robot=out.robot.with_parameters(effect.changed))
         axis = effect.axis - 1

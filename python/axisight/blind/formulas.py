@@ -60,6 +60,15 @@ class Formula:
         del motor
         return 0.0
 
+    def joint_sensor(self, joint: Array) -> Array | float:
+        """Return what the sensor says more than the joint angle, if it sits there, once a sample [rad]."""
+        del joint
+        return 0.0
+
+    def read(self, angle: Array) -> Array:
+        """Return the angle as it is read, noise included [rad]."""
+        return angle
+
     def command(self, torque: Array) -> Array:
         """Return the mean torque the drive makes of a command [Nm] over a step."""
         return torque
@@ -191,6 +200,65 @@ class RoundedKnee(Formula):
         beyond = np.abs(at.deflection) - self.knee_rad
         past = 0.5 * (beyond + np.hypot(beyond, 0.05 * self.knee_rad))
         return _through_gear(at, self.more_nm_rad * np.sign(at.deflection) * past)
+
+
+@dataclass
+class SmoothMiddle(Formula):
+    """A gear whose teeth come into contact one after another: softer by a bell of the deflection."""
+
+    less_nm_rad: float
+    half_width_rad: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what the spring lacks."""
+        within = self.half_width_rad * np.tanh(at.deflection / self.half_width_rad)
+        return _through_gear(at, -self.less_nm_rad * within)
+
+
+@dataclass
+class WeakSupply(Formula):
+    """A drive whose torque falls as its supply does under the power drawn, by an exponential."""
+
+    share_1_w: float
+    told_nm: Array = field(default_factory=lambda: np.zeros(1))
+
+    def command(self, torque: Array) -> Array:
+        """Remember what the drive was told."""
+        self.told_nm = torque
+        return torque
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return what is missing of it."""
+        if self.told_nm.shape != at.motor_speed.shape:
+            return 0.0, 0.0
+        drawn = np.maximum(self.told_nm * at.motor_speed, 0.0)
+        return self.told_nm * np.expm1(-self.share_1_w * drawn), 0.0
+
+
+@dataclass
+class RunOut(Formula):
+    """An encoder on the joint with a wave of its reading over the turn."""
+
+    amplitude_rad: float
+    phase: float
+    first: Array | None = None
+
+    def joint_sensor(self, joint: Array) -> Array | float:
+        """Return the error of the angle, counted from where it was asked first."""
+        error = np.asarray(self.amplitude_rad * np.sin(joint + self.phase))
+        self.first = error if self.first is None else self.first
+        return np.asarray(error - self.first)
+
+
+@dataclass
+class Counter(Formula):
+    """An encoder of few lines that counts the nearest."""
+
+    line_rad: float
+
+    def read(self, angle: Array) -> Array:
+        """Return its angle."""
+        return np.asarray(np.round(angle / self.line_rad) * self.line_rad)
 
 
 @dataclass

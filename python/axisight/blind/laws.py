@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import copysign, cos, exp, pi, sin
+from math import atan2, copysign, cos, exp, floor, pi, sin
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,15 @@ class Law:
         """Return what the sensor says more than the motor angle [rad]."""
         del motor
         return 0.0
+
+    def joint_sensor(self, joint: float) -> float:
+        """Return what the sensor says more than the joint angle, if it sits there [rad]."""
+        del joint
+        return 0.0
+
+    def read(self, angle: float) -> float:
+        """Return the angle as it is read, noise included [rad]."""
+        return angle
 
     def command(self, torque: float) -> float:
         """Return the torque the drive makes of a command [Nm], every step."""
@@ -163,6 +172,45 @@ class KneeSpring(Law):
 
 
 @dataclass
+class SoftMiddle(Law):
+    """A gear that is softer up to some deflection, where few teeth carry."""
+
+    less_nm_rad: float
+    half_width_rad: float
+    half_step_s: float = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
+        self.half_step_s = 0.5 * step_s
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what the spring lacks, in the middle of the step."""
+        rate = at.gear_ratio * at.motor_speed - at.joint_speed
+        deflection = at.deflection + self.half_step_s * rate
+        within = min(max(deflection, -self.half_width_rad), self.half_width_rad)
+        total = -self.less_nm_rad * within
+        return -at.gear_ratio * total, total
+
+
+@dataclass
+class Sag(Law):
+    """A drive whose torque falls in proportion to the power that it draws."""
+
+    share_1_w: float
+    told_nm: float = 0.0
+
+    def command(self, torque: float) -> float:
+        """Remember what the drive was told."""
+        self.told_nm = torque
+        return torque
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return what is missing of it."""
+        drawn = max(self.told_nm * at.motor_speed, 0.0)
+        return -self.told_nm * min(self.share_1_w * drawn, 0.9), 0.0
+
+
+@dataclass
 class GearWave(Law):
     """A gear whose angle waves with the motor's, a Fourier series; power is conserved or not."""
 
@@ -208,6 +256,38 @@ class SensorWave(Law):
         """Return the error of the angle."""
         terms = zip(self.orders, self.amplitudes_rad, self.phases, strict=True)
         return sum(a * sin(n * motor + p) for n, a, p in terms)
+
+
+@dataclass
+class EccentricDisc(Law):
+    """An encoder on the joint whose disc turns about a point ``run_out`` of its radius off centre."""
+
+    run_out: float
+    phase: float
+    first: float | None = None
+
+    def begin(self, step_s: float) -> None:
+        """Count from where the joint will stand."""
+        del step_s
+        self.first = None
+
+    def joint_sensor(self, joint: float) -> float:
+        """Return the error of the angle."""
+        at = joint + self.phase
+        error = atan2(self.run_out * sin(at), 1 + self.run_out * cos(at))
+        self.first = error if self.first is None else self.first
+        return error - self.first
+
+
+@dataclass
+class FewLines(Law):
+    """An encoder of few lines: it counts them."""
+
+    line_rad: float
+
+    def read(self, angle: float) -> float:
+        """Return the last line passed, and half of one."""
+        return (floor(angle / self.line_rad) + 0.5) * self.line_rad
 
 
 @dataclass

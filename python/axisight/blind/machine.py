@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
@@ -27,7 +28,8 @@ class Native:
     added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
     ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
     for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad]; ``longer_m``: by how much
-    the next axis lies elsewhere in the link.
+    the next axis lies elsewhere in the link; ``turns_next``: share of its turn by which it turns the gear
+    of the next axis along.
     """
 
     half_width_rad: float = 0.0
@@ -45,6 +47,7 @@ class Native:
     for_rate: float = 0.0
     for_speed: float = 0.0
     longer_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turns_next: float = 0.0
 
 
 NOTHING = Native()
@@ -75,12 +78,32 @@ PLAIN = Ends()
 
 @dataclass(frozen=True)
 class Machine:
-    """A robot as it really is: native changes and laws of its engine by axis (from 0)."""
+    """A robot as it really is: native changes and laws of its engine by axis (from 0).
+
+    ``fast``: by how much its clock is fast against that of the references [1].
+    """
 
     robot: Robot
     native: Mapping[int, Native] = field(default_factory=dict)
     ends: Ends = PLAIN
     laws: Mapping[int, Sequence[object]] = field(default_factory=dict)
+    fast: float = 0.0
+
+    def met(self, reference: Array) -> Array:
+        """Return the reference (n, n_axes) as the machine's own clock meets it."""
+        if not self.fast:
+            return reference
+        at = np.arange(len(reference), dtype=np.float64)
+        wanted = np.minimum(at * (1 + self.fast), at[-1])
+        return np.asarray(scipy.interpolate.CubicSpline(at, reference)(wanted))
+
+    def along(self) -> Array:
+        """Return by how much each motor's turn turns the joints' gears (n_axes, n_axes): its own and the next."""
+        ratio = np.asarray(self.robot.gear_ratio, np.float64)
+        out = np.diag(ratio)
+        for axis, own in enumerate(self.of_axes()[:-1]):
+            out[axis + 1, axis] = own.turns_next * ratio[axis]
+        return out
 
     def origins(self) -> list[tuple[float, ...]]:
         """Return where every joint lies in the link before [m]."""

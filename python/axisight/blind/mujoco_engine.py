@@ -34,7 +34,8 @@ def run(
     ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
     still under its controller before. Raises InputError where it does not stay stable.
     """
-    return [_along(machine, *pair) for pair in zip(references, noises, strict=True)]
+    met = [machine.met(reference) for reference in references]
+    return [_along(machine, *pair) for pair in zip(met, noises, strict=True)]
 
 
 def _along(machine: Machine, reference: Array, noise: Array) -> tuple[Array, Array]:
@@ -70,9 +71,10 @@ class _Loop:
         weight = self._weight()
         # Gears give way to it, so that the joints stand at the operating point.
         deflection = weight / self.stiffness
-        self.data.qpos[: self.n] = (robot.operating_point + deflection) / self.ratio
+        along = machine.along()
+        self.data.qpos[: self.n] = np.linalg.solve(along, robot.operating_point + deflection)
         angle = self.data.qpos[: self.n].copy()
-        self.controller = Controller(machine, angle, weight * self.ratio)
+        self.controller = Controller(machine, angle, weight @ along)
         self.time_s = 0.0
 
     def _weight(self) -> Array:
@@ -91,6 +93,9 @@ class _Loop:
             measured = self.data.qpos[: self.n] + noise[k]
             for axis, law in self.laws:
                 measured[axis] += law.sensor(float(self.data.qpos[axis]))
+                joint = float(self.data.qpos[self.joints[axis]])
+                measured[axis] += law.joint_sensor(joint) / self.ratio[axis]
+                measured[axis] = law.read(float(measured[axis]))
             command = self.controller.command(measured, wanted)
             angle[k] = measured
             torque[k] = command

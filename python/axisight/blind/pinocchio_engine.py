@@ -48,7 +48,8 @@ def run(
     still = np.zeros((samples, len(references), machine.robot.n_axes))
     loop.follow(still, still)
     loop.time_s = 0.0
-    torque, angle = loop.follow(np.stack(references, axis=1), np.stack(noises, axis=1))
+    met = [machine.met(reference) for reference in references]
+    torque, angle = loop.follow(np.stack(met, axis=1), np.stack(noises, axis=1))
     return [(torque[:, i].copy(), angle[:, i].copy()) for i in range(len(references))]
 
 
@@ -141,14 +142,16 @@ class _Loop:
         lags = [(axis, Lag(x.lag_s)) for axis, x in enumerate(own) if x.lag_s]
         self.formulas: list[tuple[int, Formula]] = [*machine.laws_of(Formula), *lags]
         joint, weight = self._balanced(np.asarray(robot.operating_point, np.float64))
-        motor = (joint[self.joints] + weight[self.joints] / self.stiffness) / self.ratio
+        self.along = machine.along()
+        turned = joint[self.joints] + weight[self.joints] / self.stiffness
+        motor = np.linalg.solve(self.along, turned)
         self.state: _State = (
             np.tile(motor, (runs, 1)),
             np.tile(joint, (runs, 1)),
             np.zeros((runs, len(motor))),
             np.zeros((runs, len(joint))),
         )
-        holding = np.tile(weight[self.joints] * self.ratio, (runs, 1))
+        holding = np.tile(weight[self.joints] @ self.along, (runs, 1))
         self.controller = Controller(machine, self.state[0], holding)
         for _, formula, at in self._places(self.state, self.time_s):
             formula.begin(at, self.step_s)
@@ -172,6 +175,9 @@ class _Loop:
             measured = motor + noise[k]
             for axis, formula in self.formulas:
                 measured[:, axis] += formula.sensor(motor[:, axis])
+                joint = self.state[1][:, self.joints[axis]]
+                measured[:, axis] += formula.joint_sensor(joint) / self.ratio[axis]
+                measured[:, axis] = formula.read(measured[:, axis])
             command = self.controller.command(measured, wanted)
             angle[k], torque[k] = measured, command
             for axis, formula in self.formulas:
@@ -216,10 +222,10 @@ class _Loop:
     def _rates(self, state: _State, drive: Array, time_s: float) -> Sequence[Array]:
         """Return the rates of a state under torques of the drives."""
         motor, joint, motor_speed, joint_speed = state
-        deflection = self.ratio * motor - joint[:, self.joints]
-        rate = self.ratio * motor_speed - joint_speed[:, self.joints]
+        deflection = motor @ self.along.T - joint[:, self.joints]
+        rate = motor_speed @ self.along.T - joint_speed[:, self.joints]
         gear = self.stiffness * deflection + self.damping * rate
-        on_motor = drive - self.viscous * motor_speed - self.ratio * gear
+        on_motor = drive - self.viscous * motor_speed - gear @ self.along
         on_joint = -self.springs * joint - self.dampers * joint_speed
         on_joint[:, self.joints] += gear
         for axis, formula, at in self._places(state, time_s):

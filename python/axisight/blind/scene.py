@@ -94,6 +94,8 @@ class Scene:
 class Drawn:
     """One effect as drawn: parameters as the library states them, and what makes it.
 
+    ``fast``: of the machine's clock, as `Machine` has it.
+
     ``axis`` from 1; None for the arm, which ``ends`` is of. ``laws`` of the engine; ``changed``:
     parameters of the robot.
     """
@@ -105,6 +107,7 @@ class Drawn:
     laws: Sequence[object] = field(default_factory=tuple)
     ends: Ends = PLAIN
     changed: Mapping[str, float] = field(default_factory=dict)
+    fast: float = 0.0
 
 
 Draw = Callable[[Rng, Scene, int], Drawn]
@@ -131,11 +134,15 @@ def unloaded(scene: Scene) -> list[int]:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of effect, and the axes where it is one. ``in_library``: the diagnosis can name it."""
+    """A kind of effect, and the axes where it is one. ``in_library``: the diagnosis can name it.
+
+    ``alone``: no other effect is drawn beside it, whose law would not know of it.
+    """
 
     draw: Draw
     in_library: bool = True
     axes: Callable[[Scene], list[int]] = everywhere
+    alone: bool = False
 
 
 def sign(rng: Rng) -> float:

@@ -74,6 +74,44 @@ def _knee(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("piecewise_stiffness", axis, {"step": step, "knee_rad": knee}, laws=[law])
 
 
+def _lost_motion(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    softness, width = between(rng, 0.4, 0.9), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
+    law = laws.SoftMiddle(softness * scene.stiffness(axis), width)
+    values = {"softness": softness, "half_width_rad": width}
+    return Drawn("lost_motion", axis, values, laws=[law])
+
+
+def _sag(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    # A supply that gives a tenth to a half less at the largest power.
+    speed = max(float(np.abs(x[:, axis - 1]).max()) for x in scene.references)
+    share = between(rng, 0.1, 0.5) / (speed * float(scene.largest_nm[axis - 1]))
+    return Drawn("power_supply_sag", axis, {"sag_1_w": share}, laws=[laws.Sag(share)])
+
+
+def _eccentric(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    # A tenth of a millimetre to half of one, on a disc of 25 mm.
+    run_out, phase = between(rng, 4e-3, 2e-2), float(rng.uniform(0, 2 * np.pi))
+    law = laws.EccentricDisc(run_out, phase)
+    values = {"cosine_rad": run_out * np.sin(phase), "sine_rad": run_out * np.cos(phase)}
+    return Drawn("encoder_eccentricity", axis, {k: float(v) for k, v in values.items()}, laws=[law])
+
+
+def _few_lines(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    line = 2 * np.pi / 2.0 ** float(rng.integers(12, 17))
+    return Drawn("position_quantization", axis, {"increment_rad": line}, laws=[laws.FewLines(line)])
+
+
+def _coupled(rng: Rng, _scene: Scene, axis: int) -> Drawn:
+    share = sign(rng) * between(rng, 0.02, 0.2)
+    return Drawn("axis_coupling", axis, {"share": share}, Native(turns_next=share))
+
+
+def _fast_clock(rng: Rng, _scene: Scene, _axis: int) -> Drawn:
+    # Of quartz that was never set right, to that of a busy computer.
+    fast = sign(rng) * between(rng, 3e-5, 1e-3)
+    return Drawn("clock_drift", None, {"relative_rate": fast}, fast=fast)
+
+
 def _zero(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     offset = sign(rng) * between(rng, 0.02, 0.1)
     return Drawn("joint_zero_offset", axis, {"offset_rad": offset}, Native(zero_rad=offset))
@@ -327,6 +365,12 @@ KINDS: Mapping[str, Kind] = {
     "base_compliance": Kind(_rocking),
     "friction_warmup": Kind(_warmup),
     "piecewise_stiffness": Kind(_knee, axes=unloaded),
+    "lost_motion": Kind(_lost_motion, axes=unloaded),
+    "power_supply_sag": Kind(_sag),
+    "encoder_eccentricity": Kind(_eccentric, axes=turning),
+    "position_quantization": Kind(_few_lines),
+    "axis_coupling": Kind(_coupled, axes=lambda scene: everywhere(scene)[:-1], alone=True),
+    "clock_drift": Kind(_fast_clock),
     "joint_zero_offset": Kind(_zero, axes=turning),
     "torque_sensor_gain": Kind(_reported),
     "sensor_delay": Kind(_late_sensor),

@@ -47,6 +47,16 @@ def _gear_error(rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]
     return formulas.GearError(values["order"], values["amplitude_rad"], phase)
 
 
+def _smooth_middle(_rng: Rng, scene: Scene, axis: int, values: Mapping[str, float]) -> Formula:
+    less = values["softness"] * scene.stiffness(axis)
+    return formulas.SmoothMiddle(less, values["half_width_rad"])
+
+
+def _run_out(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
+    cosine, sine = values["cosine_rad"], values["sine_rad"]
+    return formulas.RunOut(float(np.hypot(cosine, sine)), float(np.arctan2(cosine, sine)))
+
+
 def _stale(_rng: Rng, scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
     return formulas.StaleSensor(round(values["delay_s"] / scene.robot.sample_time_s))
 
@@ -145,6 +155,10 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
             ),
             "backlash": lambda _r, _s, _a, v: formulas.Play(v["half_width_rad"]),
             "piecewise_stiffness": _knee,
+            "lost_motion": _smooth_middle,
+            "power_supply_sag": lambda _r, _s, _a, v: formulas.WeakSupply(v["sag_1_w"]),
+            "encoder_eccentricity": _run_out,
+            "position_quantization": lambda _r, _s, _a, v: formulas.Counter(v["increment_rad"]),
             "transmission_error": _gear_error,
             "sensor_delay": _stale,
             "current_loop": lambda _r, _s, _a, v: formulas.ResonantLoop(

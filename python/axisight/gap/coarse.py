@@ -79,7 +79,12 @@ def with_coarse_encoders(
         for a in conclusion.axes
     )
     named = replace(
-        conclusion, verdict="explained", causes=causes, p_none=0.0, p_unknown=1.0 - _SURE, axes=verdicts
+        conclusion,
+        verdict="explained",
+        causes=causes,
+        p_none=0.0,
+        p_unknown=1.0 - _SURE,
+        axes=verdicts,
     )
     return named.with_checks([_says(i, float(steps[i])) for i in axes]), shares
 
@@ -91,9 +96,7 @@ def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Inter
         return replace(stage, blocks=tuple(b[:, [axis]] for b in stage.blocks))
 
     floor, still, given = of(stages.floor), of(quiet), of(stages.given)
-    return gap_reduction(
-        floor, still, given, still, draws=settings.bootstrap, seed=settings.seed
-    )
+    return gap_reduction(floor, still, given, still, draws=settings.bootstrap, seed=settings.seed)
 
 
 def _named(axis: int, step: float) -> NamedCause:

@@ -38,6 +38,12 @@ def headline(
             f"The simulator misses something that no known effect explains well: "
             f"{percent(gap.before)} of the torque is unexplained, {percent(gap.floor)} would be noise.{place}"
         )
+    return _of_causes(conclusion, gap, causes, own)
+
+
+def _of_causes(
+    conclusion: Conclusion, gap: Gap, causes: Sequence[Cause], own: Sequence[Effect]
+) -> str:
     shrinks = (
         f"adding {'it' if len(causes) == 1 else 'them'} shrinks the gap on held-out data from "
         f"{percent(gap.before)} to {percent(gap.after)} of the torque (noise alone: {percent(gap.floor)})."

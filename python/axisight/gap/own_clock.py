@@ -41,7 +41,9 @@ def with_drift(log: Log, rate: float) -> Log:
     return replace(log, velocity_ref_rad_s=np.column_stack(met))
 
 
-def drifting_clock(logs: Sequence[Log], stated: Array, shows: Array, missed: Missed) -> ShownCause | None:
+def drifting_clock(
+    logs: Sequence[Log], stated: Array, shows: Array, missed: Missed
+) -> ShownCause | None:
     """Return the drift of the machine's clock, if that is what its controller misses.
 
     ``stated``: squares (n_axes, n_logs) that the controller of the robot file misses of the torque;
@@ -57,7 +59,9 @@ def drifting_clock(logs: Sequence[Log], stated: Array, shows: Array, missed: Mis
 
     reach = _APART_S / _duration(logs[log])
     found = scipy.optimize.minimize_scalar(
-        lambda rate: float(left(rate).sum()), bounds=(start - reach, start + reach), method="bounded"
+        lambda rate: float(left(rate).sum()),
+        bounds=(start - reach, start + reach),
+        method="bounded",
     )
     rate = float(found.x)
     before = stated[tuple(places.T)]

@@ -141,7 +141,9 @@ def _axes(
     samples = found.layout.samples()
     out = []
     for i in range(found.layout.n_axes):
-        mine = tuple(k for k, c in enumerate(causes) if i + 1 in (c.axes or ()) or c.axis in (i + 1, None))
+        mine = tuple(
+            k for k, c in enumerate(causes) if i + 1 in (c.axes or ()) or c.axis in (i + 1, None)
+        )
         share = float(removed[i] / excess[i]) if excess[i] > 0 else 0.0
         if not gap or excess[i] / samples[i] <= settings.largest_scatter:
             verdict: VerdictKind = "explained" if any(causes[k].axis for k in mine) else "none"

@@ -201,7 +201,10 @@ def _values(causes: Sequence[Cause]) -> dict[str, Any]:
         for row in [r for r in parameters if r["name"] not in shapes] or parameters:
             effect = plain_name(cause.effect)
             unit = "" if row["unit"] == NO_VALUE else row["unit"]
-            shown = {"title": "" if effect == title else effect, "place": place(cause.axis, cause.axes)}
+            shown = {
+                "title": "" if effect == title else effect,
+                "place": place(cause.axis, cause.axes),
+            }
             rows.append({**row, **shown, "unit": unit})
             title = effect
     return {"rows": rows[:_MOST_VALUES], "left_out": max(0, len(rows) - _MOST_VALUES)}

@@ -18,7 +18,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "encoder_eccentricity",
     summary: "the position is taken from an encoder on the joint that sits off centre: an error once a turn of the joint",
-    equation: "v_phi = (a cos(q) + b sin(q)) / r",
+    equation: "v_phi = (a (cos(q) - cos(q_0)) + b (sin(q) - sin(q_0))) / r,  q_0 where a log begins",
     source: "Heidenhain, Rotary Encoders catalogue: measuring error of eccentric mounting, e / R once a turn",
     scope: Scope::Axis,
     acts: Acts::Sensor,
@@ -43,8 +43,8 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Kernel<S> for Eccentric<S> {
-    fn joint_sensor(&self, angle: S) -> S {
+    fn joint_sensor(&self, angle: S) -> Option<S> {
         let (sine, cosine) = angle.sin_cos();
-        self.0[0].fma(cosine, self.0[1] * sine)
+        Some(self.0[0].fma(cosine, self.0[1] * sine))
     }
 }

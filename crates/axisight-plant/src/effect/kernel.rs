@@ -282,8 +282,9 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn resolution(&self) -> Option<S> {
         None
     }
-    /// Error added to the measured joint angle [rad], from which the motor position is taken.
-    fn joint_sensor(&self, _angle: S) -> S {
-        S::zero()
+    /// Error of the measured joint angle [rad], from which the motor position is taken; what it is
+    /// where a run begins counts for nothing.
+    fn joint_sensor(&self, _angle: S) -> Option<S> {
+        None
     }
 }

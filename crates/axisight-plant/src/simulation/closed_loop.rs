@@ -232,6 +232,8 @@ pub struct Signals<S> {
     pub torque_disturbance: Vec<S>,
     /// Error of the measured positions, noise included [rad].
     pub position_disturbance: Vec<S>,
+    /// Error of encoders on the joints where the run begins [rad].
+    joint_error_at_start: Vec<S>,
     /// By how much the controller's clock is fast against that of the references; none where they are one.
     clock_drift: Option<S>,
     /// Share of each command that the drive reports, and what it reports [Nm]; empty where all
@@ -249,7 +251,8 @@ impl<S: Scalar> Signals<S> {
             command: zeros.clone(),
             reference: zeros.clone(),
             torque_disturbance: zeros.clone(),
-            position_disturbance: zeros,
+            position_disturbance: zeros.clone(),
+            joint_error_at_start: zeros,
             clock_drift: None,
             reported_share: Vec::new(),
             reported: Vec::new(),
@@ -285,12 +288,24 @@ impl<S: Scalar> Signals<S> {
             let mut error = lane_value(run.noise, k, i, plant.axes.len());
             for kernel in &axis.kernels {
                 error += kernel.sensor(angle);
-                error += kernel.joint_sensor(plant.joint_angle(axis, x)) * (1.0 / axis.ratio);
             }
+            error += self.joint_error(axis, i, k, plant.joint_angle(axis, x));
             let steps = axis.kernels.iter().filter_map(|k| k.resolution());
             let coarsest = steps.fold(S::constant(run.resolution), |a, b| (a - b).if_positive(a, b));
             self.read(i, angle, error, coarsest);
         }
+    }
+
+    /// Error of encoders on the joint of an axis, motor side, counted from where the run begins [rad].
+    fn joint_error(&mut self, axis: &Axis<S>, i: usize, k: usize, angle: S) -> S {
+        let errors = axis.kernels.iter().filter_map(|kernel| kernel.joint_sensor(angle));
+        let Some(error) = errors.reduce(|a, b| a + b) else {
+            return S::zero();
+        };
+        if k == 0 {
+            self.joint_error_at_start[i] = error;
+        }
+        (error - self.joint_error_at_start[i]) * (1.0 / axis.ratio)
     }
 
     /// Reading of an axis at motor angle `angle`, to the nearest step of the sensor.
