@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel
 from axisight.logs.log import Floats
+from axisight.logs.resolution import ROUNDING
 
 Mask = NDArray[np.bool_]
 
@@ -52,21 +53,22 @@ def frozen_stretches(values: Floats, *, limited: bool = False) -> list[tuple[int
     if elsewhere > _CHANCE * (len(step) - sum(b - a for a, b in long)):
         return []
     least = _SHARE_OF_STEP * float(np.median(moves))
+    rounding = ROUNDING * float(np.abs(values).max())
     extremes = (values.min(), values.max()) if limited else ()
     return [
         (a, b)
         for a, b in inner
-        if abs(step[b]) > max(least, _RESOLUTIONS * _resolution(step, a, b))
+        if abs(step[b]) > max(least, _RESOLUTIONS * _resolution(step, a, b, rounding))
         and values[a] not in extremes
     ]
 
 
-def _resolution(step: Floats, first: int, last: int) -> float:
-    """Return the smallest step around a stretch: numbers written with five digits differ in theirs."""
+def _resolution(step: Floats, first: int, last: int, rounding: float) -> float:
+    """Return the smallest step around a stretch, but rounding: numbers of five digits differ in theirs."""
     around = np.abs(
         np.concatenate((step[max(0, first - _AROUND) : first], step[last + 1 : last + _AROUND]))
     )
-    around = around[around > 0.0]
+    around = around[around > rounding]
     return float(around.min()) if around.size else 0.0
 
 

@@ -12,8 +12,8 @@ Ints = NDArray[np.int64]
 # A jump is compared with the smallest changes of speed so many samples around it.
 _AROUND = 50
 _SMALLEST = 0.1
-# Differences this small against the values are rounding.
-_ROUNDING = 1e-12
+ROUNDING = 1e-12
+"""Differences this small against the values are rounding."""
 # Significant digits that files have when they were written with few; more resolve any motion.
 _DIGITS = range(3, 9)
 
@@ -28,7 +28,7 @@ def steps_around(values: Floats, places: Ints) -> Floats:
     if not places.size:
         return np.zeros(0)
     change = np.abs(np.diff(values, n=2))
-    rounding = _ROUNDING * float(np.abs(values).max())
+    rounding = ROUNDING * float(np.abs(values).max())
     usual = _smallest(change, rounding)
     grid = np.array([_grid_step(change, int(k), rounding, usual) for k in places])
     return np.asarray(np.maximum(grid, _last_digit(values, places)))

@@ -1,0 +1,63 @@
+"""Positions that come in steps: named where they are what the gap is made of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, diagnose
+from axisight.gap.coarse import encoder_steps
+from gap_data import PLAN, bare_axis, logs_of, scattered
+
+STEP = 1e-3
+# Repeats of one motion have the same steps: most rows would be copies.
+HELD = {"fresh": ("multisine", 9), "other": ("multisine", 4)}
+
+
+def steps_of(size: float) -> Effect:
+    return Effect("position_quantization", 1, {"increment_rad": size})
+
+
+@pytest.fixture(scope="module")
+def logs():
+    return logs_of(scattered(bare_axis(), 4), [steps_of(STEP)], PLAN)
+
+
+def test_steps_are_read_off_the_logs(logs):
+    np.testing.assert_allclose(encoder_steps(bare_axis(), logs), [STEP], rtol=1e-6)
+
+
+def test_what_is_finer_than_the_noise_is_no_step():
+    std = bare_axis().position_noise_std
+    fine = logs_of(bare_axis(), [steps_of(2.0 * std)], PLAN, seconds=2.0)
+    assert encoder_steps(bare_axis(), fine) == [0.0]
+
+
+def test_logs_have_to_agree(logs):
+    whole = replace(
+        logs[0], position_rad=logs[0].position_rad + 1e-5 * np.pi * logs[0].time_s[:, None]
+    )
+    assert encoder_steps(bare_axis(), [*logs, whole]) == [0.0]
+
+
+def test_a_simulator_with_steps_lacks_none(logs):
+    assert encoder_steps(bare_axis().with_effects([steps_of(STEP)]), logs) == [0.0]
+
+
+def test_steps_are_the_cause_of_a_gap_that_they_make(logs):
+    held = logs_of(scattered(bare_axis(), 4), [steps_of(STEP)], HELD)
+    said = diagnose(robot=bare_axis(), estimation=logs, validation=held)
+    assert said.verdict == "explained"
+    (cause,) = said.causes
+    assert cause.label == "position_quantization@1"
+    assert cause.parameters["increment_rad"].value == pytest.approx(STEP, rel=1e-3)
+    assert cause.gap_reduction.value > 0.8
+    assert "steps of the encoders" in said.headline
+    assert said.axes[0].verdict == "explained"
+
+
+def test_steps_are_no_cause_of_a_gap_that_is_something_else(logs):
+    friction = Effect("coulomb_friction", 1, {"coulomb_nm": 8.0, "smoothing_rad_s": 0.05})
+    both = [logs_of(scattered(bare_axis(), 4), [steps_of(STEP), friction], p) for p in (PLAN, HELD)]
+    said = diagnose(robot=bare_axis(), estimation=both[0], validation=both[1])
+    assert "position_quantization@1" not in {c.label for c in said.causes}
