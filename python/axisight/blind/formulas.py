@@ -243,6 +243,11 @@ class RunOut(Formula):
     phase: float
     first: Array | None = None
 
+    def begin(self, place: Place, step_s: float) -> None:
+        """Forget where the joints stood."""
+        del place, step_s
+        self.first = None
+
     def joint_sensor(self, joint: Array) -> Array | float:
         """Return the error of the angle, counted from where it was asked first."""
         error = np.asarray(self.amplitude_rad * np.sin(joint + self.phase))

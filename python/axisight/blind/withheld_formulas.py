@@ -10,7 +10,7 @@ import numpy as np
 from axisight.blind import formulas
 from axisight.blind.formulas import Formula
 from axisight.blind.machine import NOTHING, Native
-from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign
+from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, unloaded
 from axisight.blind.withheld import KINDS
 
 # Angle of a motor over which dry friction comes after a reversal.
@@ -47,11 +47,6 @@ def _gear_error(rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]
     return formulas.GearError(values["order"], values["amplitude_rad"], phase)
 
 
-def _smooth_middle(_rng: Rng, scene: Scene, axis: int, values: Mapping[str, float]) -> Formula:
-    less = values["softness"] * scene.stiffness(axis)
-    return formulas.SmoothMiddle(less, values["half_width_rad"])
-
-
 def _run_out(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
     cosine, sine = values["cosine_rad"], values["sine_rad"]
     return formulas.RunOut(float(np.hypot(cosine, sine)), float(np.arctan2(cosine, sine)))
@@ -80,6 +75,14 @@ def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
     law = formulas.HardeningSpring(cubic)
     # Where higher orders of the sine join, the library's cube is another one.
     return Drawn("nonlinear_stiffness", axis, {"third_order_nm_rad3": cubic}, laws=[law])
+
+
+def _lost_motion(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    softness, width = between(rng, 0.4, 0.9), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
+    law = formulas.SmoothMiddle(softness * scene.stiffness(axis), width)
+    # A hyperbolic tangent is as wide as it is by another number than the library's.
+    values = {"softness": softness, "tanh_width_rad": width}
+    return Drawn("lost_motion", axis, values, laws=[law])
 
 
 def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -155,7 +158,6 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
             ),
             "backlash": lambda _r, _s, _a, v: formulas.Play(v["half_width_rad"]),
             "piecewise_stiffness": _knee,
-            "lost_motion": _smooth_middle,
             "power_supply_sag": lambda _r, _s, _a, v: formulas.WeakSupply(v["sag_1_w"]),
             "encoder_eccentricity": _run_out,
             "position_quantization": lambda _r, _s, _a, v: formulas.Counter(v["increment_rad"]),
@@ -183,6 +185,7 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
         "stribeck_friction": Kind(_stribeck),
         "nonlinear_stiffness": Kind(_cubic),
         "gear_hysteresis": Kind(_hysteresis),
+        "lost_motion": Kind(_lost_motion, axes=unloaded),
         "torque_ripple": Kind(_torque_ripple),
         "resolver_ripple": Kind(_resolver_ripple),
         "input_delay": Kind(_delay),

@@ -6,10 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.frf.errors import reference_to_input
+from axisight.logs.frozen import runs
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+# Flat tops of at least so many samples are a limit.
+_FLAT_SAMPLES = 3
 
 
 def before(x: Array) -> Array:
@@ -61,3 +66,13 @@ def loop_responses(robot: Robot, frequency_hz: Array) -> tuple[Complex, Complex]
     machine = robot.zoh_response(f).values
     from_angle = reference_to_input(machine, controller_response(robot, f))
     return from_angle, from_angle @ machine
+
+
+def free_of_limits(torque: Array, width: int) -> Mask:
+    """Return which samples (n,) lie farther than ``width`` from where the torque is cut at its extremes."""
+    free = np.ones(len(torque), dtype=bool)
+    for extreme in (torque.min(), torque.max()):
+        for a, b in runs(torque == extreme):
+            if b - a >= _FLAT_SAMPLES:
+                free[max(0, a - width) : b + width] = False
+    return free

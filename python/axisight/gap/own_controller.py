@@ -15,8 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.effects.stated import CLOCK, FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
-from axisight.gap.feedback import before, gain_shares
-from axisight.gap.gate.control_law import free_of_limits
+from axisight.gap.feedback import before, free_of_limits, gain_shares
 from axisight.gap.own_clock import drifting_clock
 from axisight.gap.result import Interval
 from axisight.gap.shown import ShownCause
@@ -118,6 +117,12 @@ def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ..
     if clock is not None:
         return (clock,)
     return tuple(cause for i in off for cause in _of_axis(i, stated[i], pieces[i]))
+
+
+def clock_drift(robot: Robot, logs: Sequence[Log]) -> float:
+    """Return by how much the machine's clock is fast against that of the references [1]; zero for one clock."""
+    found = next((c for c in other_controllers(robot, logs) if c.name == CLOCK[0]), None)
+    return 0.0 if found is None else found.values[CLOCK[1]].value
 
 
 def _clock(

@@ -246,16 +246,22 @@ def _knee(trial: Trial) -> FreeEffect:
 
 # Half-widths of a soft middle, as shares of the deflection: its corner has to be passed.
 _MIDDLES = (0.05, 0.15, 0.45)
+# Teeth that come into contact one after another, and all at once.
+_ROUNDED = (0.5, 0.05)
 
 
 def _soft(trial: Trial) -> FreeEffect:
     """Begin at several widths of a middle that is as stiff as the rest."""
     name, deflection = "half_width_rad", _deflection_rad(trial)
-    starts = tuple({name: share * deflection} for share in _MIDDLES)
+    starts = [
+        {name: share * deflection, "rounding": rounding}
+        for rounding in _ROUNDED
+        for share in _MIDDLES
+    ]
     bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
     begin = trial.effect({"softness": 0.0, **starts[1]})
-    further = (starts[0], starts[2])
-    return FreeEffect(begin, ("softness", name), bounds=bounds, starts=further)
+    further = (starts[0], *starts[2:])
+    return FreeEffect(begin, ("softness", name, "rounding"), bounds=bounds, starts=further)
 
 
 def _coupled(trial: Trial) -> FreeEffect:

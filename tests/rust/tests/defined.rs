@@ -186,17 +186,25 @@ fn a_fast_clock_runs_through_its_references() {
 fn a_sagging_supply_leaves_less_torque() {
     const SAG: f64 = 0.004;
     let robot = conservative();
-    let sagging = plant::<f64>(&robot, &[effect("power_supply_sag", Some(1), &[SAG])]);
     let inertia = drives(&robot)[1].2;
-    let (m, n) = (sagging.n_motors(), sagging.n_angles());
-    for (torque, speed) in [(2.0, 100.0), (2.0, -100.0), (-2.0, -60.0), (-2.0, 60.0), (2.0, 0.0)] {
+    let delivered = |curvature: f64, torque: f64, speed: f64| {
+        let values = [SAG, curvature];
+        let sagging = plant::<f64>(&robot, &[effect("power_supply_sag", Some(1), &values)]);
+        let n = sagging.n_angles();
         let mut x = vec![0.0; sagging.n_states()];
         x[n + 1] = speed;
-        let got = derivative(&sagging, &x, &[0.0, torque, 0.0])[n + 1] * inertia;
-        let power: f64 = torque * speed;
-        let want = torque / (1.0 + SAG * power.max(0.0));
-        assert!(m == 3 && (got - want).abs() < 1e-12, "{torque} {speed}: {got} {want}");
+        derivative(&sagging, &x, &[0.0, torque, 0.0])[n + 1] * inertia
+    };
+    for (torque, speed) in [(2.0, 100.0), (2.0, -100.0), (-2.0, -60.0), (-2.0, 60.0), (2.0, 0.0)] {
+        let drawn = SAG * f64::max(torque * speed, 0.0);
+        for (curvature, left) in [(0.0, 1.0 - drawn), (1.0, 1.0 / (1.0 + drawn))] {
+            let got = delivered(curvature, torque, speed);
+            let want = torque * left;
+            assert!((got - want).abs() < 1e-12, "{torque} {speed}: {got} {want}");
+        }
     }
+    // Something is always left.
+    assert!((delivered(0.0, 4.0, 100.0) - 0.2).abs() < 1e-12);
 }
 
 /// An encoder off centre is wrong by a wave over the joint's turn, counted on the motor's side.
@@ -219,25 +227,35 @@ fn an_eccentric_encoder_reads_a_wave_of_the_joint() {
     }
 }
 
-/// A gear with lost motion: soft up to a deflection, beyond it as stiff as it was.
+/// A gear with lost motion is soft around its middle and as stiff as it was beyond: at once with
+/// hardly any rounding, gradually with more.
 #[test]
 fn lost_motion_is_soft_around_the_middle() {
     let (softness, width) = (0.7, 2e-4);
     let robot = conservative();
-    let soft = plant::<f64>(&robot, &[effect("lost_motion", Some(0), &[softness, width])]);
     let (_, ratio, inertia, stiffness) = drives(&robot)[0];
-    let n = soft.n_angles();
-    for delta in [-5e-4, -1e-4, 1e-5, 1.5e-4, 3e-4, 1e-3] {
-        let mut x = vec![0.0; soft.n_states()];
-        x[0] = delta / ratio;
-        let got = -derivative(&soft, &x, &[0.0; 3])[n] * inertia / ratio;
-        let within: f64 = f64::clamp(delta, -width, width);
-        let want = stiffness * (delta - softness * within);
-        // The corner is rounded over a twentieth of the width.
-        let corner = 0.06 * width * stiffness * softness;
-        let far = (delta.abs() - width).abs() > 0.2 * width;
-        let tolerance = if far { 0.02 * corner } else { corner };
-        assert!((got - want).abs() < tolerance, "{delta}: {got} {want}");
+    for rounding in [0.02_f64, 0.5] {
+        let values = [softness, width, rounding];
+        let soft = plant::<f64>(&robot, &[effect("lost_motion", Some(0), &values)]);
+        let n = soft.n_angles();
+        let torque = |delta: f64| {
+            let mut x = vec![0.0; soft.n_states()];
+            x[0] = delta / ratio;
+            -derivative(&soft, &x, &[0.0; 3])[n] * inertia / ratio
+        };
+        // The corner of a hyperbola is off its lines by at most half of its rounding, at the corner.
+        let scale = rounding.hypot(1.0);
+        let corner = 0.5 * softness * stiffness * width * rounding * scale;
+        for delta in [-1e-3, -5e-4, -1e-4, 1e-5, 1.5e-4, 3e-4, 1e-3] {
+            let within = scale * f64::clamp(delta, -width, width);
+            let want = stiffness * (delta - softness * within);
+            let got = torque(delta);
+            assert!((got - want).abs() <= corner, "{delta}: {got} {want}");
+        }
+        let step = 1e-3 * width;
+        let slope = (torque(step) - torque(-step)) / (2.0 * step);
+        let want = stiffness * (1.0 - softness);
+        assert!((slope - want).abs() < 1e-3 * stiffness, "{slope} {want}");
     }
 }
 

@@ -1,13 +1,12 @@
 //! Gear that gives way around its middle: play that carries part of the torque.
 
-use super::formulas::dead_zone;
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "lost_motion",
     summary: "the gear is soft around its middle, where few of its teeth carry, and as stiff as modelled beyond",
-    equation: "tau_g = k (delta - s clip(delta, -b, b)),  its corners rounded over b/20",
+    equation: "tau_g = k (delta - s m),  m = (hypot(delta + b, c) - hypot(delta - b, c)) hypot(1, rho) / 2,  c = rho b:  dm/ddelta = 1 at 0",
     source: "Nabtesco, RV series catalogue: lost motion, the torsion at 3 % of the rated torque",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -42,24 +41,40 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 0.05,
             typical: 3e-4,
         },
+        // Teeth come into contact one after another, or all at once.
+        ParameterInfo {
+            name: "rounding",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.3,
+            lower: 0.02,
+            upper: 3.0,
+            typical: 0.3,
+        },
     ],
 };
 
 struct Soft<S> {
     softness: S,
     within: S,
+    corner: S,
+    /// Half, and what makes the slope of the middle one.
+    scale: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
     Box::new(Soft {
         softness: p[0],
         within: p[1],
+        corner: p[1] * p[2],
+        scale: p[2].fma(p[2], S::one()).sqrt() * 0.5,
     })
 }
 
 impl<S: Scalar> Kernel<S> for Soft<S> {
     fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
-        let (beyond, _) = dead_zone(spring.loaded, self.within);
-        -(spring.stiffness * self.softness * (spring.loaded - beyond))
+        let hypot = |x: S| x.fma(x, self.corner.square()).sqrt();
+        let middle = hypot(spring.loaded + self.within) - hypot(spring.loaded - self.within);
+        -(spring.stiffness * self.softness * middle * self.scale)
     }
 }

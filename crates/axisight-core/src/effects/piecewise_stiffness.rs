@@ -14,7 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Transmission,
     contains: &[],
     parts: &[],
-    usual: &["backlash", "nonlinear_stiffness"],
+    usual: &["backlash", "nonlinear_stiffness", "lost_motion"],
     twins: &[],
     stands_for: None,
     linear: Linear::No,

@@ -6,7 +6,7 @@ use axisight_scalar::Scalar;
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "power_supply_sag",
     summary: "the drive gives less of its torque the more power it draws: its supply gives way",
-    equation: "tau = u / (1 + s max(u phi', 0))",
+    equation: "tau = u (1 - x / (1 + c x)),  x = s max(u phi', 0);  a line at c = 0, 1 / (1 + x) at c = 1",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.2 (power supply and amplifier)",
     scope: Scope::Axis,
     acts: Acts::Motor,
@@ -21,28 +21,50 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::Speeds],
-    parameters: &[ParameterInfo {
-        name: "sag_1_w",
-        unit: "1/W",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: 0.0,
-        upper: 10.0,
-        typical: 1e-3,
-    }],
+    parameters: &[
+        ParameterInfo {
+            name: "sag_1_w",
+            unit: "1/W",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 10.0,
+            typical: 6e-3,
+        },
+        ParameterInfo {
+            name: "curvature",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.5,
+            lower: 0.0,
+            upper: 1.0,
+            typical: 0.5,
+        },
+    ],
 };
 
-struct Sag<S>(S);
+/// Of the torque something is always left.
+const MOST: f64 = 0.95;
+
+struct Sag<S> {
+    share: S,
+    curvature: S,
+}
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Sag(p[0]))
+    Box::new(Sag {
+        share: p[0],
+        curvature: p[1],
+    })
 }
 
 impl<S: Scalar> Kernel<S> for Sag<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let power = motor.command * motor.speed;
-        let sag = self.0 * power.if_positive(power, S::zero());
-        -(motor.command * sag / (S::one() + sag))
+        let sag = self.share * power.if_positive(power, S::zero());
+        let lost = sag / self.curvature.fma(sag, S::one());
+        let most = S::constant(MOST);
+        -(motor.command * (most - lost).if_positive(lost, most))
     }
 
     fn uses_command(&self) -> bool {

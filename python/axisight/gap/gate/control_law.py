@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.feedback import before, feedback
+from axisight.gap.feedback import before, feedback, free_of_limits
 from axisight.logs import Log, lowpass
-from axisight.logs.frozen import runs
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -30,8 +29,7 @@ Mask = NDArray[np.bool_]
 _BAND_HZ = 60.0
 _SHARE_OF_NYQUIST = 0.2
 _SAMPLES_PER_BAND = 6
-# Flat tops of at least so many samples are a limit, and so is the time the low-pass smears them over.
-_FLAT_SAMPLES = 3
+# A limit cuts for the time, too, that the low-pass smears it over.
 _SMEARED_PERIODS = 1.0
 # Less is left to compare than a limit leaves out: nothing is said.
 _LEAST_KEPT = 0.1
@@ -118,16 +116,6 @@ class ControlLaw:
             read(self.share("position", own, position), shifts[2]),
             kept,
         )
-
-
-def free_of_limits(torque: Array, width: int) -> Mask:
-    """Return which samples (n,) lie farther than ``width`` from where the torque is cut at its extremes."""
-    free = np.ones(len(torque), dtype=bool)
-    for extreme in (torque.min(), torque.max()):
-        for a, b in runs(torque == extreme):
-            if b - a >= _FLAT_SAMPLES:
-                free[max(0, a - width) : b + width] = False
-    return free
 
 
 def _regress(torque: Array, u_ref: Array, u_pos: Array, kept: Mask) -> LawFit:

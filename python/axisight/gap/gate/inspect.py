@@ -14,6 +14,8 @@ from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.gate.machine import check_machine
 from axisight.gap.gate.noise_level import check_noise
 from axisight.gap.gate.start import check_start
+from axisight.gap.own_clock import with_drift
+from axisight.gap.own_controller import clock_drift
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -52,7 +54,7 @@ def check_inputs(
     found += _references(robot, logs)
     closed = is_closed_loop(robot, logs)
     if closed:
-        found += _of_each(lambda log: check_closed_loop(robot, log), logs)
+        found += _closed_loop(robot, logs)
     else:
         found += check_inverse(robot, logs)
     if refused(found):
@@ -78,6 +80,20 @@ def _of_each(check: Callable[[Log], list[Finding]], logs: Sequence[Log]) -> list
     """Return what a check finds in each log, in their order; they are looked at beside one another."""
     with ThreadPoolExecutor() as pool:
         return [finding for found in pool.map(check, logs) for finding in found]
+
+
+def _closed_loop(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Return the findings of each log against its controller, whose clock may be its own.
+
+    References that drift away from the machine look like any mistake.
+    """
+
+    def found(seen: Sequence[Log]) -> list[Finding]:
+        return _of_each(lambda log: check_closed_loop(robot, log), seen)
+
+    out = found(logs)
+    clock = clock_drift(robot, logs) if out else 0.0
+    return found([with_drift(log, clock) for log in logs]) if clock else out
 
 
 def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
