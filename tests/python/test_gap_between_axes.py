@@ -13,6 +13,7 @@ from axisight.gap import verdict_schema
 from axisight.gap.candidates import _places
 from axisight.gap.headline import named
 from axisight.gap.result import Candidate, Cause, DetectionLimit, Interval
+from axisight.report.limits import limit_table
 from axisight.report.wording import place, title_of_label
 from gap_data import log_of
 
@@ -109,3 +110,10 @@ def test_friction_of_coupled_axes_slows_both():
     # The second axis stands still and is pulled along by the friction of the first one's turn; gears
     # still swing by a tenth of that.
     np.testing.assert_allclose(more, [0.0, 1.0, 1.0], atol=0.1)
+
+
+def test_a_limit_between_axes_stands_at_the_first_and_says_so():
+    limit = DetectionLimit("axis_coupling", 2, "share", 0.01, "1", (2, 3))
+    assert limit_table([limit], 3).rows == [
+        ["Axis coupling, with the next axis", "", "–", "0.010", "–"]
+    ]

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from axisight import Effect
+from axisight.gap import check_inputs
+from axisight.gap.gate.closed_loop import check_closed_loop
 from axisight.gap.own_clock import with_drift
 from axisight.gap.own_controller import other_controllers
-from gap_data import PLAN, bare_axis, logs_of, scattered
+from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 
 DRY = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.05})
 
@@ -57,3 +59,12 @@ def test_a_drift_moves_references_by_what_it_says():
     assert moved[1000] == pytest.approx(original[1001])
     assert moved[500] == pytest.approx(0.5 * (original[500] + original[501]))
     np.testing.assert_array_equal(with_drift(log, 0.0).velocity_ref_rad_s[:, 0], original)
+
+
+def test_a_drift_is_no_mistake_of_units():
+    """Along moves a drift looks like a torque in another unit; it is said to be none."""
+    robot, drift = bare_axis(), [Effect("clock_drift", None, {"relative_rate": -3e-4})]
+    logs = logs_of(robot, drift, PLAN)
+    assert any(check_closed_loop(robot, log) for log in logs)
+    findings = check_inputs(robot, logs, logs_of(robot, drift, HELD, seconds=5.0))
+    assert not {f.name for f in findings} & {"torque_scaled", "torque_off_control_law"}

@@ -62,7 +62,7 @@ def reported(torque: Array, limits: Sequence[ShownCause], effects: Iterable[Effe
     out = torque.copy()
     after = {x.axis for x in limits}
     for effect in effects:
-        if effect.name == TORQUE_LIMIT[0] and effect.axis in after:
+        if effect.name == TORQUE_LIMIT[0] and effect.axis is not None and effect.axis in after:
             limit, i = effect.values()[0], effect.axis - 1
             out[:, i] = np.clip(out[:, i], -limit, limit)
     return out

@@ -29,9 +29,11 @@ def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
         lines.setdefault(limit.effect, {})[limit.axis] = limit
     rows = []
     for effect, mine in sorted(lines.items()):
-        unit = next(iter(mine.values())).unit
+        first = next(iter(mine.values()))
+        unit = first.unit
+        title = plain_name(effect) + ("" if first.axes is None else ", with the next axis")
         values = [_value(mine[p]) if p in mine else NO_VALUE for p in places]
-        rows.append([plain_name(effect), "" if unit == "1" else unit, *values])
+        rows.append([title, "" if unit == "1" else unit, *values])
     return LimitTable(["arm" if p is None else f"axis {p}" for p in places], rows)
 
 
