@@ -76,6 +76,7 @@ def test_a_gear_that_is_turned_along_is_named(said):
     assert (cause.label, cause.axis, cause.axes) == ("axis_coupling@2,3", 2, (2, 3))
     share = cause.parameters["share"]
     assert share.value == pytest.approx(0.08, rel=0.02)
+    assert share.low < 0.08 < share.high < 0.1
     assert [0 in a.causes for a in said.axes] == [False, True, True]
 
 

@@ -223,7 +223,9 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
             if key in found and value:
                 here, low, high = found[key]
                 ratios.append(here / value)
-                covered.append(low <= value <= high)
+                # A verdict may state no interval: that holds nothing.
+                stated = low is not None and high is not None
+                covered.append(stated and low <= value <= high)
     return Judged(
         name=name,
         truth=tuple(_label(e) for e in withheld),

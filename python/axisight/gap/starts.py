@@ -267,14 +267,15 @@ def _soft(trial: Trial) -> FreeEffect:
 def _coupled(trial: Trial) -> FreeEffect:
     """Begin without; both motors have the same part in the speed, counted at their joints.
 
-    A gear that is turned along has to give way: a rigid one has its friction alone.
+    A gear that is turned along has to give way: a rigid one has its friction alone. Where that has no
+    size, nothing says how fast it is smoothed.
     """
     assert isinstance(trial.place, tuple)  # by its scope
     first, second = (axis - 1 for axis in trial.place)
     ratio = trial.robot.gear_ratio
     begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
     effect = begin.effect.with_values({"speed_ratio": float(ratio[second] / ratio[first])})
-    fixed = {"speed_ratio"} | ({"share"} if trial.robot.axis_is_rigid[second] else set())
+    fixed = {"speed_ratio", "smoothing_rad_s"} | ({"share"} if trial.robot.axis_is_rigid[second] else set())
     return replace(begin, effect=effect, free=tuple(n for n in begin.free if n not in fixed))
 
 
