@@ -141,7 +141,7 @@ def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
         waves = [
             v for k, v in found.items() if k.startswith((f"cosine{key[5:]}_", f"sine{key[5:]}_"))
         ]
-        if len(waves) != 2:
+        if len(waves) != 2 or any(None in w["ci95"] for w in waves):
             continue
         size = float(np.hypot(*(w["value"] for w in waves)))
         half = max(w["ci95"][1] - w["value"] for w in waves)

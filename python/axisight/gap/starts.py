@@ -142,11 +142,10 @@ def _waves(trial: Trial) -> FreeEffect | None:
 
 def _gear_waves(trial: Trial) -> FreeEffect:
     """Begin twice a motor turn, as harmonic drives have it."""
-    values = {"order": 2.0, "cosine_rad": 0.0, "sine_rad": 0.0, "returned": 0.5}
+    waves = tuple(p.name for p in trial.info.parameters if p.role == "amplitude")
+    values = {"order": 2.0, "returned": 0.5, **dict.fromkeys(waves, 0.0)}
     # Gears conserve power or pass torque at the nominal ratio: either is as good a guess.
-    return FreeEffect(
-        trial.effect(values), ("cosine_rad", "sine_rad", "returned"), {"returned": (0.5, 0.5)}
-    )
+    return FreeEffect(trial.effect(values), (*waves, "returned"), {"returned": (0.5, 0.5)})
 
 
 # An axis with less of the error than this is not worth many starts.
@@ -275,7 +274,9 @@ def _coupled(trial: Trial) -> FreeEffect:
     ratio = trial.robot.gear_ratio
     begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
     effect = begin.effect.with_values({"speed_ratio": float(ratio[second] / ratio[first])})
-    fixed = {"speed_ratio", "smoothing_rad_s"} | ({"share"} if trial.robot.axis_is_rigid[second] else set())
+    fixed = {"speed_ratio", "smoothing_rad_s"} | (
+        {"share"} if trial.robot.axis_is_rigid[second] else set()
+    )
     return replace(begin, effect=effect, free=tuple(n for n in begin.free if n not in fixed))
 
 

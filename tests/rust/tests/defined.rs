@@ -26,7 +26,11 @@ fn conservative() -> RobotDescription {
 
 /// Joint of each axis, its gear ratio, motor inertia and stiffness.
 fn drives(robot: &RobotDescription) -> Vec<(usize, f64, f64, f64)> {
-    let one = |(joint, description, drive): (usize, &axisight_core::robot::Joint, &axisight_core::robot::Drive)| {
+    let one = |(joint, description, drive): (
+        usize,
+        &axisight_core::robot::Joint,
+        &axisight_core::robot::Drive,
+    )| {
         let stiffness = description.compliance.map_or(0.0, |c| c.stiffness);
         (joint, drive.gear_ratio, drive.motor_inertia, stiffness)
     };
@@ -60,14 +64,25 @@ fn a_gear_that_is_turned_along_keeps_power() {
         let mut largest: f64 = 0.0;
         let axes = drives(&robot);
         for (i, (joint, ratio, inertia, stiffness)) in axes.iter().enumerate() {
-            let turned = |of: &[f64]| if i == 2 { share * axes[1].1 * of[1] } else { 0.0 };
+            let turned = |of: &[f64]| {
+                if i == 2 {
+                    share * axes[1].1 * of[1]
+                } else {
+                    0.0
+                }
+            };
             let delta = ratio * x[i] + turned(&x) - x[m + joint];
             let rate = ratio * dx[i] + turned(&dx) - dx[m + joint];
             let spring = stiffness * delta * rate;
             power += inertia * dx[i] * dx[m + n + i] + spring - torque[i] * dx[i];
             largest = largest.max(spring.abs());
         }
-        for (j, joint) in robot.joints.iter().enumerate().filter(|(_, j)| j.drive.is_none()) {
+        for (j, joint) in robot
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, j)| j.drive.is_none())
+        {
             let stiffness = joint.compliance.map_or(0.0, |c| c.stiffness);
             power += stiffness * x[m + j] * v[j];
         }
@@ -75,7 +90,13 @@ fn a_gear_that_is_turned_along_keeps_power() {
     };
     for _ in 0..10 {
         // Sums of a dozen products rounded at 1e-16, of forces that cancel to a hundredth.
-        assert!(kept(&plant(&robot, std::slice::from_ref(&coupled)), &mut random, SHARE) < 1e-12);
+        assert!(
+            kept(
+                &plant(&robot, std::slice::from_ref(&coupled)),
+                &mut random,
+                SHARE
+            ) < 1e-12
+        );
         assert!(kept(&plant(&robot, &[]), &mut random, SHARE) > 1e-6);
     }
 }
@@ -99,7 +120,10 @@ fn a_motor_carries_the_gear_it_turns_along() {
         (with.motor_torque[2], without.motor_torque[2]),
         (with.motor_angle[2], without.motor_angle[2] + turned),
     ] {
-        assert!((got - want).abs() < 1e-9 * want.abs().max(1.0), "{got} {want}");
+        assert!(
+            (got - want).abs() < 1e-9 * want.abs().max(1.0),
+            "{got} {want}"
+        );
     }
     assert!(carried.abs() > 0.01 && turned.abs() > 1.0);
 }
@@ -111,10 +135,18 @@ fn predicted_torques_of_coupled_axes_balance_power() {
     let mut robot = robot(PRESET);
     robot.gravity = [0.0; 3];
     let (viscous, coulomb, ratio, width) = (0.02, 0.4, -0.7, 2.0);
-    let coupled = effect("axis_coupling", Some(1), &[SHARE, viscous, coulomb, ratio, width]);
+    let coupled = effect(
+        "axis_coupling",
+        Some(1),
+        &[SHARE, viscous, coulomb, ratio, width],
+    );
     let (n, samples) = (3, 40);
     let mut random = Random(3);
-    let mut of = |size: f64| (0..n * samples).map(|_| random.within(size)).collect::<Vec<_>>();
+    let mut of = |size: f64| {
+        (0..n * samples)
+            .map(|_| random.within(size))
+            .collect::<Vec<_>>()
+    };
     let record = MotionRecord {
         position: of(50.0),
         velocity: of(20.0),
@@ -138,12 +170,20 @@ fn predicted_torques_of_coupled_axes_balance_power() {
         let joints = |x: &[f64]| {
             let mut out = vec![0.0; body.n_joints()];
             for (i, (joint, ratio, ..)) in axes.iter().enumerate() {
-                out[*joint] = ratio * x[i] + if i == 2 { SHARE * axes[1].1 * x[1] } else { 0.0 };
+                out[*joint] = ratio * x[i]
+                    + if i == 2 {
+                        SHARE * axes[1].1 * x[1]
+                    } else {
+                        0.0
+                    };
             }
             out
         };
-        let [p, v, a] = [&record.position, &record.velocity, &record.acceleration].map(|x| motor(x));
-        let force = body.inverse_dynamics(&joints(&p), &joints(&v), &joints(&a)).expect("finite");
+        let [p, v, a] =
+            [&record.position, &record.velocity, &record.acceleration].map(|x| motor(x));
+        let force = body
+            .inverse_dynamics(&joints(&p), &joints(&v), &joints(&a))
+            .expect("finite");
         let mut want: f64 = force.iter().zip(joints(&v)).map(|(f, v)| f * v).sum();
         for (i, (.., inertia, _)) in axes.iter().enumerate() {
             let own = robot.driven().nth(i).expect("an axis").2.viscous_friction;
@@ -152,7 +192,10 @@ fn predicted_torques_of_coupled_axes_balance_power() {
         let speed = v[1] + ratio * v[2];
         want += speed * (viscous * speed + coulomb * (speed / width).tanh());
         let got: f64 = (0..n).map(|i| torque[i * samples + k] * v[i]).sum();
-        assert!((got - want).abs() < 1e-10 * want.abs().max(1.0), "{k}: {got} {want}");
+        assert!(
+            (got - want).abs() < 1e-10 * want.abs().max(1.0),
+            "{k}: {got} {want}"
+        );
     }
 }
 
@@ -174,7 +217,13 @@ fn a_fast_clock_runs_through_its_references() {
     }
     let drifting = plant::<f64>(&robot, &[effect("clock_drift", None, &[DRIFT])]);
     let plain = plant::<f64>(&robot, &[]);
-    let got = trace(&drifting, &robot, Drive::Reference(&[&reference]), &[], METHOD);
+    let got = trace(
+        &drifting,
+        &robot,
+        Drive::Reference(&[&reference]),
+        &[],
+        METHOD,
+    );
     let want = trace(&plain, &robot, Drive::Reference(&[&warped]), &[], METHOD);
     let other = trace(&plain, &robot, Drive::Reference(&[&reference]), &[], METHOD);
     assert!(relative(&got.command, &want.command) < 1e-12);
@@ -195,7 +244,13 @@ fn a_sagging_supply_leaves_less_torque() {
         x[n + 1] = speed;
         derivative(&sagging, &x, &[0.0, torque, 0.0])[n + 1] * inertia
     };
-    for (torque, speed) in [(2.0, 100.0), (2.0, -100.0), (-2.0, -60.0), (-2.0, 60.0), (2.0, 0.0)] {
+    for (torque, speed) in [
+        (2.0, 100.0),
+        (2.0, -100.0),
+        (-2.0, -60.0),
+        (-2.0, 60.0),
+        (2.0, 0.0),
+    ] {
         let drawn = SAG * f64::max(torque * speed, 0.0);
         for (curvature, left) in [(0.0, 1.0 - drawn), (1.0, 1.0 / (1.0 + drawn))] {
             let got = delivered(curvature, torque, speed);
@@ -215,7 +270,13 @@ fn an_eccentric_encoder_reads_a_wave_of_the_joint() {
     robot.operating_point = vec![0.1, 0.3, -0.2];
     let eccentric = plant::<f64>(&robot, &[effect("encoder_eccentricity", Some(2), &[a, b])]);
     let reference = sines(100, 3, robot.sample_time, 1.5);
-    let got = trace(&eccentric, &robot, Drive::Reference(&[&reference]), &[], METHOD);
+    let got = trace(
+        &eccentric,
+        &robot,
+        Drive::Reference(&[&reference]),
+        &[],
+        METHOD,
+    );
     let (joint, ratio, ..) = drives(&robot)[2];
     let start = got.states[0][3 + joint];
     for (k, x) in got.states.iter().enumerate() {
@@ -223,7 +284,10 @@ fn an_eccentric_encoder_reads_a_wave_of_the_joint() {
         let wave = |q: f64| a * q.cos() + b * q.sin();
         let want = x[2] + (wave(q) - wave(start)) / ratio;
         let read = got.measured[3 * k + 2];
-        assert!((read - want).abs() < 1e-12 * want.abs(), "{k}: {read} {want}");
+        assert!(
+            (read - want).abs() < 1e-12 * want.abs(),
+            "{k}: {read} {want}"
+        );
     }
 }
 
@@ -266,12 +330,56 @@ fn a_coarse_encoder_reads_steps() {
     let robot = robot(PRESET);
     let coarse = plant::<f64>(&robot, &[effect("position_quantization", Some(1), &[STEP])]);
     let reference = sines(100, 3, robot.sample_time, 1.5);
-    let got = trace(&coarse, &robot, Drive::Reference(&[&reference]), &[], METHOD);
+    let got = trace(
+        &coarse,
+        &robot,
+        Drive::Reference(&[&reference]),
+        &[],
+        METHOD,
+    );
     for (k, x) in got.states.iter().enumerate() {
         let read = &got.measured[3 * k..3 * (k + 1)];
-        assert!((read[0] - x[0]).abs() == 0.0 && (read[2] - x[2]).abs() == 0.0, "{k}");
+        assert!(
+            (read[0] - x[0]).abs() == 0.0 && (read[2] - x[2]).abs() == 0.0,
+            "{k}"
+        );
         assert!((read[1] - x[1]).abs() < 0.5 * STEP * (1.0 + 1e-9), "{k}");
         let steps = read[1] / STEP;
         assert!((steps - steps.round()).abs() < 1e-9, "{k}: {steps} steps");
+    }
+}
+
+/// A gear that runs ahead by two waves carries the torque of its spring at what they add, and conserves power.
+#[test]
+fn a_transmission_error_has_two_waves() {
+    let (order, waves) = (3.0, [2e-4, -1e-4, 3e-5, 5e-5]);
+    let robot = conservative();
+    let values = [order, waves[0], waves[1], 1.0, waves[2], waves[3]];
+    let waving = plant::<f64>(&robot, &[effect("transmission_error", Some(0), &values)]);
+    let (joint, ratio, inertia, stiffness) = drives(&robot)[0];
+    let (m, n) = (waving.n_motors(), waving.n_angles());
+    let body = RigidBody::new(&robot);
+    for phi in [0.0_f64, 0.4, -1.3, 2.0] {
+        let mut x = vec![0.0; waving.n_states()];
+        x[0] = phi;
+        let at = |k: f64| (k * order * phi).sin_cos();
+        let ((s1, c1), (s2, c2)) = (at(1.0), at(2.0));
+        let ahead = waves[0] * c1 + waves[1] * s1 + waves[2] * c2 + waves[3] * s2;
+        let first = order * (waves[1] * c1 - waves[0] * s1);
+        let slope = first + 2.0 * order * (waves[3] * c2 - waves[2] * s2);
+        let torque = stiffness * (ratio * phi + ahead);
+        let dx = derivative(&waving, &x, &[0.0; 3]);
+        let on_motor = -dx[n] * inertia;
+        let want = torque * (ratio + slope);
+        assert!(
+            (on_motor - want).abs() < 1e-9 * want.abs().max(1e-3),
+            "{phi}: {on_motor} {want}"
+        );
+        let force = body.inverse_dynamics(&x[m..n], &vec![0.0; n - m], &dx[n + m..2 * n]);
+        let on_joint = force.expect("finite")[joint];
+        assert!(
+            (on_joint - torque).abs() < 1e-9 * torque.abs().max(1.0),
+            "{on_joint} {torque}"
+        );
     }
 }

@@ -99,7 +99,8 @@ fn effects_at_work_show() {
             let seen = ways.iter().fold(0.0_f64, |seen, (speed, base)| {
                 let run = moved_by(*speed, &robot, std::slice::from_ref(&at_work));
                 let command = relative(&run.command, &base.command);
-                seen.max(command).max(relative(&run.measured, &base.measured))
+                seen.max(command)
+                    .max(relative(&run.measured, &base.measured))
             });
             assert!(seen > 1e-9, "{} {place:?}: {seen:.1e}", info.name);
         }

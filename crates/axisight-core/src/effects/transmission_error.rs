@@ -4,10 +4,22 @@ use super::formulas::harmonic_slope;
 use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
+const fn wave(name: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        unit: "rad (joint side)",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: -0.1,
+        upper: 0.1,
+        typical: 2e-4,
+    }
+}
+
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "transmission_error",
     summary: "the gear runs ahead and behind periodically over the motor angle",
-    equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi); tau_motor = (r + c de/dphi) tau_gear",
+    equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi) + a_2 cos(2 n phi) + b_2 sin(2 n phi); tau_motor = (r + c de/dphi) tau_gear",
     source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -32,24 +44,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 500.0,
             typical: 1.0,
         },
-        ParameterInfo {
-            name: "cosine_rad",
-            unit: "rad (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -0.1,
-            upper: 0.1,
-            typical: 2e-4,
-        },
-        ParameterInfo {
-            name: "sine_rad",
-            unit: "rad (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
-            lower: -0.1,
-            upper: 0.1,
-            typical: 2e-4,
-        },
+        wave("cosine_rad"),
+        wave("sine_rad"),
         // One where the gear conserves power; none where the torque passes at the nominal ratio, as
         // many simulators have it and lossy gears may.
         ParameterInfo {
@@ -61,6 +57,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 2.0,
             typical: 1.0,
         },
+        wave("second_cosine_rad"),
+        wave("second_sine_rad"),
     ],
 };
 
@@ -69,6 +67,7 @@ struct TransmissionError<S> {
     cosine: S,
     sine: S,
     returned: S,
+    second: [S; 2],
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
@@ -77,15 +76,18 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
         cosine: p[1],
         sine: p[2],
         returned: p[3],
+        second: [p[4], p[5]],
     })
 }
 
 impl<S: Scalar> Kernel<S> for TransmissionError<S> {
     fn transmission_error(&self, angle: S) -> Option<GearError<S>> {
-        let (ahead, slope) = harmonic_slope(self.order * angle, self.cosine, self.sine);
-        let slope = self.order * slope;
+        let at = self.order * angle;
+        let (first, slope) = harmonic_slope(at, self.cosine, self.sine);
+        let (second, steeper) = harmonic_slope(at * 2.0, self.second[0], self.second[1]);
+        let slope = self.order * (slope + steeper * 2.0);
         Some(GearError {
-            ahead,
+            ahead: first + second,
             slope,
             returned: self.returned * slope,
         })

@@ -208,7 +208,8 @@ fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
         None => Ok(()),
         Some(axis) => Err(EffectError::Axis {
             effect: "axis_coupling",
-            expected: "a second axis with a compliant transmission where the first one turns it".to_owned(),
+            expected: "a second axis with a compliant transmission where the first one turns it"
+                .to_owned(),
             got: format!("axis {} (rigid)", axis + 1),
         }),
     }
@@ -291,14 +292,19 @@ impl<S: Scalar> Signals<S> {
             }
             error += self.joint_error(axis, i, k, plant.joint_angle(axis, x));
             let steps = axis.kernels.iter().filter_map(|k| k.resolution());
-            let coarsest = steps.fold(S::constant(run.resolution), |a, b| (a - b).if_positive(a, b));
+            let coarsest = steps.fold(S::constant(run.resolution), |a, b| {
+                (a - b).if_positive(a, b)
+            });
             self.read(i, angle, error, coarsest);
         }
     }
 
     /// Error of encoders on the joint of an axis, motor side, counted from where the run begins [rad].
     fn joint_error(&mut self, axis: &Axis<S>, i: usize, k: usize, angle: S) -> S {
-        let errors = axis.kernels.iter().filter_map(|kernel| kernel.joint_sensor(angle));
+        let errors = axis
+            .kernels
+            .iter()
+            .filter_map(|kernel| kernel.joint_sensor(angle));
         let Some(error) = errors.reduce(|a, b| a + b) else {
             return S::zero();
         };

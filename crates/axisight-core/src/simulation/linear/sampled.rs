@@ -175,7 +175,8 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         for (i, axis) in self.plant.axes.iter().enumerate() {
             let angle = deviation[axis.slot] * axis.scale + axis.angle;
             let error = lane_value::<S>(run.noise, k, i, m) + self.ripple[i].resolver.value;
-            self.signals.read(i, angle, error, S::constant(run.resolution));
+            self.signals
+                .read(i, angle, error, S::constant(run.resolution));
         }
         self.signals.command(run, k, &mut self.controller);
         for (i, axis) in self.plant.axes.iter().enumerate() {
