@@ -65,9 +65,9 @@ def differ(a: Linearized, b: Linearized) -> float:
 
 
 # Columns are weighted in pairs, each at the size of the other: a column whose partner is another
-# differs by roundings of its largest entry, 1e-15, of which no more than a thousandth may be a
-# typical one.
-ROUNDING = 1e-12
+# differs by roundings of its largest entry, 1e-15, of which a ten-thousandth may be a typical one: of an
+# encoder off centre one wave grows with the angle, the other with its square.
+ROUNDING = 1e-11
 # With many columns the arm is linear along the run between nodes, alone it is exact: what changes a
 # link differs by the curvature of its forces between them.
 LINEAR_ARM = 1e-3

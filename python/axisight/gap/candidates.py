@@ -64,7 +64,7 @@ def all_candidates(
     trials = [
         Trial(info, place, robot, logs, at)
         for info in effect_table().values()
-        if not info.stiff and (info.inverse_dynamics or not inverse_dynamics)
+        if not info.stiff and (not inverse_dynamics or _in_torque(info))
         for place in _places(robot, info)
         if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
     ]
@@ -73,6 +73,14 @@ def all_candidates(
         out = [candidate for candidate in found if candidate is not None]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+def _in_torque(info: EffectInfo) -> bool:
+    """Whether an effect is looked for in predicted torque.
+
+    Not between axes: where friction is missing on both, one effect takes the place of several.
+    """
+    return info.inverse_dynamics and info.scope != "axes"
 
 
 def _places(robot: Robot, info: EffectInfo) -> list[Place]:

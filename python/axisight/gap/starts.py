@@ -267,7 +267,7 @@ def _coupled(trial: Trial) -> FreeEffect:
     """Begin without; both motors have the same part in the speed, counted at their joints.
 
     A gear that is turned along has to give way: a rigid one has its friction alone. Where that has no
-    size, nothing says how fast it is smoothed.
+    size, nothing says how fast it is smoothed: as the law that it begins with.
     """
     assert isinstance(trial.place, tuple)  # by its scope
     first, second = (axis - 1 for axis in trial.place)

@@ -118,11 +118,16 @@ def _shown(cause: ShownCause) -> NamedCause:
 def _strongest(found: Search) -> Standing | None:
     """Return how candidates stood where the first cause was taken in, by what other axes say, too.
 
-    Without a cause, where there was most to explain.
+    Without a cause, where there was most to explain. What was taken in there and given up later is no
+    candidate any more.
     """
     first = found.rounds[0]
     if first.accepted:
-        return first.accepted[0][1]
+        standing, kept = first.accepted[0][1], {r.trial.label for r, _ in found.accepted}
+        taken = {r.trial.label for x in found.rounds for r, _ in x.accepted}
+        for label in taken - kept:
+            standing = standing.without(label)
+        return standing
     left = found.to_explain() / found.layout.samples()
     return max(first.standings, key=lambda s: float(left[s.axis]), default=None)
 

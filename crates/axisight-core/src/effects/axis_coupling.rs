@@ -34,7 +34,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Arm,
     contains: &[],
     parts: &[],
-    usual: &["viscous_friction", "coulomb_friction"],
+    usual: &[],
     twins: &[],
     stands_for: None,
     linear: Linear::No,

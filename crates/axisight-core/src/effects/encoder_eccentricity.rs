@@ -25,7 +25,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Periodic,
     contains: &[],
     parts: &[],
-    usual: &["joint_zero_offset"],
+    usual: &[],
     twins: &[],
     stands_for: None,
     linear: Linear::No,

@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::TorquePath,
     contains: &[],
     parts: &[],
-    usual: &["torque_constant", "viscous_friction"],
+    usual: &["torque_constant"],
     twins: &[],
     stands_for: None,
     linear: Linear::No,

@@ -196,8 +196,8 @@ impl<'a, S: Scalar> Arm<'a, S> {
         for (target, source) in self.motion.iter_mut().zip(sources) {
             for (axis, x) in self.plant.axes.iter().zip(&source[k * n_axes..]) {
                 target[axis.joint] = S::constant(x * axis.ratio);
-                for (first, by) in &axis.led_by {
-                    target[axis.joint] += *by * source[k * n_axes + first];
+                for lead in &axis.led_by {
+                    target[axis.joint] += lead.by * source[k * n_axes + lead.axis];
                 }
             }
         }
@@ -238,8 +238,8 @@ fn predicted<S: Scalar, T: Scalar>(
 fn reaction<S: Scalar, T: Scalar>(plant: &Plant<S>, forces: &[T], motor: usize) -> S {
     let mut torque = S::zero();
     for axis in &plant.axes {
-        for (_, by) in axis.led_by.iter().filter(|(first, _)| *first == motor) {
-            torque += lifted::<T, S>(&forces[axis.joint]) * *by;
+        for lead in axis.led_by.iter().filter(|lead| lead.axis == motor) {
+            torque += lifted::<T, S>(&forces[axis.joint]) * lead.by;
         }
     }
     torque

@@ -17,6 +17,17 @@ pub struct Gear<S> {
     pub(super) slot: usize,
 }
 
+/// An axis whose motor turns the gear of another one along.
+#[derive(Debug, Clone, Copy)]
+pub struct Lead<S> {
+    /// Index of the axis.
+    pub axis: usize,
+    /// Turn of the gear, joint side, per turn of the motor there.
+    pub by: S,
+    /// The effect that does so.
+    pub effect: &'static str,
+}
+
 /// One driven axis.
 #[derive(Clone)]
 pub struct Axis<S> {
@@ -36,8 +47,8 @@ pub struct Axis<S> {
     pub(super) on_motor: Vec<Own<S>>,
     pub(super) on_gear: Vec<Own<S>>,
     pub(super) on_joint: Vec<Own<S>>,
-    /// Axes whose turn turns this gear along: which, and by how much per motor angle there.
-    pub led_by: Vec<(usize, S)>,
+    /// Axes whose turn turns this gear along.
+    pub led_by: Vec<Lead<S>>,
 }
 
 impl<S: Scalar> Axis<S> {

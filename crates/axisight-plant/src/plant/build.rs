@@ -1,6 +1,6 @@
 //! A plant from a robot, changed parameters and the kernels of effects.
 
-use super::axis::axes;
+use super::axis::{Lead, axes};
 use super::equations::Plant;
 use super::own::{OnPair, Own};
 use crate::effect::{Acts, BaseJoint, EffectError, EffectInfo, Kernel, PlantParameters, Scope};
@@ -128,7 +128,11 @@ impl<S: Scalar> Plant<S> {
                 let own = self.with_states(own);
                 if let Some(share) = own.kernel.turns_next() {
                     let by = share * self.axes[a].ratio;
-                    self.axes[b].led_by.push((a, by));
+                    self.axes[b].led_by.push(Lead {
+                        axis: a,
+                        by,
+                        effect: info.name,
+                    });
                 }
                 self.on_pairs.push(OnPair { axes: [a, b], own });
             }

@@ -91,7 +91,7 @@ impl<S: Scalar> Plant<S> {
     pub fn arm_carries_derivatives(&self) -> bool {
         let seeded = |by: &S| (0..S::PARTIALS).any(|seed| by.partial(seed, 0) != 0.0);
         let mut turned = self.axes.iter().flat_map(|axis| &axis.led_by);
-        self.chain.carries_derivatives() || turned.any(|(_, by)| seeded(by))
+        self.chain.carries_derivatives() || turned.any(|lead| seeded(&lead.by))
     }
 
     /// By how much the controller's clock is fast against that of the references; `None` for one clock.
@@ -268,10 +268,10 @@ impl<S: Scalar> Plant<S> {
             }
             delta -= x[m + axis.joint];
             let mut rate = speed * slope - x[m + n + m + axis.joint];
-            for (first, by) in &axis.led_by {
-                let first = &self.axes[*first];
-                delta += self.motor_angle(first, x) * *by;
-                rate += self.motor_speed(first, x) * *by;
+            for lead in &axis.led_by {
+                let first = &self.axes[lead.axis];
+                delta += self.motor_angle(first, x) * lead.by;
+                rate += self.motor_speed(first, x) * lead.by;
             }
             let torque = axis.gear_torque(gear, delta, rate, own, own_rates);
             (angle, speed, torque, torque * back)
@@ -317,8 +317,8 @@ impl<S: Scalar> Plant<S> {
         for second in self.axes.iter().filter(|axis| !axis.led_by.is_empty()) {
             let none = S::zero();
             let gear = self.driven(second, x, none, none, &mut []).gear;
-            for (first, by) in &second.led_by {
-                take(*first, gear * *by);
+            for lead in &second.led_by {
+                take(lead.axis, gear * lead.by);
             }
         }
     }

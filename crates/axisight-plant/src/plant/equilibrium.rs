@@ -181,7 +181,7 @@ fn hold_axes<S: Scalar>(
     for (number, (axis, added)) in plant.axes.iter().zip(added).enumerate() {
         let joint_angle = q[axis.joint];
         let load = gear_load(axis, q, load) - added.joint;
-        let turned = axis.led_by.iter().map(|(first, by)| motors[*first] * *by);
+        let turned = axis.led_by.iter().map(|lead| motors[lead.axis] * lead.by);
         let by_motor = turned.fold(joint_angle, |angle, by| angle - by);
         let angle = axis.motor_angle_at_rest(by_motor, load);
         if (0..S::LANES).any(|lane| !angle.lane(lane).is_finite()) {
@@ -206,8 +206,8 @@ fn gear_load<S: Scalar>(axis: &Axis<S>, q: &[S], load: &[S]) -> S {
 fn add_reactions<S: Scalar>(plant: &Plant<S>, q: &[S], load: &[S], added: &mut [AxisTorque<S>]) {
     for (second, axis) in plant.axes.iter().enumerate() {
         let torque = gear_load(axis, q, load) - added[second].joint;
-        for (first, by) in &axis.led_by {
-            added[*first].motor -= torque * *by;
+        for lead in &axis.led_by {
+            added[lead.axis].motor -= torque * lead.by;
         }
     }
 }

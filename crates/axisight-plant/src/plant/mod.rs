@@ -9,7 +9,7 @@ mod linearization;
 mod own;
 mod zoh_response;
 
-pub use axis::{Axis, Gear};
+pub use axis::{Axis, Gear, Lead};
 pub use build::{PlacedKernel, PlantError};
 pub use equations::Plant;
 pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};

@@ -4,7 +4,7 @@ use super::controller::{ControlLoop, OwnLaw};
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
-use crate::plant::{Axis, EquilibriumError, Plant, equilibrium};
+use crate::plant::{Axis, EquilibriumError, Lead, Plant, equilibrium};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -199,20 +199,18 @@ pub fn simulate<S: Scalar>(
 
 /// Refuse a rigid gear that another axis turns along: it would be a constraint.
 fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
-    let turned = |axis: &Axis<S>| {
-        let lanes = 0..S::LANES;
-        let by = |(_, by): &(usize, S)| lanes.clone().any(|lane| by.lane(lane) != 0.0);
-        axis.gear.is_none() && axis.led_by.iter().any(by)
-    };
-    match plant.axes.iter().position(turned) {
-        None => Ok(()),
-        Some(axis) => Err(EffectError::Axis {
-            effect: "axis_coupling",
-            expected: "a second axis with a compliant transmission where the first one turns it"
-                .to_owned(),
-            got: format!("axis {} (rigid)", axis + 1),
-        }),
+    let turns = |lead: &&Lead<S>| (0..S::LANES).any(|lane| lead.by.lane(lane) != 0.0);
+    for (i, axis) in plant.axes.iter().enumerate() {
+        let lead = axis.led_by.iter().find(turns);
+        if let (None, Some(lead)) = (&axis.gear, lead) {
+            return Err(EffectError::Axis {
+                effect: lead.effect,
+                expected: "a compliant transmission of the axis that is turned along".to_owned(),
+                got: format!("axis {} (rigid)", i + 1),
+            });
+        }
     }
+    Ok(())
 }
 
 /// Whether no state is infinite or NaN: zero times the sum of all would be NaN.
