@@ -310,6 +310,8 @@ def effects_of_arm() -> st.SearchStrategy[list[Effect]]:
         axis = None if info.scope == "arm" else draw(st.integers(1, 3))
         chosen = draw(st.lists(st.sampled_from(info.parameters), unique=True))
         values = {p.name: draw(st.floats(p.lower, p.upper)) for p in chosen}
+        if info.scope == "axes":
+            return Effect(info.name, None, values, (axis, axis % 3 + 1))
         return Effect(info.name, axis, values)
 
     return st.lists(one(), unique_by=lambda e: e.label, max_size=4)

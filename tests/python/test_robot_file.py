@@ -367,9 +367,10 @@ def test_every_effect_may_stand_at_its_neutral_values_and_bounds(tmp_path: Path)
     robot = load_robot("irb6600_like")
     for name, info in effect_table().items():
         axis = 3 if info.scope == "axis" else None
+        axes = (2, 3) if info.scope == "axes" else None
         for which in ("neutral", "lower", "upper"):
             given = {p.name: getattr(p, which) for p in info.parameters}
-            found = identified({}, SOURCE, effects=[Effect(name, axis, given)])
+            found = identified({}, SOURCE, effects=[Effect(name, axis, given, axes)])
             write_identified(robot, tmp_path / "r.toml", found, overwrite=True)
             assert load_identified(tmp_path / "r.toml").effects == found.effects
 
