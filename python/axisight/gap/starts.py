@@ -263,21 +263,15 @@ def _soft(trial: Trial) -> FreeEffect:
     return FreeEffect(begin, ("softness", name, "rounding"), bounds=bounds, starts=further)
 
 
-def _coupled(trial: Trial) -> FreeEffect:
-    """Begin without; both motors have the same part in the speed, counted at their joints.
+def _coupled(trial: Trial) -> FreeEffect | None:
+    """Begin without a turn that one axis gives the next; a rigid gear cannot be turned along.
 
-    A gear that is turned along has to give way: a rigid one has its friction alone. Where that has no
-    size, nothing says how fast it is smoothed: as the law that it begins with.
+    Friction of both is not free: one law of two axes takes the place of several of one.
     """
     assert isinstance(trial.place, tuple)  # by its scope
-    first, second = (axis - 1 for axis in trial.place)
-    ratio = trial.robot.gear_ratio
-    begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
-    effect = begin.effect.with_values({"speed_ratio": float(ratio[second] / ratio[first])})
-    fixed = {"speed_ratio", "smoothing_rad_s"} | (
-        {"share"} if trial.robot.axis_is_rigid[second] else set()
-    )
-    return replace(begin, effect=effect, free=tuple(n for n in begin.free if n not in fixed))
+    if trial.robot.axis_is_rigid[trial.place[1] - 1]:
+        return None
+    return FreeEffect(_neutral(trial).effect, ("share",))
 
 
 def _axis_share(at: Situation, index: int) -> float:
