@@ -132,61 +132,58 @@ class MaxwellSlip(Law):
         return -at.gear_ratio * total, total
 
 
+class HeldSpring(Law):
+    """A spring whose torque is held over a step: half of it late, a stiff one would feed a swing."""
+
+    half_step_s = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Remember half a step."""
+        self.half_step_s = 0.5 * step_s
+
+    def deflection(self, at: Axis) -> float:
+        """Return the deflection of the gear in the middle of the step."""
+        rate = at.gear_ratio * at.motor_speed - at.joint_speed
+        return at.deflection + self.half_step_s * rate
+
+
 @dataclass
-class CubicSpring(Law):
+class CubicSpring(HeldSpring):
     """A gear that stiffens with the cube of its deflection."""
 
     cubic_nm_rad3: float
-    half_step_s: float = 0.0
-
-    def begin(self, step_s: float) -> None:
-        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
-        self.half_step_s = 0.5 * step_s
 
     def torque(self, at: Axis) -> tuple[float, float]:
         """Return what the cube adds to the gear's torque in the middle of the step."""
-        rate = at.gear_ratio * at.motor_speed - at.joint_speed
-        total = self.cubic_nm_rad3 * (at.deflection + self.half_step_s * rate) ** 3
+        total = self.cubic_nm_rad3 * self.deflection(at) ** 3
         return -at.gear_ratio * total, total
 
 
 @dataclass
-class KneeSpring(Law):
+class KneeSpring(HeldSpring):
     """A gear with one stiffness up to some deflection and another beyond."""
 
     more_nm_rad: float
     knee_rad: float
-    half_step_s: float = 0.0
-
-    def begin(self, step_s: float) -> None:
-        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
-        self.half_step_s = 0.5 * step_s
 
     def torque(self, at: Axis) -> tuple[float, float]:
         """Return what is stiffer beyond the knee, in the middle of the step."""
-        rate = at.gear_ratio * at.motor_speed - at.joint_speed
-        deflection = at.deflection + self.half_step_s * rate
+        deflection = self.deflection(at)
         beyond = copysign(max(abs(deflection) - self.knee_rad, 0.0), deflection)
         total = self.more_nm_rad * beyond
         return -at.gear_ratio * total, total
 
 
 @dataclass
-class SoftMiddle(Law):
+class SoftMiddle(HeldSpring):
     """A gear that is softer up to some deflection, where few teeth carry."""
 
     less_nm_rad: float
     half_width_rad: float
-    half_step_s: float = 0.0
-
-    def begin(self, step_s: float) -> None:
-        """Torques are held over a step: half of it late, a stiff spring would feed a swing."""
-        self.half_step_s = 0.5 * step_s
 
     def torque(self, at: Axis) -> tuple[float, float]:
         """Return what the spring lacks, in the middle of the step."""
-        rate = at.gear_ratio * at.motor_speed - at.joint_speed
-        deflection = at.deflection + self.half_step_s * rate
+        deflection = self.deflection(at)
         within = min(max(deflection, -self.half_width_rad), self.half_width_rad)
         total = -self.less_nm_rad * within
         return -at.gear_ratio * total, total

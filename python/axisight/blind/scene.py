@@ -94,10 +94,8 @@ class Scene:
 class Drawn:
     """One effect as drawn: parameters as the library states them, and what makes it.
 
-    ``fast``: of the machine's clock, as `Machine` has it.
-
     ``axis`` from 1; None for the arm, which ``ends`` is of. ``laws`` of the engine; ``changed``:
-    parameters of the robot.
+    parameters of the robot; ``fast``: of the machine's clock, as `Machine` has it.
     """
 
     effect: str

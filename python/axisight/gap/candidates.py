@@ -78,7 +78,7 @@ def all_candidates(
 def _in_torque(info: EffectInfo) -> bool:
     """Whether an effect is looked for in predicted torque.
 
-    Not between axes: where friction is missing on both, one effect takes the place of several.
+    Not between axes: of these the turn of an elastic gear is looked for, and gears are rigid there.
     """
     return info.inverse_dynamics and info.scope != "axes"
 
