@@ -53,6 +53,32 @@ def test_orders_are_seen_through_the_response():
     assert strongest_orders([log], [flat(log)], count=2) != [24, 5]
 
 
+@pytest.mark.parametrize("n", [N, N - 1])
+def test_products_of_waves_are_those_of_their_series(n: int):
+    """Normal equations from spectra against the series themselves, which the response has passed."""
+    rng = np.random.default_rng(11)
+    whole = turned(np.zeros(N))
+    log = Turning(rng.normal(size=n), whole.angle_rad[:n], whole.speed_rad_s[:n], T)
+    response = 1.0 / (1.0 + 0.3j * log.frequency_hz)
+    if n % 2 == 0:
+        response[-1] = 0.0
+    spectra = log.spectra * response
+    spectra[:, 0] = 0.0
+    series = np.fft.irfft(spectra, n)
+    normal, along = series @ series.T, series @ log.residual
+    assert log.normal(response) == pytest.approx(normal, abs=1e-12 * normal.max())
+    assert log.along(response, log.residual) == pytest.approx(
+        along, abs=1e-12 * np.abs(along).max()
+    )
+
+
+def test_what_is_known_of_waves_is_kept_for_another_residual():
+    """It is taken once for all models of a search."""
+    log = turned(np.zeros(N))
+    known = log.normal(flat(log))
+    assert log.leaving(np.ones(N)).normal(flat(log)) is known
+
+
 def test_a_decimated_residual_stands_in_the_middle_of_its_samples():
     """Against the full log mirrored at its ends, order 30 keeps its phase only so."""
     full, factor = 5e-4, 8

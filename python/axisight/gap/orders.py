@@ -22,6 +22,8 @@ _TAPERED = 0.05
 _WORTH = 0.05
 # Cosine and sine of an order that hardly turns look alike.
 _LEAST_APART = 1e-8
+# What a motion keeps whatever the residual is.
+_KNOWN_OF_WAVES = ("spectra", "_normals")
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Turning:
     def leaving(self, residual: Array) -> Turning:
         """Return the same motion with another residual (n,); what is known of its waves is kept."""
         other = replace(self, residual=residual)
-        vars(other).update({k: v for k, v in vars(self).items() if k == "spectra"})
+        vars(other).update({k: v for k, v in vars(self).items() if k in _KNOWN_OF_WAVES})
         return other
 
     @property
@@ -59,6 +61,39 @@ class Turning:
         wave *= scipy.signal.windows.tukey(len(self.angle_rad), _TAPERED)
         spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))
         return np.asarray(spectra * np.exp(2j * np.pi * self.frequency_hz * self.later_s))
+
+    @cached_property
+    def _normals(self) -> dict[bytes, Array]:
+        """Normal matrices by response."""
+        return {}
+
+    def normal(self, response: Complex) -> Array:
+        """Return the products of the waves of all orders through a response, without means (160, 160)."""
+        key = response.tobytes()
+        if key not in self._normals:
+            # By Parseval's theorem, from the spectra: rows of real numbers, as long as a log.
+            passed = self.spectra * (response * np.sqrt(self._parseval))
+            rows = np.concatenate([passed.real, passed.imag], axis=1)
+            self._normals[key] = rows @ rows.T
+        return self._normals[key]
+
+    def along(self, response: Complex, residual: Array) -> Array:
+        """Return the products of the waves through a response with a residual (160,)."""
+        seen = np.conj(np.fft.rfft(residual)) * response * self._parseval
+        return np.asarray((self.spectra @ seen).real)
+
+    @property
+    def _parseval(self) -> Array:
+        """Weights by which a product of spectra sums to that of the series; none of the means.
+
+        Nor of the Nyquist frequency, where a wave has no phase.
+        """
+        n = len(self.residual)
+        weights = np.full(n // 2 + 1, 2.0 / n)
+        weights[0] = 0.0
+        if n % 2 == 0:
+            weights[-1] = 0.0
+        return weights
 
 
 def turning(
@@ -88,15 +123,15 @@ def strongest_orders(
     a twentieth of what is left. An order is one amplitude and phase for all logs. Orders that come
     round less often than ``least_turns`` over the travel are left out.
 
-    Cost: two transforms an order and log, and products of 160 numbers a sample.
+    Cost: a transform an order and log, and products of 160 numbers a sample, both once for all residuals
+    of a motion and response.
     """
     size = 2 * HIGHEST_ORDER
     normal, along, power = np.zeros((size, size)), np.zeros(size), 0.0
     for log, response in zip(logs, responses, strict=True):
-        columns = _columns(log, response)
         residual = log.residual - log.residual.mean()
-        normal += columns @ columns.T
-        along += columns @ residual
+        normal += log.normal(response)
+        along += log.along(response, residual)
         power += float(residual @ residual)
     travel = max(float(np.ptp(log.angle_rad)) for log in logs)
     comes_round = np.arange(1, HIGHEST_ORDER + 1) * travel >= 2 * np.pi * least_turns
@@ -111,20 +146,11 @@ def strongest_orders(
     return found
 
 
-def _columns(log: Turning, response: Complex) -> Array:
-    """Return cosines of every order, then sines, through a response (2 orders, n), without means."""
-    return _through(log.spectra, response, len(log.residual))
-
-
 def passed(series: Array, response: Complex) -> Array:
     """Return series (k, n) of the sample time of a residual through a response, without means."""
-    return _through(np.fft.rfft(series), response, series.shape[1])
-
-
-def _through(spectra: Complex, response: Complex, n: int) -> Array:
-    out = spectra * response
+    out = np.fft.rfft(series) * response
     out[:, 0] = 0.0
-    return np.asarray(np.fft.irfft(out, n))
+    return np.asarray(np.fft.irfft(out, series.shape[1]))
 
 
 def _gains(normal: Array, along: Array, found: Sequence[int]) -> Array:

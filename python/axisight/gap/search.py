@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -199,9 +199,10 @@ def _taken(
         mine = fall[place[s.best.trial.label]]
         return -float(mine.sum()), -float(mine[s.axis])
 
+    causes = {s.axis: _led_by_a_cause(s, state, settings, tried) for s in standings}
     for standing in sorted(standings, key=felt_most):
-        led = _led_by_a_cause(standing, state, settings, tried)
-        if led is None:
+        led = causes[standing.axis]
+        if led is None or _beaten_at_home(led, causes):
             continue
         least = state.least_falls(settings)
         led = led.with_what_others_say(
@@ -218,6 +219,21 @@ def _taken(
     if not found and round_.fitter.adds_up:
         found = _pairs(round_, trials, state, settings, tried)
     return tuple(found)
+
+
+def _beaten_at_home(led: Standing, causes: Mapping[int, Standing | None]) -> bool:
+    """Whether another cause leads on the axis of what leads elsewhere, and is of that axis too.
+
+    How effects of one axis fare on others says little of which of them it is.
+    """
+    effect = led.best.trial.candidate.effect
+    if effect.axis is None or effect.axis == led.axis + 1:
+        return False
+    home = causes.get(effect.axis - 1)
+    if home is None:
+        return False
+    other = home.best.trial.candidate.effect
+    return other.axis == effect.axis and other.label != effect.label
 
 
 def _leads(led: Standing, other: Standing, fall: Array, least: Array) -> bool:

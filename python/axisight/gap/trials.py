@@ -24,6 +24,7 @@ from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 from axisight.gap.tryout import Tryout
+from axisight.gap.usual import begun_where_it_ended
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -151,7 +152,8 @@ class Trials:
         if any(tryout.bends(start) for start in chosen):
             self.bench.begin_nominal()
         with self._threads() as pool:
-            return self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
+            found = self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
+            return self._with_usual(pool, found, options)
 
     def _screened(self, options: Sequence[FreeEffect], number: int) -> list[Start]:
         screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
@@ -183,6 +185,19 @@ class Trials:
             if (s.falls is None and s.gain < worth[(s.option.effect.axis or 1) - 1])
             or (s.falls is not None and np.all(s.falls < worth))
         }
+
+    def _with_usual(
+        self, pool: ThreadPoolExecutor, trials: list[Trial], options: Sequence[FreeEffect]
+    ) -> list[Trial]:
+        """Add what is more usual than the leader of an axis and may have begun too far off."""
+        tried = {t.label for t in trials}
+        begun = [
+            start
+            for standing in self.standings(trials)
+            if standing.best.trial.candidate.effect.axis == standing.axis + 1
+            for start in begun_where_it_ended(standing.best.trial, options, tried)
+        ]
+        return [*trials, *self._fitted(pool, begun)]
 
     def run_waiting(self, number: int) -> list[Trial]:
         """Fit the candidates that were left to the next round."""

@@ -1,0 +1,57 @@
+"""More usual effects begun where the fit of a less usual one ended, which is them at its limits.
+
+A soft middle of a gear without any stiffness is play: where the simulator is still far off, the
+valley of the play is too narrow for its own start, and that of the soft middle leads into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from axisight.effects import Effect, EffectInfo, effect_info
+from axisight.gap.decide import Trial
+from axisight.gap.evidence import FreeEffect
+from axisight.gap.screening import Start
+
+
+def begun_where_it_ended(
+    leader: Trial, options: Sequence[FreeEffect], tried: Collection[str]
+) -> list[Start]:
+    """Return the candidates more usual than ``leader``, with the shape that its fit found.
+
+    Of ``options`` those that were not ``tried``, by label, and have a shape or size in common with it.
+    """
+    fitted = leader.evidence.effects[-1]
+    wanted = {
+        Effect(name, fitted.axis).label
+        for name in effect_info(fitted.name).usual
+        if effect_info(name).scope == "axis"
+    }
+    starts = []
+    for option in options:
+        label = option.effect.label
+        shared = _in_common(fitted, effect_info(option.effect.name)) if label in wanted else {}
+        if shared and label not in tried:
+            at = option.at({**(option.effect.parameters or {}), **shared})
+            starts.append(Start(at, leader.evidence.robot_values, 0.0))
+    return starts
+
+
+def _in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
+    """Return the values of a fitted effect that another one takes, of the same quantity.
+
+    That is one with a unit; the same name says so, or the same unit where only one parameter has it.
+    """
+    own = effect_info(fitted.name).parameters
+    units = [p.unit for p in own]
+    values = dict(zip((p.name for p in own), fitted.values(), strict=True))
+    found = {}
+    for p in info.parameters:
+        if p.unit == "1":
+            continue
+        same = [q.name for q in own if q.unit == p.unit]
+        if p.name in values:
+            found[p.name] = values[p.name]
+        elif units.count(p.unit) == 1:
+            found[p.name] = values[same[0]]
+    return found
