@@ -114,7 +114,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _crooked(self, trials):
             return set()
 
-        def _worth_refining(self, trials, done, crooked):
+        def _worth_refining(self, trials, done, crooked, *, even_felt):
             return [t for t in trials if t.label not in done]
 
     def settled(fitter, free_, start):

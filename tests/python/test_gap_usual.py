@@ -2,11 +2,14 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from axisight import Effect
+from axisight import Effect, Settings
+from axisight.gap import trials
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.search import _beaten_at_home
+from axisight.gap.trials import Trials
 from axisight.gap.usual import begun_where_it_ended
 
 WIDTH = 2.1e-4
@@ -68,3 +71,44 @@ def test_it_stands_where_its_own_axis_has_no_other(home):
     assert not _beaten_at_home(felt, {2: felt})
     whole = standing(3, Effect("payload", None))
     assert not _beaten_at_home(whole, {0: home, 2: whole})
+
+
+# Falls of a cube of axis 3, a play of axis 1 that feels it, and friction of axis 2 that does not.
+TRIED = [SimpleNamespace(label=label) for label in ("cube@3", "play@1", "friction@2")]
+FALLS = np.array([[30.0, 1.0, 90.0], [60.0, 1.0, 5.0], [0.1, 9.0, 0.1]])
+LED = {0: "play@1", 1: "friction@2", 2: "cube@3"}
+
+
+def led(axis: int, score: float = 0.99, rivals: tuple = ()):
+    trial = next(t for t in TRIED if t.label == LED[axis])
+    best = SimpleNamespace(trial=trial, gain=1.0, score=score)
+    return SimpleNamespace(axis=axis, best=best, ranked=(best, *rivals))
+
+
+def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
+    monkeypatch.setattr(trials, "falls", lambda *_: FALLS)
+    field = SimpleNamespace(current=None, layout=None)
+    kept = Trials._not_felt(field, [led(0), led(1), led(2)], TRIED)
+    assert [s.axis for s in kept] == [1, 2]
+
+
+@pytest.mark.parametrize("begun", [set(), {"backlash@1"}])
+def test_what_began_where_a_clear_leader_ended_is_refined(monkeypatch, begun: set):
+    """A leader that is clear needs no better fit itself, but not while it may be another at its limits."""
+    rival = SimpleNamespace(
+        score=0.89,
+        trial=SimpleNamespace(
+            label="backlash@1", candidate=SimpleNamespace(effect=Effect("backlash", 1))
+        ),
+    )
+    standing = led(0, rivals=(rival,))
+    monkeypatch.setattr(trials, "_clear", lambda _: True)
+    field = SimpleNamespace(
+        standings=lambda _: [standing],
+        layout=SimpleNamespace(samples=lambda: np.ones(3)),
+        least=np.zeros(3),
+        settings=Settings(),
+        usual=begun,
+    )
+    todo = Trials._worth_refining(field, TRIED, set(), set(), even_felt=True)
+    assert [t.label for t in todo] == sorted(begun)

@@ -133,9 +133,10 @@ def search(
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
-        if not taken and round_.waiting:
-            # What they waited for is no cause.
-            trials = round_.refined([*trials, *round_.run_waiting(number)], number)
+        if not taken:
+            # What others waited for is no cause.
+            trials = [*trials, *round_.run_waiting(number)]
+            trials = round_.refined(trials, number, even_felt=True)
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
         out.sensitivities |= round_.sensitivities

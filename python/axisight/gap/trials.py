@@ -132,6 +132,7 @@ class Trials:
         self.bench = Bench(fitter, model)
         self.screen = Screen(self.bench)
         self.waiting: list[Start] = []
+        self.usual: set[str] = set()
         self.sensitivities: dict[str, Sensitivity] = {}
 
     @property
@@ -197,6 +198,7 @@ class Trials:
             if standing.best.trial.candidate.effect.axis == standing.axis + 1
             for start in begun_where_it_ended(standing.best.trial, options, tried)
         ]
+        self.usual = {start.option.effect.label for start in begun}
         return [*trials, *self._fitted(pool, begun)]
 
     def run_waiting(self, number: int) -> list[Trial]:
@@ -274,7 +276,7 @@ class Trials:
         ]
         return [s.usual_first() for s in found if s is not None]
 
-    def refined(self, trials: list[Trial], number: int) -> list[Trial]:
+    def refined(self, trials: list[Trial], number: int, *, even_felt: bool = False) -> list[Trial]:
         """Fit the leaders of each axis again with the simulator's sensitivities renewed.
 
         A large effect bends the re-fitted simulator, and the sensitivities taken from
@@ -282,11 +284,15 @@ class Trials:
         """
         done: set[str] = set()
         label = f"refining the leaders, round {number}"
-        crooked = self._crooked(trials)
-        # Where the leader bends the simulator, several are; else mostly one.
-        at_once = self.settings.threads if crooked else 1
         with self._threads() as pool:
-            while todo := self._worth_refining(trials, done, crooked)[:at_once]:
+            while True:
+                # A leader with sensitivities of its own may no longer bend the simulator.
+                crooked = self._crooked(trials)
+                todo = self._worth_refining(trials, done, crooked, even_felt=even_felt)
+                # Where the leader bends it, several are; else mostly one.
+                todo = todo[: self.settings.threads if crooked else 1]
+                if not todo:
+                    break
                 self.progress(label, len(done), len(done) + len(todo))
                 done.update(t.label for t in todo)
                 better = dict(zip(map(id, todo), pool.map(self._refined, todo), strict=True))
@@ -319,7 +325,7 @@ class Trials:
         return {axis for axis, evidence in leaders if bent(self.fitter, evidence) >= BENT}
 
     def _worth_refining(
-        self, trials: Sequence[Trial], done: set[str], crooked: set[int]
+        self, trials: Sequence[Trial], done: set[str], crooked: set[int], *, even_felt: bool
     ) -> list[Trial]:
         """Return the leaders that explain anything, not done yet, where it is not clear which leads.
 
@@ -327,19 +333,41 @@ class Trials:
         with the simulator's sensitivities its own.
         """
         out = []
-        for standing in self.standings(trials):
+        standings = self.standings(trials)
+        for standing in standings if even_felt else self._not_felt(standings, trials):
             leader = standing.best
             gain = leader.gain * self.layout.samples()[standing.axis]
-            bends = standing.axis in crooked
-            if (_clear(standing) and not bends) or gain < self.least[standing.axis]:
+            if gain < self.least[standing.axis]:
                 continue
+            bends = standing.axis in crooked
             count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
-            for r in standing.ranked[:count]:
+            rivals = standing.ranked[:count]
+            if _clear(standing) and not bends:
+                # What began where the leader ended is it at its limits, until its own fit says no.
+                rivals = tuple(r for r in standing.ranked if r.trial.label in self.usual)
+            for r in rivals:
                 here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
                 near = r.score > max(0.5 * self.settings.smallest_score, close * leader.score)
                 if here and near and r.trial.label not in done and r.trial not in out:
                     out.append(r.trial)
         return out
+
+    def _not_felt(
+        self, standings: Sequence[Standing], trials: Sequence[Trial]
+    ) -> Sequence[Standing]:
+        """Return the standings but those whose leaders the one that gains most of all is felt by.
+
+        They are judged in the next round, on top of it.
+        """
+        fall = falls(trials, self.current, self.layout)
+        place = {t.label: i for i, t in enumerate(trials)}
+        leaders = [place[s.best.trial.label] for s in standings]
+        first = max(leaders, key=lambda i: float(fall[i].sum()), default=0)
+        return [
+            s
+            for i, s in zip(leaders, standings, strict=True)
+            if i == first or not interact(first, i, s.axis, fall)
+        ]
 
     def _worth(self) -> Array:
         """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""
