@@ -90,6 +90,7 @@ def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     field = SimpleNamespace(current=None, layout=None)
     kept = Trials._not_felt(field, [led(0), led(1), led(2)], TRIED)
     assert [s.axis for s in kept] == [1, 2]
+    assert field.first == "cube@3"
 
 
 @pytest.mark.parametrize("begun", [set(), {"backlash@1"}])

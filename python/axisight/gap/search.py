@@ -133,7 +133,7 @@ def search(
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
-        if not taken:
+        if round_.first not in {r.trial.label for r, _ in taken}:
             # What others waited for is no cause.
             trials = [*trials, *round_.run_waiting(number)]
             trials = round_.refined(trials, number, even_felt=True)

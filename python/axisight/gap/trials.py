@@ -94,7 +94,10 @@ def settled(
     renewals = _RENEWALS
     if rough is not None:
         with suppress(InputError):
-            start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
+            start = rough.fit(free, start, refreshes=renewals)
+            # Where no step leads on, all of the data have to say where to.
+            if start.status != "stalled":
+                start = _renewed(rough, start, max_iterations)
             free, renewals = start.free, 0
     return _renewed(fitter, fitter.fit(free, start, refreshes=renewals), max_iterations)
 
@@ -111,7 +114,7 @@ class Trials:
 
     ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``kept``: what candidates
     did to models before, and will have done to this; ``sensitivities`` by label,
-    of candidates that were screened.
+    of candidates that were screened; ``first``: label of the leader that others waited for.
     """
 
     def __init__(
@@ -133,6 +136,7 @@ class Trials:
         self.screen = Screen(self.bench)
         self.waiting: list[Start] = []
         self.usual: set[str] = set()
+        self.first = ""
         self.sensitivities: dict[str, Sensitivity] = {}
 
     @property
@@ -363,6 +367,7 @@ class Trials:
         place = {t.label: i for i, t in enumerate(trials)}
         leaders = [place[s.best.trial.label] for s in standings]
         first = max(leaders, key=lambda i: float(fall[i].sum()), default=0)
+        self.first = trials[first].label if leaders else ""
         return [
             s
             for i, s in zip(leaders, standings, strict=True)
