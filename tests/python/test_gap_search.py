@@ -114,8 +114,8 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _crooked(self, trials):
             return set()
 
-        def _worth_refining(self, trials, done, crooked, *, even_felt):
-            return [t for t in trials if t.label not in done]
+        def _worth_refining(self, trials, crooked, *, even_felt):
+            return [t for t in trials if t.label not in self.done]
 
     def settled(fitter, free_, start):
         if start is whole.evidence:
@@ -127,6 +127,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     field.bench = SimpleNamespace(skipped={})
     field.screen = SimpleNamespace(bench=field.bench)
     field.fitter = None
+    field.done = set()
     monkeypatch.setattr(trials, "settled", settled)
     monkeypatch.setattr(trials, "trial", lambda candidate, evidence: other)
     assert Trials.refined(field, [whole, other], 1) == [other]

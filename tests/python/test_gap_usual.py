@@ -1,5 +1,6 @@
 """More usual effects begun where a less usual one led, and axes that judge their own effects."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,9 +89,11 @@ def led(axis: int, score: float = 0.99, rivals: tuple = ()):
 def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     monkeypatch.setattr(trials, "falls", lambda *_: FALLS)
     field = SimpleNamespace(current=None, layout=None)
+    field.first = partial(Trials.first, field)
+    assert field.first([], TRIED) == ""
+    assert field.first([led(0), led(1), led(2)], TRIED) == "cube@3"
     kept = Trials._not_felt(field, [led(0), led(1), led(2)], TRIED)
     assert [s.axis for s in kept] == [1, 2]
-    assert field.first == "cube@3"
 
 
 @pytest.mark.parametrize("begun", [set(), {"backlash@1"}])
@@ -110,6 +113,7 @@ def test_what_began_where_a_clear_leader_ended_is_refined(monkeypatch, begun: se
         least=np.zeros(3),
         settings=Settings(),
         usual=begun,
+        done=set(),
     )
-    todo = Trials._worth_refining(field, TRIED, set(), set(), even_felt=True)
+    todo = Trials._worth_refining(field, TRIED, set(), even_felt=True)
     assert [t.label for t in todo] == sorted(begun)

@@ -133,9 +133,9 @@ def search(
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
-        if round_.first not in {r.trial.label for r, _ in taken}:
+        if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
             # What others waited for is no cause.
-            trials = [*trials, *round_.run_waiting(number)]
+            trials = round_.run_waiting(trials, options, number)
             trials = round_.refined(trials, number, even_felt=True)
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped

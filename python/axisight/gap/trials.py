@@ -94,10 +94,7 @@ def settled(
     renewals = _RENEWALS
     if rough is not None:
         with suppress(InputError):
-            start = rough.fit(free, start, refreshes=renewals)
-            # Where no step leads on, all of the data have to say where to.
-            if start.status != "stalled":
-                start = _renewed(rough, start, max_iterations)
+            start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
             free, renewals = start.free, 0
     return _renewed(fitter, fitter.fit(free, start, refreshes=renewals), max_iterations)
 
@@ -114,7 +111,7 @@ class Trials:
 
     ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``kept``: what candidates
     did to models before, and will have done to this; ``sensitivities`` by label,
-    of candidates that were screened; ``first``: label of the leader that others waited for.
+    of candidates that were screened.
     """
 
     def __init__(
@@ -135,8 +132,9 @@ class Trials:
         self.bench = Bench(fitter, model)
         self.screen = Screen(self.bench)
         self.waiting: list[Start] = []
+        # Labels of candidates that began where a leader ended, and of those refined.
         self.usual: set[str] = set()
-        self.first = ""
+        self.done: set[str] = set()
         self.sensitivities: dict[str, Sensitivity] = {}
 
     @property
@@ -202,16 +200,19 @@ class Trials:
             if standing.best.trial.candidate.effect.axis == standing.axis + 1
             for start in begun_where_it_ended(standing.best.trial, options, tried)
         ]
-        self.usual = {start.option.effect.label for start in begun}
+        self.usual |= {start.option.effect.label for start in begun}
         return [*trials, *self._fitted(pool, begun)]
 
-    def run_waiting(self, number: int) -> list[Trial]:
-        """Fit the candidates that were left to the next round."""
+    def run_waiting(
+        self, trials: list[Trial], options: Sequence[FreeEffect], number: int
+    ) -> list[Trial]:
+        """Fit the candidates that were left to the next round too; return all trials."""
         chosen, self.waiting = self.waiting, []
-        label = f"fitting further candidates, round {number}"
+        if not chosen:
+            return trials
         with self._threads() as pool:
-            found = self._fitted(pool, chosen)
-        self.progress(label, len(chosen), len(chosen))
+            found = self._with_usual(pool, [*trials, *self._fitted(pool, chosen)], options)
+        self.progress(f"fitting further candidates, round {number}", len(chosen), len(chosen))
         return found
 
     @contextmanager
@@ -286,24 +287,25 @@ class Trials:
         A large effect bends the re-fitted simulator, and the sensitivities taken from
         it; the leaders deserve better before one of them is believed.
         """
-        done: set[str] = set()
         label = f"refining the leaders, round {number}"
         with self._threads() as pool:
-            while True:
-                # A leader with sensitivities of its own may no longer bend the simulator.
-                crooked = self._crooked(trials)
-                todo = self._worth_refining(trials, done, crooked, even_felt=even_felt)
-                # Where the leader bends it, several are; else mostly one.
-                todo = todo[: self.settings.threads if crooked else 1]
-                if not todo:
-                    break
-                self.progress(label, len(done), len(done) + len(todo))
-                done.update(t.label for t in todo)
+            while todo := self._refined_next(trials, even_felt=even_felt):
+                self.progress(label, len(self.done), len(self.done) + len(todo))
+                self.done.update(t.label for t in todo)
                 better = dict(zip(map(id, todo), pool.map(self._refined, todo), strict=True))
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
         self.progress(label, 1, 1)
         return trials
+
+    def _refined_next(self, trials: Sequence[Trial], *, even_felt: bool) -> list[Trial]:
+        """Return the leaders to refine now: where one bends the simulator several, else mostly one.
+
+        A leader with sensitivities of its own may no longer bend it.
+        """
+        crooked = self._crooked(trials)
+        todo = self._worth_refining(trials, crooked, even_felt=even_felt)
+        return todo[: self.settings.threads if crooked else 1]
 
     def _refined(self, one: Trial) -> Trial | None:
         """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
@@ -329,7 +331,7 @@ class Trials:
         return {axis for axis, evidence in leaders if bent(self.fitter, evidence) >= BENT}
 
     def _worth_refining(
-        self, trials: Sequence[Trial], done: set[str], crooked: set[int], *, even_felt: bool
+        self, trials: Sequence[Trial], crooked: set[int], *, even_felt: bool
     ) -> list[Trial]:
         """Return the leaders that explain anything, not done yet, where it is not clear which leads.
 
@@ -352,7 +354,7 @@ class Trials:
             for r in rivals:
                 here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
                 near = r.score > max(0.5 * self.settings.smallest_score, close * leader.score)
-                if here and near and r.trial.label not in done and r.trial not in out:
+                if here and near and r.trial.label not in self.done and r.trial not in out:
                     out.append(r.trial)
         return out
 
@@ -366,13 +368,18 @@ class Trials:
         fall = falls(trials, self.current, self.layout)
         place = {t.label: i for i, t in enumerate(trials)}
         leaders = [place[s.best.trial.label] for s in standings]
-        first = max(leaders, key=lambda i: float(fall[i].sum()), default=0)
-        self.first = trials[first].label if leaders else ""
+        first = place.get(self.first(standings, trials), 0)
         return [
             s
             for i, s in zip(leaders, standings, strict=True)
             if i == first or not interact(first, i, s.axis, fall)
         ]
+
+    def first(self, standings: Sequence[Standing], trials: Sequence[Trial]) -> str:
+        """Return the label of the leader that gains most of all; empty where nothing leads."""
+        fall = falls(trials, self.current, self.layout).sum(axis=1)
+        gain = {t.label: float(f) for t, f in zip(trials, fall, strict=True)}
+        return max((s.best.trial.label for s in standings), key=gain.__getitem__, default="")
 
     def _worth(self) -> Array:
         """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""

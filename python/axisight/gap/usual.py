@@ -22,18 +22,15 @@ def begun_where_it_ended(
     Of ``options`` those that were not ``tried``, by label, and have a shape or size in common with it.
     """
     fitted = leader.evidence.effects[-1]
-    wanted = {
-        Effect(name, fitted.axis).label
-        for name in effect_info(fitted.name).usual
-        if effect_info(name).scope == "axis"
-    }
+    usual = effect_info(fitted.name).usual
     starts = []
     for option in options:
-        label = option.effect.label
-        shared = _in_common(fitted, effect_info(option.effect.name)) if label in wanted else {}
-        if shared and label not in tried:
-            at = option.at({**(option.effect.parameters or {}), **shared})
-            starts.append(Start(at, leader.evidence.robot_values, 0.0))
+        effect = option.effect
+        if effect.name in usual and effect.axis == fitted.axis and effect.label not in tried:
+            shared = _in_common(fitted, effect_info(effect.name))
+            if shared:
+                start = Start(option.at(shared), leader.evidence.robot_values, 0.0)
+                starts.append(start)
     return starts
 
 
@@ -44,14 +41,9 @@ def _in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
     """
     own = effect_info(fitted.name).parameters
     units = [p.unit for p in own]
-    values = dict(zip((p.name for p in own), fitted.values(), strict=True))
-    found = {}
-    for p in info.parameters:
-        if p.unit == "1":
-            continue
-        same = [q.name for q in own if q.unit == p.unit]
-        if p.name in values:
-            found[p.name] = values[p.name]
-        elif units.count(p.unit) == 1:
-            found[p.name] = values[same[0]]
-    return found
+    return {
+        p.name: value
+        for p in info.parameters
+        for q, value in zip(own, fitted.values(), strict=True)
+        if p.unit == q.unit != "1" and (p.name == q.name or units.count(q.unit) == 1)
+    }
