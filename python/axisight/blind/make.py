@@ -58,9 +58,9 @@ def _make(cases: Path, truths: Path, seed: int, choice: Choice, number: int) -> 
         return
     for attempt in range(_ATTEMPTS):
         drawn = draw(seed, number, choice, attempt)
-        logs = _logs(drawn, seed)
-        if logs is not None:
-            _write(cases / name, truths / f"{name}.json", drawn, logs, seed)
+        runs = _runs(drawn, seed)
+        if runs is not None:
+            _write(cases / name, truths / f"{name}.json", drawn, runs, seed)
             return
     raise InputError(f"{name}: expected a machine that works within {_ATTEMPTS} draws")
 
@@ -70,33 +70,43 @@ def _engine(name: str) -> Run:
     return import_module(f"axisight.blind.{name}_engine").run  # type: ignore[no-any-return]
 
 
-def _logs(drawn: Draw, seed: int) -> list[tuple[Array, Array]] | None:
-    """Return torque and angle along every reference; None of a machine that nobody would run.
+_Logs = list[tuple[Array, Array]]
+"""Torque and angle along references."""
+
+
+def _runs(drawn: Draw, seed: int) -> tuple[_Logs, _Logs] | None:
+    """Return the logs, and the validation ones without noise; None of a machine that nobody would run.
 
     An effect may take the loop beyond its margin: it swings without end.
     """
     rng = np.random.default_rng([seed, drawn.number, 1])
     references = [reference for _, reference in drawn.references.values()]
     noises = [drawn.robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    validation = _validation(drawn)
+    quiet = [np.zeros_like(x) for x in validation]
     try:
-        logs = _engine(drawn.engine)(drawn.machine, references, noises)
+        # An engine moves all runs of a machine at once where it can.
+        logs = _engine(drawn.engine)(drawn.machine, references + validation, noises + quiet)
     except InputError:
         return None
     largest = np.max([np.abs(torque).max(axis=0) for torque, _ in logs], axis=0)
     usual = Scene(drawn.robot, references).largest_nm
-    return logs if np.all(largest < _RUNAWAY * usual) else None
+    count = len(references)
+    return (logs[:count], logs[count:]) if np.all(largest < _RUNAWAY * usual) else None
 
 
-def _write(
-    folder: Path, truth: Path, drawn: Draw, logs: Sequence[tuple[Array, Array]], seed: int
-) -> None:
+def _validation(drawn: Draw) -> list[Array]:
+    return [x for role, x in drawn.references.values() if role == "validation"]
+
+
+def _write(folder: Path, truth: Path, drawn: Draw, runs: tuple[_Logs, _Logs], seed: int) -> None:
     case = CaseFolder(folder, folder.name)
+    logs, quiet = runs
     for (name, (role, reference)), log in zip(drawn.references.items(), logs, strict=True):
         time_s = np.arange(len(reference), dtype=np.float64) * drawn.robot.sample_time_s
         case.add(name, role, time_s, reference, *log)
     case.finish(drawn.arm)
-    severity = _severity(drawn, _engine(drawn.engine))
-    text = json.dumps(_truth(drawn, seed, severity), indent=1)
+    text = json.dumps(_truth(drawn, seed, _severity(drawn, quiet)), indent=1)
     write_whole(truth, text)
     # Last: a case with its seal is whole.
     write_whole(folder / SEAL, seal_of(text) + "\n")
@@ -118,21 +128,20 @@ def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
     }
 
 
-def _severity(drawn: Draw, run: Run) -> list[float]:
+def _severity(drawn: Draw, with_it: _Logs) -> list[float]:
     """Return rms torque change by all effects over rms torque noise, largest validation log, by axis."""
     robot = drawn.robot
     if not drawn.effects:
         return [0.0] * robot.n_axes
     rng = np.random.default_rng(0)
-    references = [x for role, x in drawn.references.values() if role == "validation"]
+    references = _validation(drawn)
     quiet = [np.zeros_like(x) for x in references]
     noise = [robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
     count = len(references)
-    with_it = [torque for torque, _ in run(drawn.machine, references, quiet)]
-    bare = [torque for torque, _ in run(drawn.bare, references * 2, quiet + noise)]
+    bare = _engine(drawn.engine)(drawn.bare, references * 2, quiet + noise)
     without, noisy = bare[:count], bare[count:]
     shares = [
         np.sqrt(np.mean((a - b) ** 2, axis=0) / np.mean((c - b) ** 2, axis=0))
-        for a, b, c in zip(with_it, without, noisy, strict=True)
+        for (a, _), (b, _), (c, _) in zip(with_it, without, noisy, strict=True)
     ]
     return [float(x) for x in np.max(shares, axis=0)]

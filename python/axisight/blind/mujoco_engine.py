@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,16 +35,13 @@ def run(
     ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
     still under its controller before. Raises InputError where it does not stay stable.
     """
-    met = [machine.met(reference) for reference in references]
-    return [_along(machine, *pair) for pair in zip(met, noises, strict=True)]
-
-
-def _along(machine: Machine, reference: Array, noise: Array) -> tuple[Array, Array]:
     loop = _Loop(machine)
-    still = np.zeros((round(_SETTLING_S / machine.robot.sample_time_s), reference.shape[1]))
-    loop.follow(still, still)
-    loop.begin_log()
-    return loop.follow(reference, noise)
+    loop.settle()
+    logs = []
+    for reference, noise in zip(references, noises, strict=True):
+        loop.begin_log()
+        logs.append(loop.follow(machine.met(reference), noise))
+    return logs
 
 
 class _Loop:
@@ -76,24 +74,37 @@ class _Loop:
         angle = self.data.qpos[: self.n].copy()
         self.controller = Controller(machine, angle, weight @ along)
         self.time_s = 0.0
+        # Views of what the engine computes with.
+        data = self.data
+        self.command, self.applied = data.ctrl, data.qfrc_applied
+        self.angle, self.speed = data.qpos, data.qvel
 
     def _weight(self) -> Array:
         """Return the torques that hold the joints where they are."""
         mujoco.mj_forward(self.model, self.data)
         return np.asarray(self.data.qfrc_bias[self.joints])
 
+    def settle(self) -> None:
+        """Stand still under the controller until nothing moves; logs begin from there."""
+        still = np.zeros((round(_SETTLING_S / self.sample_s), self.n))
+        self.follow(still, still)
+        self.rest = copy.copy(self.data), copy.deepcopy((self.laws, self.controller))
+
     def begin_log(self) -> None:
-        """Count time from here."""
+        """Be at rest as settled, and count time from here."""
+        data, memories = self.rest
+        mujoco.mj_copyData(self.data, self.model, data)
+        self.laws, self.controller = copy.deepcopy(memories)
         self.time_s = 0.0
 
     def follow(self, reference: Array, noise: Array) -> tuple[Array, Array]:
         """Return reported torque and measured angle along a reference."""
         torque, angle = np.empty_like(reference), np.empty_like(reference)
         for k, wanted in enumerate(reference):
-            measured = self.data.qpos[: self.n] + noise[k]
+            measured = self.angle[: self.n] + noise[k]
             for axis, law in self.laws:
-                measured[axis] += law.sensor(float(self.data.qpos[axis]))
-                joint = float(self.data.qpos[self.joints[axis]])
+                measured[axis] += law.sensor(float(self.angle[axis]))
+                joint = float(self.angle[self.joints[axis]])
                 measured[axis] += law.joint_sensor(joint) / self.ratio[axis]
                 measured[axis] = law.read(float(measured[axis]))
             command = self.controller.command(measured, wanted)
@@ -107,28 +118,31 @@ class _Loop:
         return torque, angle
 
     def _step(self, command: Array) -> None:
-        data = self.data
+        if not self.laws:
+            self.command[:] = command
+            mujoco.mj_step(self.model, self.data, STEPS_PER_SAMPLE)
+            return
         for _ in range(STEPS_PER_SAMPLE):
-            data.ctrl[:] = command
-            data.qfrc_applied[:] = 0.0
+            self.command[:] = command
+            self.applied[:] = 0.0
             for axis, law in self.laws:
-                data.ctrl[axis] = law.command(float(data.ctrl[axis]))
+                self.command[axis] = law.command(float(self.command[axis]))
                 motor, joint = law.torque(self._at(axis))
-                data.qfrc_applied[axis] += motor
-                data.qfrc_applied[self.joints[axis]] += joint
-            mujoco.mj_step(self.model, data)
+                self.applied[axis] += motor
+                self.applied[self.joints[axis]] += joint
+            mujoco.mj_step(self.model, self.data)
             self.time_s += self.step_s
 
     def _at(self, axis: int) -> Axis:
-        data, joint = self.data, self.joints[axis]
-        motor, q = float(data.qpos[axis]), float(data.qpos[joint])
+        joint = self.joints[axis]
+        motor, q = float(self.angle[axis]), float(self.angle[joint])
         ratio = float(self.ratio[axis])
         return Axis(
             self.time_s,
             motor,
-            float(data.qvel[axis]),
+            float(self.speed[axis]),
             q,
-            float(data.qvel[joint]),
+            float(self.speed[joint]),
             ratio,
             float(self.stiffness[axis]) * (ratio * motor - q),
         )

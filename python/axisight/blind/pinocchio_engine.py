@@ -109,10 +109,6 @@ def _add(chain: _Chain, joint: Joint, origin: tuple[float, ...]) -> None:
         chain.load(joint.link.mass_kg, joint.link.com_m, joint.link.inertia_kg_m2)
 
 
-# Positions and speeds of motors, then of joints: (n_runs, n_axes), (n_runs, n_joints).
-_State = tuple[Array, Array, Array, Array]
-
-
 class _Loop:
     """The state of the closed loops of all runs."""
 
@@ -134,6 +130,8 @@ class _Loop:
         self.inertia = np.array([d.motor_inertia * (1 + x.armature) for _, d, x in gears if d])
         self.viscous = np.array([d.viscous_friction * (1 + x.viscous) for _, d, x in gears if d])
         self.gain = np.array([1 + x.gear for x in own])
+        # For all runs in one call.
+        self.pool = pinocchio.ModelPool(self.model, 1)
         self.zero = np.zeros(self.model.nq)
         self.zero[self.joints] = [x.zero_rad for x in own]
         self.sample_s = robot.sample_time_s
@@ -145,14 +143,12 @@ class _Loop:
         self.along = machine.along()
         turned = joint[self.joints] + weight[self.joints] / self.stiffness
         motor = np.linalg.solve(self.along, turned)
-        self.state: _State = (
-            np.tile(motor, (runs, 1)),
-            np.tile(joint, (runs, 1)),
-            np.zeros((runs, len(motor))),
-            np.zeros((runs, len(joint))),
-        )
+        # Angles of motors and joints, then their speeds: (n_runs, 2 (n_axes + n_joints)).
+        self.moving = len(motor) + len(joint)
+        rest = np.concatenate((motor, joint, np.zeros(self.moving)))
+        self.state = np.tile(rest, (runs, 1))
         holding = np.tile(weight[self.joints] @ self.along, (runs, 1))
-        self.controller = Controller(machine, self.state[0], holding)
+        self.controller = Controller(machine, self.state[:, : len(motor)].copy(), holding)
         for _, formula, at in self._places(self.state, self.time_s):
             formula.begin(at, self.step_s)
 
@@ -171,12 +167,12 @@ class _Loop:
         """Return reported torques and measured angles along references, (n, n_runs, n_axes)."""
         torque, angle = np.empty_like(reference), np.empty_like(reference)
         for k, wanted in enumerate(reference):
-            motor = self.state[0]
+            motor, joint, _, _ = self._parts(self.state)
             measured = motor + noise[k]
             for axis, formula in self.formulas:
                 measured[:, axis] += formula.sensor(motor[:, axis])
-                joint = self.state[1][:, self.joints[axis]]
-                measured[:, axis] += formula.joint_sensor(joint) / self.ratio[axis]
+                at_joint = formula.joint_sensor(joint[:, self.joints[axis]])
+                measured[:, axis] += at_joint / self.ratio[axis]
                 measured[:, axis] = formula.read(measured[:, axis])
             command = self.controller.command(measured, wanted)
             angle[k], torque[k] = measured, command
@@ -195,23 +191,24 @@ class _Loop:
             # A drive may keep what it was told: its own copy.
             drive[:, axis] = formula.command(drive[:, axis].copy())
         drive *= self.gain
-        h, t = self.step_s, self.time_s
-        first = self._rates(self.state, drive, t)
-        second = self._rates(_ahead(self.state, first, h / 2), drive, t + h / 2)
-        third = self._rates(_ahead(self.state, second, h / 2), drive, t + h / 2)
-        fourth = self._rates(_ahead(self.state, third, h), drive, t + h)
-        mean = [
-            (a + 2 * b + 2 * c + d) / 6
-            for a, b, c, d in zip(first, second, third, fourth, strict=True)
-        ]
-        self.state = _ahead(self.state, mean, h)
+        h, t, state = self.step_s, self.time_s, self.state
+        first = self._rates(state, drive, t)
+        second = self._rates(state + h / 2 * first, drive, t + h / 2)
+        third = self._rates(state + h / 2 * second, drive, t + h / 2)
+        fourth = self._rates(state + h * third, drive, t + h)
+        self.state = state + h / 6 * (first + fourth + 2 * (second + third))
         self.time_s = t + h
         for _, formula, at in self._places(self.state, self.time_s):
             formula.moved(at)
 
-    def _places(self, state: _State, time_s: float) -> Iterator[tuple[int, Formula, Place]]:
+    def _parts(self, state: Array) -> tuple[Array, Array, Array, Array]:
+        """Return views of the angles of motors and joints, and of their speeds."""
+        n, half = len(self.ratio), self.moving
+        return state[:, :n], state[:, n:half], state[:, half : half + n], state[:, half + n :]
+
+    def _places(self, state: Array, time_s: float) -> Iterator[tuple[int, Formula, Place]]:
         """Yield every formula with its axis and where that is."""
-        motor, joint, motor_speed, joint_speed = state
+        motor, joint, motor_speed, joint_speed = self._parts(state)
         for axis, formula in self.formulas:
             ratio, k = float(self.ratio[axis]), self.joints[axis]
             phi, speed = motor[:, axis], motor_speed[:, axis]
@@ -219,28 +216,27 @@ class _Loop:
             gear = float(self.stiffness[axis]), float(self.damping[axis])
             yield axis, formula, Place(time_s, phi, speed, deflection, rate, ratio, *gear)
 
-    def _rates(self, state: _State, drive: Array, time_s: float) -> Sequence[Array]:
+    def _rates(self, state: Array, drive: Array, time_s: float) -> Array:
         """Return the rates of a state under torques of the drives."""
-        motor, joint, motor_speed, joint_speed = state
+        motor, joint, motor_speed, joint_speed = self._parts(state)
         deflection = motor @ self.along.T - joint[:, self.joints]
         rate = motor_speed @ self.along.T - joint_speed[:, self.joints]
         gear = self.stiffness * deflection + self.damping * rate
         on_motor = drive - self.viscous * motor_speed - gear @ self.along
         on_joint = -self.springs * joint - self.dampers * joint_speed
         on_joint[:, self.joints] += gear
-        for axis, formula, at in self._places(state, time_s):
-            more, joint_more = formula.torque(at)
-            on_motor[:, axis] += more
-            on_joint[:, self.joints[axis]] += joint_more
-        where = joint + self.zero
-        joint_rate = np.empty_like(joint)
-        for i in range(len(joint)):
-            joint_rate[i] = pinocchio.aba(
-                self.model, self.data, where[i], joint_speed[i], on_joint[i]
-            )
-        return motor_speed, joint_speed, on_motor / self.inertia, joint_rate
-
-
-def _ahead(state: _State, rates: Sequence[Array], by_s: float) -> _State:
-    a, b, c, d = (x + by_s * r for x, r in zip(state, rates, strict=True))
-    return a, b, c, d
+        if self.formulas:
+            for axis, formula, at in self._places(state, time_s):
+                more, joint_more = formula.torque(at)
+                on_motor[:, axis] += more
+                on_joint[:, self.joints[axis]] += joint_more
+        rates = np.empty_like(state)
+        rates[:, : self.moving] = state[:, self.moving :]
+        _, _, motor_rate, joint_rate = self._parts(rates)
+        motor_rate[:] = on_motor / self.inertia
+        turned, speed = joint + self.zero, np.ascontiguousarray(joint_speed)
+        # It takes a column for every run.
+        solved = np.empty_like(turned)
+        pinocchio.abaInParallel(1, self.pool, turned.T, speed.T, on_joint.T, solved.T)
+        joint_rate[:] = solved
+        return rates
