@@ -20,16 +20,16 @@ from axisight.gap.inverse import predicted_torque
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
-from axisight.gap.noise import Floor, position_noise_std, segment_of, torque_density
 from axisight.gap.own_controller import other_controllers
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
+from axisight.gap.simulated import noise_torques, simulated_torques
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
+from axisight.gap.tracking_weights import TrackingWeights, passed, tracking_floor
 from axisight.gap.view import View
 from axisight.logs import Log, differentiate
 from axisight.robot import Robot
-from axisight.simulation import simulate_batch, white_noise
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -110,12 +110,16 @@ class ClosedLoopView(View):
     def weighting_with(self, torque_nm: Array) -> Weighting:
         """Return the weights that there would be with one more log, of this torque (n, n_axes)."""
         torques = [*(log.torque_nm for log in self.logs), torque_nm]
-        torque = _mean_density(torques, self.logs[0])
-        floor = self.floor
-        total = _total_density(
-            self.tracking, self._noisy, floor.frequency_hz, floor.noise, torque, self.settings
+        floor, own = self.floor, self._noisy
+        weights = TrackingWeights(
+            self.tracking,
+            own,
+            floor.frequency_hz,
+            floor.position_std_rad,
+            floor.noise,
+            self.settings.model_error,
         )
-        return replace(self.floor.weighting, weight=1.0 / np.sqrt(total))
+        return replace(floor.weighting, weight=weights.of(torques, self.logs[0]))
 
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
@@ -175,8 +179,8 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
         return predicted_torque(tracking.with_effects([]), AS_GIVEN, at)
 
     friction = sure_friction_nm(slow, rigid)
-    passed = _passed(tracking, weighting.frequency_hz)
-    weighting = replace(weighting, weight=weighting.weight * passed)
+    weight = weighting.weight * passed(tracking, weighting.frequency_hz)
+    weighting = replace(weighting, weight=weight)
     out = []
     for speed in speeds:
         left_open = open_errors(speed, friction, weighting, step_s)
@@ -304,118 +308,3 @@ class ClosedLoopFitter(ModelFitter):
             courses=near,
             cancel=self.cancel,
         )
-
-
-def simulated_torques(
-    robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
-) -> list[Array]:
-    """Return the commanded torque (n, n_axes) [Nm] of a simulator along the references of logs.
-
-    Where the simulation fails (an unstable model), the rest is NaN.
-    """
-    changed = robot.with_parameters(variant.robot_values)
-    return _along(changed, logs, threads, effects=variant.effects)
-
-
-def _along(
-    robot: Robot,
-    logs: Sequence[Log],
-    threads: int,
-    *,
-    effects: Sequence[Effect] = (),
-    noise: Sequence[Array] | None = None,
-) -> list[Array]:
-    """Return the torque commanded along the references of logs, which may differ in length."""
-    references = _padded([_reference(log) for log in logs])
-    out = simulate_batch(
-        robot,
-        references,
-        effects=effects,
-        method="rk4",
-        noise=None if noise is None else _padded(noise),
-        threads=threads,
-    )
-    torque = out["torque_cmd_nm"].values
-    return [torque[i, : log.n_samples] for i, log in enumerate(logs)]
-
-
-def _padded(rows: Sequence[Array]) -> Array:
-    """Stack arrays (n, n_axes), zeros after the end of the shorter ones."""
-    longest = max(len(row) for row in rows)
-    return np.stack([np.pad(row, ((0, longest - len(row)), (0, 0))) for row in rows])
-
-
-def _reference(log: Log) -> Array:
-    if log.velocity_ref_rad_s is None:
-        raise InputError(f"log {log.name!r}: expected velocity references")
-    return log.velocity_ref_rad_s
-
-
-def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Settings) -> Floor:
-    """Return the floor of the feedback that keeps a simulator on logs, and the weights it implies.
-
-    ``tracking`` has the controller that keeps it there, ``own`` the machine's. Noise is simulated
-    in the loop. Errors of formulas are a share of the torque as the machine's own controller would
-    command it: they pass the loop as any torque on the motor does.
-    """
-    nominal = own.position_noise_std
-    std = np.maximum(position_noise_std(logs), nominal)
-    log = logs[0]
-    (noise,) = noise_torques(tracking, [log], std, settings.seed)
-    rate, segment = 1.0 / log.sample_time_s, segment_of(log)
-    f, noise_density = torque_density(noise, rate, segment)
-    torque = _mean_density([x.torque_nm for x in logs], log)
-    total = _total_density(tracking, own, f, noise_density, torque, settings)
-    decimation = max(1, int(rate / (2 * settings.bandwidth_hz)))
-    weighting = Weighting(f, 1.0 / np.sqrt(total), decimation)
-    band = f <= rate / (2 * decimation)
-    expected = np.mean((noise_density / total)[:, band], axis=1)
-    return Floor(std, f, noise_density, weighting, expected)
-
-
-def _mean_density(torques: Sequence[Array], like: Log) -> Array:
-    """Return the mean density of torques (n_axes, n_freq), averaged over segments as those of a log."""
-    rate, segment = 1.0 / like.sample_time_s, segment_of(like)
-    return np.asarray(np.mean([torque_density(x, rate, segment)[1] for x in torques], axis=0))
-
-
-def _total_density(
-    tracking: Robot,
-    own: Robot,
-    frequency_hz: Array,
-    noise: Array,
-    torque: Array,
-    settings: Settings,
-) -> Array:
-    """Return the density of noise and of errors of formulas (n_axes, n_freq) at a density of torque."""
-    passed = _passed(tracking, frequency_hz) / _passed(own, frequency_hz)
-    total = noise + settings.model_error**2 * torque * passed**2
-    # A noise-free simulated log still needs a finite weight.
-    return np.asarray(np.maximum(total, 1e-12 * torque.max()))
-
-
-def _passed(robot: Robot, frequency_hz: Array) -> Array:
-    """Return the share of a torque on the motor that the loop answers with (n_axes, n_freq)."""
-    _, from_torque = loop_responses(robot, frequency_hz)
-    return np.asarray(np.abs(np.einsum("fii->if", from_torque)))
-
-
-def noise_torques(
-    robot: Robot,
-    logs: Sequence[Log],
-    std_rad: Array,
-    seed: int,
-    first_run: int = 0,
-    *,
-    threads: int = 0,
-) -> list[Array]:
-    """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log."""
-    noise = [
-        white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
-        for i, log in enumerate(logs)
-    ]
-    # With noise and without in one batch: they run in lock-step.
-    both = [np.zeros_like(x) for x in noise] + noise
-    torques = _along(robot, [*logs, *logs], threads, noise=both)
-    clean, noisy = torques[: len(logs)], torques[len(logs) :]
-    return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]

@@ -57,6 +57,22 @@ def segment_of(log: Log) -> int:
     return min(_SEGMENT, log.n_samples // 2)
 
 
+# Neighbouring frequencies that a density of noise is averaged over.
+_NEIGHBOURS = 51
+
+
+def smoothed(density: Array, shape: Array) -> Array:
+    """Return a sampled density (n_axes, n_freq) with a smooth ratio to one of about its ``shape``.
+
+    A density of few segments is off by a quarter at every frequency. Weights by its inverse would count
+    noise most where it is said too small, and that noise alone leaves more than it is said to.
+    """
+    ratio = density / shape
+    # Without its mean a segment has next to nothing at the first frequencies.
+    ratio[:, :2] = ratio[:, 2:3]
+    return np.asarray(shape * scipy.ndimage.uniform_filter1d(ratio, _NEIGHBOURS, mode="nearest"))
+
+
 def torque_density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
     """Return frequencies and density (n_axes, n_freq), scaled so that white noise has its variance."""
     f, density = scipy.signal.welch(x, rate, nperseg=segment, axis=0, detrend="constant")

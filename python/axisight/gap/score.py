@@ -18,17 +18,47 @@ def held_out_loss(evidence: Evidence) -> Array:
     (one Gauss-Newton step from the common fit, exact for a model linear in its
     parameters), and its blocks are scored. With a single log, its blocks are
     left out in five interleaved groups instead.
+
+    A log that alone tells of an effect is left out in stretches: what others make of it is no more
+    than their noise.
     """
-    groups = evidence.log
-    if len(np.unique(groups)) == 1:
-        position = np.arange(len(groups))
-        groups = position % 5
+    groups = _groups(evidence)
     out = np.zeros(len(evidence.loss))
     for group in np.unique(groups):
         inside = groups == group
         step = step_without(evidence, inside)
         out[inside] = predicted_loss(evidence, inside, step)
     return out
+
+
+# Share of what all logs tell of an effect's parameter from which a log is alone with it.
+_ALONE = 0.9
+# Stretches of time of such a log.
+_STRETCHES = 4
+# Groups of a single log.
+_INTERLEAVED = 5
+
+
+def _groups(evidence: Evidence) -> NDArray[np.int64]:
+    """Return the number of the group (n_blocks,) that each block is left out with."""
+    logs, number = np.unique(evidence.log, return_inverse=True)
+    if len(logs) == 1:
+        return np.arange(len(number)) % _INTERLEAVED
+    groups = number * _STRETCHES
+    for log in _alone(evidence, number):
+        for axis in np.unique(evidence.axis):
+            # Blocks of an axis of a log stand in the order of time.
+            here = np.flatnonzero((number == log) & (evidence.axis == axis))
+            groups[here] += np.arange(len(here)) * _STRETCHES // max(len(here), 1)
+    return groups
+
+
+def _alone(evidence: Evidence, number: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the numbers of the logs that tell nearly all there is of some parameter of an effect."""
+    effects = [i for i, (place, _) in enumerate(evidence.parameters) if place is not None]
+    told = np.einsum("bii->bi", evidence.matrix)[:, effects]
+    by_log = np.array([told[number == k].sum(axis=0) for k in range(number.max() + 1)])
+    return np.flatnonzero((by_log > _ALONE * by_log.sum(axis=0)).any(axis=1))
 
 
 def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:

@@ -336,10 +336,12 @@ class Trials:
         """Return the leaders that explain anything, not done yet, where it is not clear which leads.
 
         An effect is judged on its own axis: how it fares on others says little of what it would be
-        with the simulator's sensitivities its own.
+        with the simulator's sensitivities its own. Unless it leads there: on others it is held against
+        rivals that were refined.
         """
         out = []
         standings = self.standings(trials)
+        leaders = {s.best.trial.label for s in standings}
         for standing in standings if even_felt else self._not_felt(standings, trials):
             leader = standing.best
             gain = leader.gain * self.layout.samples()[standing.axis]
@@ -352,9 +354,10 @@ class Trials:
                 # What began where the leader ended is it at its limits, until its own fit says no.
                 rivals = tuple(r for r in standing.ranked if r.trial.label in self.usual)
             for r in rivals:
-                here = r.trial.candidate.effect.axis in (None, standing.axis + 1)
+                place, label = r.trial.candidate.effect.axis, r.trial.label
+                here = place in (None, standing.axis + 1) or label in leaders
                 near = r.score > max(0.5 * self.settings.smallest_score, close * leader.score)
-                if here and near and r.trial.label not in self.done and r.trial not in out:
+                if here and near and label not in self.done and r.trial not in out:
                     out.append(r.trial)
         return out
 
@@ -422,8 +425,17 @@ def _clear(standing: Standing) -> bool:
     leader = standing.best
     if len(standing.inseparable()) > 1 or standing.p_unknown > leader.probability:
         return False
-    alone = all(r.score < _CLOSE * leader.score for r in standing.ranked[1:])
+    close = [r for r in standing.ranked[1:] if r.score >= _CLOSE * leader.score]
+    # What needs fewer numbers may catch up where its fit has not settled.
+    if any(r.trial.cost < leader.trial.cost and not _is_settled(r.trial) for r in close):
+        return False
+    alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
+
+
+def _is_settled(one: Trial) -> bool:
+    """Whether a step from where its fit ended promises next to nothing."""
+    return linear_gain(one.evidence) < _SETTLED * one.evidence.total
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

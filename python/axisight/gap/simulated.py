@@ -1,0 +1,83 @@
+"""Torques of simulators in closed loop, along the references of logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.gap.torques import Variant
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import simulate_batch, white_noise
+
+Array = NDArray[np.float64]
+
+
+def simulated_torques(
+    robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
+) -> list[Array]:
+    """Return the commanded torque (n, n_axes) [Nm] of a simulator along the references of logs.
+
+    Where the simulation fails (an unstable model), the rest is NaN.
+    """
+    changed = robot.with_parameters(variant.robot_values)
+    return _along(changed, logs, threads, effects=variant.effects)
+
+
+def _along(
+    robot: Robot,
+    logs: Sequence[Log],
+    threads: int,
+    *,
+    effects: Sequence[Effect] = (),
+    noise: Sequence[Array] | None = None,
+) -> list[Array]:
+    """Return the torque commanded along the references of logs, which may differ in length."""
+    references = _padded([_reference(log) for log in logs])
+    out = simulate_batch(
+        robot,
+        references,
+        effects=effects,
+        method="rk4",
+        noise=None if noise is None else _padded(noise),
+        threads=threads,
+    )
+    torque = out["torque_cmd_nm"].values
+    return [torque[i, : log.n_samples] for i, log in enumerate(logs)]
+
+
+def _padded(rows: Sequence[Array]) -> Array:
+    """Stack arrays (n, n_axes), zeros after the end of the shorter ones."""
+    longest = max(len(row) for row in rows)
+    return np.stack([np.pad(row, ((0, longest - len(row)), (0, 0))) for row in rows])
+
+
+def _reference(log: Log) -> Array:
+    if log.velocity_ref_rad_s is None:
+        raise InputError(f"log {log.name!r}: expected velocity references")
+    return log.velocity_ref_rad_s
+
+
+def noise_torques(
+    robot: Robot,
+    logs: Sequence[Log],
+    std_rad: Array,
+    seed: int,
+    first_run: int = 0,
+    *,
+    threads: int = 0,
+) -> list[Array]:
+    """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log."""
+    noise = [
+        white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
+        for i, log in enumerate(logs)
+    ]
+    # With noise and without in one batch: they run in lock-step.
+    both = [np.zeros_like(x) for x in noise] + noise
+    torques = _along(robot, [*logs, *logs], threads, noise=both)
+    clean, noisy = torques[: len(logs)], torques[len(logs) :]
+    return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]

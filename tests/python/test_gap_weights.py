@@ -1,0 +1,83 @@
+"""The floor of a simulator that is kept on logs, and what in a torque answers noise."""
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.evidence import FreeEffect
+from axisight.gap.noise import segment_of, smoothed, torque_density
+from axisight.gap.tracking_weights import TrackingWeights
+from gap_data import PLAN, bare_axis, logs_of
+
+# Bounded moves: above ten hertz or so their torque is what the controller makes of the sensor's noise.
+MOVES = {"moves": ("moves", 0), "again": ("moves", 1)}
+LAG_S = 1e-3
+
+
+def test_weights_by_few_segments_count_no_noise_more_than_other_noise():
+    """A density of ``k`` degrees of freedom: its inverse is too large by k / (k - 2) on average."""
+    rng, k = np.random.default_rng(0), 10
+    shape = 1.0 + np.cos(np.linspace(0, 3, 400)) ** 2
+    sampled = np.array([shape * rng.chisquare(k, 400) / k for _ in range(200)])
+    by_itself = np.mean(shape / sampled)
+    by_neighbours = np.mean(shape / smoothed(sampled, np.tile(shape, (200, 1))))
+    assert by_itself == pytest.approx(k / (k - 2), rel=0.02)
+    # Of 51 neighbours: 1 + 2 / (51 k), more at the ends, where fewer of them are new.
+    assert by_neighbours == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_smooth_ratio_to_the_shape_stays():
+    f = np.linspace(0, 1, 1025)
+    shape = np.tile(1.0 + 50 * np.exp(-(((f - 0.2) / 0.01) ** 2)), (2, 1))
+    density = shape * (1.0 + 0.3 * f)
+    assert smoothed(density, shape) == pytest.approx(density, rel=0.01)
+
+
+@pytest.mark.parametrize("seconds", [3.0, 10.0])
+def test_noise_leaves_what_it_is_said_to(seconds: float):
+    """Of a simulator that is the machine.
+
+    Its few thousand residuals, half of them of little weight, and the noise that the floor was taken from
+    have 5 % of deviation together.
+    """
+    robot = bare_axis()
+    view = ClosedLoopView(robot, logs_of(robot, [], PLAN, seconds), Settings())
+    found = view.fitter.fit([], max_iterations=0)
+    left = found.loss.sum() / found.samples.sum()
+    assert left == pytest.approx(view.floor.expected[0], rel=0.15)
+
+
+def fitted_lag(view: ClosedLoopView) -> float:
+    begin = FreeEffect(
+        Effect("actuator_bandwidth", 1, {"time_constant_s": LAG_S / 2}), ("time_constant_s",)
+    )
+    return view.fitter.fit([begin], refreshes=1).effects[0].values()[0]
+
+
+def test_answers_to_noise_do_not_tell_of_the_machine(monkeypatch: pytest.MonkeyPatch):
+    """A drive's lag in moves: fitted to all of the torque it is off by an eighth, and says it is sure."""
+    robot = bare_axis()
+    lag = Effect("actuator_bandwidth", 1, {"time_constant_s": LAG_S})
+    logs = logs_of(robot, [lag], MOVES)
+    found = fitted_lag(ClosedLoopView(robot, logs, Settings()))
+    monkeypatch.setattr(TrackingWeights, "driven", lambda _, torque: np.ones_like(torque))
+    biased = fitted_lag(ClosedLoopView(robot, logs, Settings()))
+    assert abs(biased / LAG_S - 1) > 0.1
+    assert abs(found / LAG_S - 1) < 0.5 * abs(biased / LAG_S - 1)
+
+
+def test_what_the_references_drive_is_told_from_answers_to_noise():
+    """Multisines to 40 Hz: there the torque is driven; far above it is what the noise makes of it."""
+    robot = bare_axis()
+    logs = logs_of(robot, [], {"one": ("multisine", 1), "two": ("multisine", 2)})
+    floor = ClosedLoopView(robot, logs, Settings()).floor
+    f = floor.frequency_hz
+    weights = TrackingWeights(robot, robot, f, floor.position_std_rad, floor.noise, 0.01)
+    rate, segment = 1 / robot.sample_time_s, segment_of(logs[0])
+    torque = np.mean([torque_density(x.torque_nm, rate, segment)[1] for x in logs], axis=0)
+    share = weights.driven(torque)[0]
+    assert share[(f > 2) & (f < 38)].min() > 0.9
+    assert np.median(share[(f > 60) & (f < 120)]) < 0.1
+    # Weight and other slow torque count, whatever the density of segments without their mean says.
+    assert share[0] == 1.0
