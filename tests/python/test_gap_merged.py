@@ -31,7 +31,12 @@ def found(real: list[Effect], free: list[FreeEffect]) -> tuple[Evidence, str | N
     model = view.fitter.fit(free)
     floor = view.floor.expected[model.axis] * model.size
     one = one_for_several(
-        view.fitter, model, view.candidates(model), floor, layout_of(model), view.settings
+        view.fitter,
+        model,
+        view.candidates(model, axes=[1]),
+        floor,
+        layout_of(model),
+        view.settings,
     )
     return model, None if one is None else one[0].trial.label
 

@@ -71,7 +71,8 @@ def test_where_a_screen_has_all_data_candidates_are_fitted_to_it(view, whole, fr
     fitted = tryout.ended(begun)
     direct = view.fitter.fit([friction], whole, lazy=True)
     assert fitted is not None
-    assert fitted.evidence.total == pytest.approx(direct.total, rel=1e-3)
+    # Both end where a step promises less than a thousandth.
+    assert fitted.evidence.total == pytest.approx(direct.total, rel=2e-3)
 
 
 def test_what_stands_elsewhere_stays_as_it_is(view, whole, friction, screen):
