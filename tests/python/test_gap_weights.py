@@ -48,6 +48,18 @@ def test_noise_leaves_what_it_is_said_to(seconds: float):
     assert left == pytest.approx(view.floor.expected[0], rel=0.15)
 
 
+def test_logs_may_be_shorter_than_the_segments_of_others():
+    robot = bare_axis()
+    (long,) = logs_of(robot, [], {"multisine": ("multisine", 1)}, 3.0)
+    (short,) = logs_of(robot, [], {"moves": ("moves", 0)}, 0.6)
+    floors = [
+        ClosedLoopView(robot, list(x), Settings()).floor for x in ((long, short), (short, long))
+    ]
+    assert floors[0].frequency_hz == pytest.approx(floors[1].frequency_hz)
+    # Of the same torques; noise is drawn by the place of a log.
+    assert floors[0].expected == pytest.approx(floors[1].expected, rel=0.3)
+
+
 def fitted_lag(view: ClosedLoopView) -> float:
     begin = FreeEffect(
         Effect("actuator_bandwidth", 1, {"time_constant_s": LAG_S / 2}), ("time_constant_s",)

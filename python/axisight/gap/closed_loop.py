@@ -26,7 +26,7 @@ from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques, simulated_torques
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
-from axisight.gap.tracking_weights import TrackingWeights, passed, tracking_floor
+from axisight.gap.tracking_weights import TrackingWeights, passed, shortest, tracking_floor
 from axisight.gap.view import View
 from axisight.logs import Log, differentiate
 from axisight.robot import Robot
@@ -119,7 +119,7 @@ class ClosedLoopView(View):
             floor.noise,
             self.settings.model_error,
         )
-        return replace(floor.weighting, weight=weights.of(torques, self.logs[0]))
+        return replace(floor.weighting, weight=weights.of(torques, shortest(self.logs)))
 
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""

@@ -35,17 +35,22 @@ def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Setti
     in the loop.
     """
     std = np.maximum(position_noise_std(logs), own.position_noise_std)
-    log = logs[0]
+    like = shortest(logs)
     torques = noise_torques(tracking, logs[:_SIMULATED], std, settings.seed)
-    f, sampled = _density(torques, log)
+    f, sampled = _density(torques, like)
     noise = smoothed(sampled, answer(tracking, f, std))
-    rate = 1.0 / log.sample_time_s
+    rate = 1.0 / like.sample_time_s
     decimation = max(1, int(rate / (2 * settings.bandwidth_hz)))
     band = f <= rate / (2 * decimation)
     weights = TrackingWeights(tracking, own, f, std, noise, settings.model_error)
-    weight = weights.of([x.torque_nm for x in logs], log)
+    weight = weights.of([x.torque_nm for x in logs], like)
     expected = np.mean((noise * weight**2)[:, band], axis=1)
     return Floor(std, f, noise, Weighting(f, weight, decimation), expected)
+
+
+def shortest(logs: Sequence[Log]) -> Log:
+    """Return the log whose segments all others have too."""
+    return min(logs, key=lambda log: log.n_samples)
 
 
 class TrackingWeights:
