@@ -35,6 +35,31 @@ def test_held_out_loss_is_that_of_refitting_without_the_log(regression):
         )
 
 
+def test_a_log_that_alone_tells_of_an_effect_is_left_out_in_stretches(regression):
+    """What the others tell of it is a hundredth and their noise: held against that, the truth loses."""
+    x, y, log = regression
+    x = x.copy()
+    x[log != 1, 2] *= 1e-4
+    y = y - regression[0] @ [0, 0, 0.5] + x @ [0, 0, 0.5]
+    own = linear_evidence(x, y, log)
+    alone = replace(own, parameters=(*own.parameters[:2], (0, "size")))
+    held = held_out_loss(alone)
+    blocks = np.repeat(np.arange(3), 10)
+    for stretch in range(4):
+        # Ten blocks of twenty in four stretches of time: three, two, three and two.
+        mine = 10 + np.flatnonzero(np.arange(10) * 4 // 10 == stretch)
+        inside = np.isin(np.arange(600) // 20, mine)
+        theta = np.linalg.lstsq(x[~inside], y[~inside], rcond=None)[0]
+        brute = ((x[inside] @ theta - y[inside]) ** 2).sum()
+        np.testing.assert_allclose(held[mine].sum(), brute, rtol=1e-5)
+    noise = 0.3**2 * 200
+    assert held[blocks == 1].sum() == pytest.approx(noise, rel=0.2)
+    # Of the simulator's own parameters, which have tolerances, every log is left out as a whole.
+    assert held_out_loss(own)[blocks == 1].sum() > 10 * noise
+    # The other logs are left out whole either way.
+    np.testing.assert_allclose(held[blocks != 1], held_out_loss(own)[blocks != 1], rtol=1e-12)
+
+
 def test_linear_gain_is_what_least_squares_gains(regression):
     x, y, log = regression
     evidence = linear_evidence(x, y, log)
