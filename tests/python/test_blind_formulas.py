@@ -190,7 +190,7 @@ def test_a_lever_with_play_moves_as_scipy_says():
     width, values = 2e-4, {k.partition(".")[2]: v for k, v in robot.parameters().items()}
     loop = _Loop(Machine(robot, laws={0: [Play(width)]}), 1)
     loop.follow(np.zeros((100, 1, 1)), np.zeros((100, 1, 1)))
-    state = np.array([float(x[0, 0]) for x in loop.state])
+    state = loop.state[0].copy()
     torque, angle = loop.follow(reference[:, None, :], np.zeros((360, 1, 1)))
     # One equation of motion, written out: a mass on a lever, its inertia about the mass.
     ratio, mass, arm = float(robot.gear_ratio[0]), values["mass"], values["com_x"]

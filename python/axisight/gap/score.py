@@ -54,11 +54,15 @@ def _groups(evidence: Evidence) -> NDArray[np.int64]:
 
 
 def _alone(evidence: Evidence, number: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the numbers of the logs that tell nearly all there is of some parameter of an effect."""
+    """Return the numbers of the logs that tell nearly all there is of every parameter of the effects.
+
+    Of every one: a law that only adds a number to another is judged as that other is.
+    """
     effects = [i for i, (place, _) in enumerate(evidence.parameters) if place is not None]
     told = np.einsum("bii->bi", evidence.matrix)[:, effects]
     by_log = np.array([told[number == k].sum(axis=0) for k in range(number.max() + 1)])
-    return np.flatnonzero((by_log > _ALONE * by_log.sum(axis=0)).any(axis=1))
+    every = (by_log > _ALONE * by_log.sum(axis=0)).all(axis=1)
+    return np.flatnonzero(every) if effects else np.zeros(0, dtype=np.int64)
 
 
 def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
