@@ -36,7 +36,7 @@ def test_held_out_loss_is_that_of_refitting_without_the_log(regression):
 
 
 def test_a_log_that_alone_tells_of_an_effect_is_left_out_in_stretches(regression):
-    """What the others tell of it is a hundredth and their noise: held against that, the truth loses."""
+    """What the others tell of it is their noise: held against that, the truth loses."""
     x, y, log = regression
     x = x.copy()
     x[log != 1, 2] *= 1e-4
@@ -56,6 +56,9 @@ def test_a_log_that_alone_tells_of_an_effect_is_left_out_in_stretches(regression
     assert held[blocks == 1].sum() == pytest.approx(noise, rel=0.2)
     # Of the simulator's own parameters, which have tolerances, every log is left out as a whole.
     assert held_out_loss(own)[blocks == 1].sum() > 10 * noise
+    # One that has another number besides, which every log tells, is judged as that other is.
+    more = replace(own, parameters=(own.parameters[0], (0, "other"), (0, "size")))
+    np.testing.assert_array_equal(held_out_loss(more), held_out_loss(own))
     # The other logs are left out whole either way.
     np.testing.assert_allclose(held[blocks != 1], held_out_loss(own)[blocks != 1], rtol=1e-12)
 

@@ -7,7 +7,7 @@ from axisight import Effect, Settings
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.noise import segment_of, smoothed, torque_density
-from axisight.gap.tracking_weights import TrackingWeights
+from axisight.gap.tracking_weights import TrackingWeights, tracking_floor
 from gap_data import PLAN, bare_axis, logs_of
 
 # Bounded moves: above ten hertz or so their torque is what the controller makes of the sensor's noise.
@@ -83,9 +83,8 @@ def test_what_the_references_drive_is_told_from_answers_to_noise():
     """Multisines to 40 Hz: there the torque is driven; far above it is what the noise makes of it."""
     robot = bare_axis()
     logs = logs_of(robot, [], {"one": ("multisine", 1), "two": ("multisine", 2)})
-    floor = ClosedLoopView(robot, logs, Settings()).floor
+    floor, weights = tracking_floor(robot, robot, logs, Settings())
     f = floor.frequency_hz
-    weights = TrackingWeights(robot, robot, f, floor.position_std_rad, floor.noise, 0.01)
     rate, segment = 1 / robot.sample_time_s, segment_of(logs[0])
     torque = np.mean([torque_density(x.torque_nm, rate, segment)[1] for x in logs], axis=0)
     share = weights.driven(torque)[0]

@@ -22,8 +22,10 @@ from axisight.errors import InputError
 from axisight.storage import write_whole
 
 Array = NDArray[np.float64]
+# Torque and angle along references.
+Logs = list[tuple[Array, Array]]
 # Of an engine: machine, references and noises of its runs to torques and angles.
-Run = Callable[[Machine, Sequence[Array], Sequence[Array]], list[tuple[Array, Array]]]
+Run = Callable[[Machine, Sequence[Array], Sequence[Array]], Logs]
 
 
 # Draws until a machine works.
@@ -70,11 +72,7 @@ def _engine(name: str) -> Run:
     return import_module(f"axisight.blind.{name}_engine").run  # type: ignore[no-any-return]
 
 
-_Logs = list[tuple[Array, Array]]
-"""Torque and angle along references."""
-
-
-def _runs(drawn: Draw, seed: int) -> tuple[_Logs, _Logs] | None:
+def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
     """Return the logs, and the validation ones without noise; None of a machine that nobody would run.
 
     An effect may take the loop beyond its margin: it swings without end.
@@ -99,7 +97,7 @@ def _validation(drawn: Draw) -> list[Array]:
     return [x for role, x in drawn.references.values() if role == "validation"]
 
 
-def _write(folder: Path, truth: Path, drawn: Draw, runs: tuple[_Logs, _Logs], seed: int) -> None:
+def _write(folder: Path, truth: Path, drawn: Draw, runs: tuple[Logs, Logs], seed: int) -> None:
     case = CaseFolder(folder, folder.name)
     logs, quiet = runs
     for (name, (role, reference)), log in zip(drawn.references.items(), logs, strict=True):
@@ -128,7 +126,7 @@ def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
     }
 
 
-def _severity(drawn: Draw, with_it: _Logs) -> list[float]:
+def _severity(drawn: Draw, with_it: Logs) -> list[float]:
     """Return rms torque change by all effects over rms torque noise, largest validation log, by axis."""
     robot = drawn.robot
     if not drawn.effects:

@@ -26,7 +26,7 @@ from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques, simulated_torques
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
-from axisight.gap.tracking_weights import TrackingWeights, passed, shortest, tracking_floor
+from axisight.gap.tracking_weights import passed, shortest, tracking_floor
 from axisight.gap.view import View
 from axisight.logs import Log, differentiate
 from axisight.robot import Robot
@@ -64,7 +64,7 @@ class ClosedLoopView(View):
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
         self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
-        floor = tracking_floor(self.tracking, self._noisy, logs, settings)
+        floor, self._weights = tracking_floor(self.tracking, self._noisy, logs, settings)
         # A torque reported after the limit is what the motor got: it needs no limit once more.
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
@@ -110,16 +110,8 @@ class ClosedLoopView(View):
     def weighting_with(self, torque_nm: Array) -> Weighting:
         """Return the weights that there would be with one more log, of this torque (n, n_axes)."""
         torques = [*(log.torque_nm for log in self.logs), torque_nm]
-        floor, own = self.floor, self._noisy
-        weights = TrackingWeights(
-            self.tracking,
-            own,
-            floor.frequency_hz,
-            floor.position_std_rad,
-            floor.noise,
-            self.settings.model_error,
-        )
-        return replace(floor.weighting, weight=weights.of(torques, shortest(self.logs)))
+        weight = self._weights.of(torques, shortest(self.logs))
+        return replace(self.floor.weighting, weight=weight)
 
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""

@@ -57,6 +57,8 @@ def segment_of(log: Log) -> int:
     return min(_SEGMENT, log.n_samples // 2)
 
 
+SLOW = 2
+"""First frequencies of a density of segments without their mean, which has next to nothing there."""
 # Neighbouring frequencies that a density of noise is averaged over.
 _NEIGHBOURS = 51
 
@@ -68,8 +70,7 @@ def smoothed(density: Array, shape: Array) -> Array:
     noise most where it is said too small, and that noise alone leaves more than it is said to.
     """
     ratio = density / shape
-    # Without its mean a segment has next to nothing at the first frequencies.
-    ratio[:, :2] = ratio[:, 2:3]
+    ratio[:, :SLOW] = ratio[:, [SLOW]]
     return np.asarray(shape * scipy.ndimage.uniform_filter1d(ratio, _NEIGHBOURS, mode="nearest"))
 
 

@@ -49,7 +49,7 @@ def _groups(evidence: Evidence) -> NDArray[np.int64]:
         for axis in np.unique(evidence.axis):
             # Blocks of an axis of a log stand in the order of time.
             here = np.flatnonzero((number == log) & (evidence.axis == axis))
-            groups[here] += np.arange(len(here)) * _STRETCHES // max(len(here), 1)
+            groups[here] += np.arange(len(here)) * _STRETCHES // len(here)
     return groups
 
 

@@ -9,27 +9,28 @@ from numpy.typing import NDArray
 
 from axisight.fitting import Weighting
 from axisight.gap.feedback import loop_responses
-from axisight.gap.noise import Floor, position_noise_std, segment_of, smoothed, torque_density
+from axisight.gap.noise import SLOW, Floor, position_noise_std, segment_of, smoothed, torque_density
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques
 from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 # Logs along which noise is simulated: with noise and without they fill the lanes of one simulation.
 _SIMULATED = 2
 # Share of the torque that is taken as driven by the references at least: a weight stays above zero.
 _LEAST_DRIVEN = 1e-3
-# Times the answer to noise, as a linear loop without lags gives it, that counts as answer. Lags amplify it
-# by up to a fifth, and the density of the torque is an average of few: half driven is none.
+# Times the answer to noise, as a linear loop without lags gives it, that counts as answer. A lag of a
+# millisecond amplifies it by a fifth, and the density of the torque is an average of few: half driven is none.
 _AS_ANSWER = 2.0
-# Frequencies where a density of segments without their mean is next to nothing: weight and other slow torque.
-_SLOW = 2
 
 
-def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Settings) -> Floor:
-    """Return the floor of the feedback that keeps a simulator on logs, and the weights it implies.
+def tracking_floor(
+    tracking: Robot, own: Robot, logs: list[Log], settings: Settings
+) -> tuple[Floor, TrackingWeights]:
+    """Return the floor of the feedback that keeps a simulator on logs, and what its weights come from.
 
     ``tracking`` has the controller that keeps it there, ``own`` the machine's. Noise is simulated
     in the loop.
@@ -38,14 +39,13 @@ def tracking_floor(tracking: Robot, own: Robot, logs: list[Log], settings: Setti
     like = shortest(logs)
     torques = noise_torques(tracking, logs[:_SIMULATED], std, settings.seed)
     f, sampled = _density(torques, like)
-    noise = smoothed(sampled, answer(tracking, f, std))
+    weights = TrackingWeights(tracking, own, f, std, sampled, settings.model_error)
     rate = 1.0 / like.sample_time_s
     decimation = max(1, int(rate / (2 * settings.bandwidth_hz)))
     band = f <= rate / (2 * decimation)
-    weights = TrackingWeights(tracking, own, f, std, noise, settings.model_error)
     weight = weights.of([x.torque_nm for x in logs], like)
-    expected = np.mean((noise * weight**2)[:, band], axis=1)
-    return Floor(std, f, noise, Weighting(f, weight, decimation), expected)
+    expected = np.mean((weights.noise * weight**2)[:, band], axis=1)
+    return Floor(std, f, weights.noise, Weighting(f, weight, decimation), expected), weights
 
 
 def shortest(logs: Sequence[Log]) -> Log:
@@ -56,9 +56,10 @@ def shortest(logs: Sequence[Log]) -> Log:
 class TrackingWeights:
     """Weights by the density of noise and of errors of formulas, and by what the torque tells.
 
-    ``std_rad`` (n_axes,) of the noise of the sensors, ``noise`` (n_axes, n_freq) what the loop that keeps the
-    simulator on a log makes of it. Errors of formulas are a share ``model_error`` of the torque as the
-    machine's own controller would command it: they pass the loop as any torque on the motor does.
+    ``std_rad`` (n_axes,) of the noise of the sensors, ``sampled`` (n_axes, n_freq) the density of what the
+    loop that keeps the simulator on a log makes of it in a simulation, ``noise`` the same smoothed. Errors
+    of formulas are a share ``model_error`` of the torque as the machine's own controller would
+    command it: they pass the loop as any torque on the motor does.
     """
 
     def __init__(
@@ -67,12 +68,15 @@ class TrackingWeights:
         own: Robot,
         frequency_hz: Array,
         std_rad: Array,
-        noise: Array,
+        sampled: Array,
         model_error: float,
     ) -> None:
-        self.noise, self.model_error = noise, model_error
-        self._passed = passed(tracking, frequency_hz) / passed(own, frequency_hz)
-        self._answer = answer(own, frequency_hz, std_rad)
+        self.model_error = model_error
+        from_angle, kept = loop_responses(tracking, frequency_hz)
+        self.noise = smoothed(sampled, _answer(from_angle, std_rad))
+        from_angle, commanded = loop_responses(own, frequency_hz)
+        self._passed = _of_axes(kept) / _of_axes(commanded)
+        self._answer = _answer(from_angle, std_rad)
 
     def of(self, torques: Sequence[Array], like: Log) -> Array:
         """Return the weights (n_axes, n_freq) for logged torques, sampled as a log is."""
@@ -91,7 +95,7 @@ class TrackingWeights:
         the torque is such an answer, it tells nothing of the machine.
         """
         share = 1.0 - _AS_ANSWER * self._answer / np.maximum(torque, 1e-300)
-        share[:, :_SLOW] = 1.0
+        share[:, :SLOW] = 1.0
         return np.asarray(np.clip(share, _LEAST_DRIVEN, 1.0))
 
 
@@ -102,13 +106,16 @@ def _density(torques: Sequence[Array], like: Log) -> tuple[Array, Array]:
     return found[0][0], np.asarray(np.mean([density for _, density in found], axis=0))
 
 
-def answer(robot: Robot, frequency_hz: Array, std_rad: Array) -> Array:
+def _answer(from_angle: Complex, std_rad: Array) -> Array:
     """Return the density of torque that answers noise of the sensors (n_axes, n_freq), all linear."""
-    from_angle, _ = loop_responses(robot, frequency_hz)
     return np.asarray(np.einsum("fij,j->if", np.abs(from_angle) ** 2, std_rad**2))
 
 
 def passed(robot: Robot, frequency_hz: Array) -> Array:
     """Return the share of a torque on the motor that the loop answers with (n_axes, n_freq)."""
     _, from_torque = loop_responses(robot, frequency_hz)
-    return np.asarray(np.abs(np.einsum("fii->if", from_torque)))
+    return _of_axes(from_torque)
+
+
+def _of_axes(response: Complex) -> Array:
+    return np.asarray(np.abs(np.einsum("fii->if", response)))
