@@ -61,7 +61,8 @@ def facts(effect: Mapping[str, Any]) -> str:
         out.append(f"Contains {', '.join(f'`{n}`' for n in effect['contains'])}.")
     if effect["twins"]:
         twins = ", ".join(f"`{n}`" for n in effect["twins"])
-        out.append(f"Commands and motor angles are those of {twins}: no log tells them apart.")
+        alone = "Of an axis alone, commands" if effect["family"] == "timing" else "Commands"
+        out.append(f"{alone} and motor angles are those of {twins}: no log tells them apart.")
     if effect["usual"]:
         usual = ", ".join(f"`{n}`" for n in effect["usual"])
         out.append(

@@ -22,7 +22,14 @@ from axisight.blind import (
     pinocchio_engine,
 )
 from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
-from axisight.blind.formulas import ConstantTorque, DelayLine, Formula, ResonantLoop, RunOut
+from axisight.blind.formulas import (
+    ConstantTorque,
+    DelayLine,
+    Formula,
+    ResonantLoop,
+    RunOut,
+    StaleSensor,
+)
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
 from axisight.blind.make import make_cases
@@ -115,6 +122,7 @@ def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
             Effect("current_loop", 1, {"time_constant_s": 1e-3, "damping": 0.4}),
         ),
         (Native(), [DelayLine(1.2e-3)], Effect("input_delay", 1, {"delay_s": 1.2e-3})),
+        (Native(), [StaleSensor(3)], Effect("sensor_delay", 1, {"delay_s": 1.5e-3})),
         (Native(), [ConstantTorque(0.4)], Effect("torque_offset", 1, {"offset_nm": 0.4})),
         (Native(gear=0.05), [], Effect("torque_constant", 1, {"relative_error": 0.05})),
         (Native(spring=-0.2), [], Effect("joint_stiffness", 1, {"relative_change": -0.2})),

@@ -12,9 +12,9 @@ import numpy as np
 import scipy
 
 from axisight.blind.sealed import SEAL, seal_of
-from axisight.effects import effect_info, effect_table
+from axisight.effects import effect_table
 from axisight.errors import InputError
-from axisight.gap.twins import TWIN_SHARE
+from axisight.gap.twins import TWIN_SHARE, twins_of
 
 SEVERE = 3.0
 """Change of the torque over its noise from which an effect counts as there to be found."""
@@ -159,10 +159,10 @@ _FAILED: dict[str, Any] = {
 }
 
 
-def _as_named(effect: dict[str, Any], named: set[str]) -> dict[str, Any]:
+def _as_named(effect: dict[str, Any], named: set[str], n_axes: int) -> dict[str, Any]:
     """Return a withheld effect as its twin where that is named: their logs are the same."""
     kind = effect["effect"]
-    twins = effect_info(kind).twins if kind in effect_table() else ()
+    twins = twins_of(kind, n_axes) if kind in effect_table() else ()
     as_twins = [{**effect, "effect": name} for name in twins]
     return next((t for t in as_twins if _label(t) in named), effect)
 
@@ -175,7 +175,10 @@ def _setting(name: str, truth: dict[str, Any]) -> dict[str, str]:
 
 
 def _missed(
-    withheld: Sequence[dict[str, Any]], named: set[str], limits: Sequence[dict[str, Any]]
+    withheld: Sequence[dict[str, Any]],
+    named: set[str],
+    limits: Sequence[dict[str, Any]],
+    n_axes: int,
 ) -> dict[str, float]:
     """Return what is not named, with its size over the detection limit said of it."""
     stated = {_label(limit): limit for limit in limits}
@@ -184,7 +187,7 @@ def _missed(
         label, kind = _label(effect), effect["effect"]
         if label not in named and kind in effect_table():
             # A limit of one of twins is that of the other.
-            twins = ({**effect, "effect": name} for name in (kind, *effect_info(kind).twins))
+            twins = ({**effect, "effect": name} for name in (kind, *twins_of(kind, n_axes)))
             limit = next((stated[_label(t)] for t in twins if _label(t) in stated), None)
             out[label] = float("nan") if limit is None else _over(effect["parameters"], limit)
     return out
@@ -200,9 +203,9 @@ def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
     return 0.0 if limit["value"] is None else abs(size) / float(limit["value"])
 
 
-def _said(cause: dict[str, Any]) -> float:
+def _said(cause: dict[str, Any], n_axes: int) -> float:
     """Return the probability said of a cause or a twin of it: they count as one another."""
-    twins = effect_info(cause["effect"]).twins
+    twins = twins_of(cause["effect"], n_axes)
     return float(cause["probability"] / (1 - TWIN_SHARE * len(twins)))
 
 
@@ -210,8 +213,8 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
     if "error" in verdict:
         # What could not be diagnosed counts, and is not right.
         verdict = _FAILED
-    causes = verdict["causes"]
-    withheld = [_as_named(e, {_label(c) for c in causes}) for e in truth["effects"]]
+    causes, n_axes = verdict["causes"], len(truth["severity"])
+    withheld = [_as_named(e, {_label(c) for c in causes}, n_axes) for e in truth["effects"]]
     likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]
     allowed = {_label(x) for x in (*causes, *likely)}
     allowed |= {label for group in verdict["equivalent"] for label in group}
@@ -232,11 +235,11 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         in_library=all(e["effect"] in effect_table() for e in withheld),
         setting=_setting(name, truth),
         reduction=causes[0]["gap_reduction"]["value"] if causes else float("nan"),
-        missed=_missed(withheld, {_label(c) for c in causes}, verdict["detection_limits"]),
+        missed=_missed(withheld, {_label(c) for c in causes}, verdict["detection_limits"], n_axes),
         severity=max(truth["severity"]),
         verdict=verdict["verdict"],
         named=tuple(_label(c) for c in causes),
-        probabilities=tuple(_said(c) for c in causes),
+        probabilities=tuple(_said(c, n_axes) for c in causes),
         allowed=frozenset(allowed),
         where=frozenset(w["axis"] for w in verdict["where"][:1]),
         ratios=tuple(ratios),

@@ -89,7 +89,8 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
     share, slip = between(rng, 0.15, 0.4), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
     stiff = share * scene.stiffness(axis)
     law = formulas.DahlGear(stiff, stiff * slip)
-    values = {"share": share, "deflection_rad": slip}
+    # What slips also as a load is taken off is stated in other numbers than the library's.
+    values = {"dahl_share": share, "dahl_deflection_rad": slip}
     return Drawn("gear_hysteresis", axis, values, Native(spring=-share), [law])
 
 

@@ -70,7 +70,8 @@ def conclude(
     if shown and not accepted:
         ranking = (_candidate_shown(shown[0]),)
         p_none, p_unknown = 0.0, 1.0 - _SHOWN
-    ranking = with_twins(ranking)
+    n_axes = found.layout.n_axes
+    ranking = with_twins(ranking, n_axes)
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
     gap = stands_out and _significant(found, settings)
@@ -92,9 +93,9 @@ def conclude(
     named = {c.label for c in causes}
     return Conclusion(
         verdict=verdict,
-        causes=less_their_twins(causes),
+        causes=less_their_twins(causes, n_axes),
         alternatives=tuple(c for c in ranking if c.label not in named)[:5],
-        equivalent=(*open_groups, *open_twins(causes)) if believed else (),
+        equivalent=(*open_groups, *open_twins(causes, n_axes)) if believed else (),
         next_experiment=advice,
         ranking=ranking,
         p_none=p_none,
@@ -102,7 +103,7 @@ def conclude(
         axes=_axes(found, settings, causes, gap=gap),
         checks=(
             *(x.says for x in shown),
-            *about_twins(causes),
+            *about_twins(causes, n_axes),
             *_checks(found, settings, explained),
         ),
         effects=effects,

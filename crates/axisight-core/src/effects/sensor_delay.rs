@@ -1,10 +1,11 @@
 //! Transport delay of the position that the controller reads.
 
-use super::{Acts, EffectInfo, Experiment, Family, Linear, Scope, input_delay};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Scope, input_delay};
+use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "sensor_delay",
-    summary: "the controller reads and logs the position late: to the logs a delay of the drive",
+    summary: "the controller reads and logs the position late: of an axis alone the logs of a delay of the drive, other axes feel its motion earlier than it is read",
     equation: "phi_measured(t) = phi(t - T_d)",
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
     scope: Scope::Axis,
@@ -12,10 +13,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Timing,
     contains: &[],
     parts: &[],
-    usual: &[],
+    usual: &["input_delay"],
     twins: &["input_delay"],
     stands_for: None,
-    linear: Linear::Path,
+    linear: Linear::No,
     inverse_dynamics: false,
     stiff: false,
     absorbed_by: &[],
@@ -23,5 +24,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: input_delay::INFO.parameters,
 };
 
-/// The machine does not know the time: driven late it is where one read late seems to be.
-pub(super) use super::input_delay::kernel;
+struct Late<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Late(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Late<S> {
+    fn reading_delay(&self) -> Option<S> {
+        Some(self.0)
+    }
+}

@@ -278,6 +278,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn sensor(&self, _angle: S) -> S {
         S::zero()
     }
+    /// By how much the motor position is read late [s].
+    fn reading_delay(&self) -> Option<S> {
+        None
+    }
     /// Step of the position sensor [rad].
     fn resolution(&self) -> Option<S> {
         None

@@ -1,6 +1,7 @@
 //! The sampled loop: measure, command, integrate to the next sample.
 
 use super::controller::{ControlLoop, OwnLaw};
+use super::late_reading::LateReading;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
@@ -166,7 +167,7 @@ pub fn simulate<S: Scalar>(
         .zip(&rest.motor_torque)
         .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
         .collect();
-    let mut signals = Signals::of(plant);
+    let mut signals = Signals::of(plant, &rest.motor_angle, run.sample_time);
     let mut buffers = TorqueBuffers::new(n_axes);
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
@@ -239,6 +240,8 @@ pub struct Signals<S> {
     /// report what they are told.
     reported_share: Vec<S>,
     reported: Vec<S>,
+    /// Of axes whose motors are read late; empty where none is.
+    late: Vec<Option<LateReading<S>>>,
 }
 
 impl<S: Scalar> Signals<S> {
@@ -255,11 +258,13 @@ impl<S: Scalar> Signals<S> {
             clock_drift: None,
             reported_share: Vec::new(),
             reported: Vec::new(),
+            late: Vec::new(),
         }
     }
 
-    /// All zero, with what the drives of a plant report.
-    fn of(plant: &Plant<S>) -> Self {
+    /// All zero, with what the drives of a plant report, and sensors that read motors late, at rest at
+    /// `angle`.
+    fn of(plant: &Plant<S>, angle: &[S], sample_time: f64) -> Self {
         let n_axes = plant.axes.len();
         let mut signals = Self::new(n_axes);
         signals.clock_drift = plant.clock_drift();
@@ -278,15 +283,29 @@ impl<S: Scalar> Signals<S> {
             signals.reported_share = known.collect();
             signals.reported = vec![S::zero(); n_axes];
         }
+        let late = |(axis, &rest): (&Axis<S>, &S)| {
+            let delays = axis.kernels.iter().filter_map(|k| k.reading_delay());
+            let delay = delays.reduce(|a, b| a + b)?;
+            Some(LateReading::new(delay * (1.0 / sample_time), rest))
+        };
+        let readings: Vec<_> = plant.axes.iter().zip(angle).map(late).collect();
+        if readings.iter().any(Option::is_some) {
+            signals.late = readings;
+        }
         signals
     }
 
     fn measure(&mut self, plant: &Plant<S>, run: &Run<'_>, k: usize, x: &[S]) {
         for (i, axis) in plant.axes.iter().enumerate() {
             let angle = plant.motor_angle(axis, x);
-            let mut error = lane_value(run.noise, k, i, plant.axes.len());
+            let mut error: S = lane_value(run.noise, k, i, plant.axes.len());
+            let mut seen = angle;
+            if let Some(Some(late)) = self.late.get_mut(i) {
+                seen = late.read(angle, plant.motor_speed(axis, x) * run.sample_time);
+                error += seen - angle;
+            }
             for kernel in &axis.kernels {
-                error += kernel.sensor(angle);
+                error += kernel.sensor(seen);
             }
             error += self.joint_error(axis, i, k, plant.joint_angle(axis, x));
             let steps = axis.kernels.iter().filter_map(|k| k.resolution());

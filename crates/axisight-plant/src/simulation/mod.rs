@@ -5,6 +5,7 @@ mod controller;
 mod current_loop;
 mod dormand_prince;
 mod implicit;
+mod late_reading;
 mod method;
 mod nystrom4;
 mod runge_kutta4;
