@@ -32,7 +32,7 @@ from axisight.blind.formulas import (
 )
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
-from axisight.blind.make import make_cases
+from axisight.blind.make import _noise, make_cases
 from axisight.blind.motions import MOTIONS, multisines
 from axisight.blind.scene import Scene
 from axisight.blind.score import _missed, _said, comparable, sizes
@@ -234,6 +234,20 @@ def test_a_case_is_a_function_of_seed_and_number():
     pairs = [draw(1, number).effects for number in range(1, 60, 6)]
     assert all(len({e.axis for e in pair}) == len(pair) for pair in pairs)
     assert any(len(pair) == 2 for pair in pairs)
+
+
+def test_noise_of_some_sensors_is_coloured_and_as_large():
+    drawn = [draw(3, n, Choice(arm="lever_like", motions="slow_and_short")) for n in range(12)]
+    coloured = [d for d in drawn if d.corner_hz is not None]
+    assert 0 < len(coloured) < len(drawn) and all(300 < d.corner_hz < 800 for d in coloured)
+    for d in (coloured[0], next(d for d in drawn if d.corner_hz is None)):
+        x = _noise(np.random.default_rng(1), d, (40000, 1))[:, 0]
+        keep = 0.0
+        if d.corner_hz is not None:
+            keep = np.exp(-2 * np.pi * d.corner_hz * d.robot.sample_time_s)
+        # 40,000 samples: variances and correlations to 1 %, five deviations of each.
+        assert x.std() / d.robot.position_noise_std == pytest.approx(1.0, abs=0.05)
+        assert np.mean(x[1:] * x[:-1]) / x.var() == pytest.approx(keep, abs=0.05)
 
 
 def test_engines_arms_and_motions_are_drawn_unless_they_are_chosen():

@@ -42,6 +42,9 @@ ENGINES: Mapping[str, Mapping[str, Kind]] = {"mujoco": KINDS, "pinocchio": KINDS
 _ENGINES = {"mujoco": 0.5, "pinocchio": 0.5}
 _ARMS = {"irb6600_like": 0.6, "scara_like": 0.15, "lever_like": 0.15, "cobot_like": 0.1}
 _MOTIONS = {"multisines": 0.6, "moves": 0.2, "slow_and_short": 0.2}
+# Of so many cases one has sensors with noise of first order, of a corner between these.
+_COLOURED_ONE_IN = 5
+_CORNER_HZ = (300.0, 800.0)
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Choice:
 class Draw:
     """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role.
 
-    ``robot``: the simulator that the case gets.
+    ``robot``: the simulator that the case gets; ``corner_hz``: of the noise of its sensors, None where
+    it is white.
     """
 
     number: int
@@ -76,6 +80,7 @@ class Draw:
     machine: Machine
     bare: Machine
     references: dict[str, tuple[str, Array]]
+    corner_hz: float | None = None
 
 
 DRAWN = Choice()
@@ -99,7 +104,10 @@ def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Dr
     effects = _effects(rng, number, scene, ENGINES[engine])
     machine = _without_scatter_of(effects, scattered(rng, robot), robot)
     with_effects, bare = machine_of(machine, effects), machine_of(machine, ())
-    return Draw(number, engine, arm, motions, robot, effects, with_effects, bare, references)
+    corner_hz = float(rng.uniform(*_CORNER_HZ)) if rng.integers(_COLOURED_ONE_IN) == 0 else None
+    return Draw(
+        number, engine, arm, motions, robot, effects, with_effects, bare, references, corner_hz
+    )
 
 
 def _one_of(rng: np.random.Generator, shares: Mapping[str, float]) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from axisight.blind.case_files import CaseFolder
@@ -79,7 +80,7 @@ def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
     """
     rng = np.random.default_rng([seed, drawn.number, 1])
     references = [reference for _, reference in drawn.references.values()]
-    noises = [drawn.robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    noises = [_noise(rng, drawn, x.shape) for x in references]
     validation = _validation(drawn)
     quiet = [np.zeros_like(x) for x in validation]
     try:
@@ -91,6 +92,15 @@ def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
     usual = Scene(drawn.robot, references).largest_nm
     count = len(references)
     return (logs[:count], logs[count:]) if np.all(largest < _RUNAWAY * usual) else None
+
+
+def _noise(rng: np.random.Generator, drawn: Draw, shape: tuple[int, ...]) -> Array:
+    """Return noise of the sensors (n, n_axes) [rad], of the deviation that the robot states."""
+    white = drawn.robot.position_noise_std * rng.standard_normal(shape)
+    if drawn.corner_hz is None:
+        return np.asarray(white)
+    keep = np.exp(-2 * np.pi * drawn.corner_hz * drawn.robot.sample_time_s)
+    return np.asarray(scipy.signal.lfilter([np.sqrt(1 - keep**2)], [1.0, -keep], white, axis=0))
 
 
 def _validation(drawn: Draw) -> list[Array]:
@@ -116,6 +126,7 @@ def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
         "engine": drawn.engine,
         "arm": drawn.arm,
         "motions": drawn.motions,
+        "noise_corner_hz": drawn.corner_hz,
         "seed": seed,
         "number": drawn.number,
         "effects": [
@@ -134,7 +145,7 @@ def _severity(drawn: Draw, with_it: Logs) -> list[float]:
     rng = np.random.default_rng(0)
     references = _validation(drawn)
     quiet = [np.zeros_like(x) for x in references]
-    noise = [robot.position_noise_std * rng.standard_normal(x.shape) for x in references]
+    noise = [_noise(rng, drawn, x.shape) for x in references]
     count = len(references)
     bare = _engine(drawn.engine)(drawn.bare, references * 2, quiet + noise)
     without, noisy = bare[:count], bare[count:]
