@@ -5,7 +5,7 @@ import pytest
 from axisight.effects import Effect
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Interval
-from axisight.gap.torque_sensor import with_torque_sensors
+from axisight.gap.torque_sensor import either, with_torque_sensors
 
 
 def cause(name: str, axis: int, **values: float) -> NamedCause:
@@ -31,6 +31,22 @@ def test_three_numbers_that_agree_are_one_cause():
     assert [e.label for e in acting] == ["torque_sensor_gain@2", "backlash@1"]
     assert found[0].parameters["relative_error"].value == 0.08
     assert acting[0].values()[0] == 0.08
+
+
+@pytest.mark.parametrize(
+    ("proportional", "integral", "open_"),
+    [
+        (-0.032, -0.0321, True),
+        # Not quite the same; and so large that a torque constant would show beside them.
+        (-0.032, -0.034, False),
+        (0.08, 0.08, False),
+    ],
+)
+def test_small_gains_that_agree_may_be_either(proportional, integral, open_):
+    alone = [gains(2, proportional, integral), cause("backlash", 1, half_width_rad=1e-4)]
+    found = either(alone, 0.045)
+    assert found == ((("controller_gain@2", "torque_sensor_gain@2"),) if open_ else ())
+    assert either(alone, 0.0) == ()
 
 
 @pytest.mark.parametrize(

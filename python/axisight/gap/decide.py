@@ -13,23 +13,20 @@ from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
-from axisight.gap.terms import idle_terms
+from axisight.gap.terms import idle_numbers
 
 Array = NDArray[np.float64]
 
 # Residuals of neighbouring blocks and logs share their causes; this many blocks count as
 # independent in a likelihood ratio.
 _INDEPENDENT_BLOCKS = 60.0
-# Share of the explained error by which two formulas for one physical effect may
-# differ (tanh or algebraic Coulomb, play or dead zone): differences in fit below
-# it say nothing about the cause.
-_FORMULA_ERROR = 0.02
+FORMULA_ERROR = 0.02
+"""Share of the explained error by which two formulas for one physical effect may differ (tanh or algebraic
+Coulomb, play or dead zone): differences in fit below it say nothing about the cause."""
+GEAR = "transmission"
+"""Family of effects whose laws are many for one gear: a second one may mend the formula of the first."""
 # Log-probability each fitted number costs (Schwarz 1978, with the blocks above).
 _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
-
-
-# Fitted values of a term of a series: cosine, sine and order.
-_OF_A_TERM = 3.0
 
 
 def numbers(effect: FreeEffect) -> float:
@@ -42,13 +39,13 @@ def numbers(effect: FreeEffect) -> float:
 class Trial:
     """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,).
 
-    ``idle``: terms of its series that it does not need.
+    ``idle``: numbers of it that it does not need.
     """
 
     candidate: FreeEffect
     evidence: Evidence
     held_out: Array
-    idle: int = 0
+    idle: float = 0.0
 
     @property
     def label(self) -> str:
@@ -58,7 +55,7 @@ class Trial:
     @property
     def cost(self) -> float:
         """Number of fitted values that it needs; the order of a harmonic counts too."""
-        return numbers(self.candidate) - _OF_A_TERM * self.idle
+        return numbers(self.candidate) - self.idle
 
 
 @dataclass(frozen=True)
@@ -131,10 +128,16 @@ class Standing:
         return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
 
     def inseparable(self) -> list[Ranked]:
-        """Return the candidates the data cannot tell apart, the winner first; one if it is clear."""
-        winner = self.best
+        """Return the candidates the data cannot tell apart, the winner first; one if it is clear.
+
+        Of many rivals none of which is likely by itself, the likeliest.
+        """
+        winner, rivals = self.best, self.ranked[1:]
         bar = _RIVAL * winner.probability / (1 - _RIVAL)
-        return [winner, *(r for r in self.ranked[1:] if r.probability > bar)]
+        together = sum(r.probability for r in rivals)
+        if together > _RIVALS * winner.probability / (1 - _RIVALS):
+            bar = min(bar, rivals[0].probability)
+        return [winner, *(r for r in rivals if r.probability >= bar)]
 
     def usual_first(self) -> Standing:
         """Return the same with what is more usual than the winner counted for as much more.
@@ -157,19 +160,21 @@ class Standing:
 
 
 # How many times as often the usual one of two is met: the simpler law of an axis; a load, which every
-# arm is there to carry, beside a link that is not as it was drawn.
-_ODDS = {"axis": 4.0, "axes": 4.0, "arm": 10.0}
-# A rival this likely beside the winner leaves the cause open.
+# arm is there to carry, beside a link that is not as it was drawn: named first, with the link beside it.
+_ODDS = {"axis": 4.0, "axes": 4.0, "arm": 3.0}
+# A rival this likely beside the winner leaves the cause open, and so do all of them if together they are
+# as likely as this.
 _RIVAL = 0.2
+_RIVALS = 0.25
 
 
 def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
     """Score a fitted candidate on held-out data."""
 
-    def pays(loss: float, without: float) -> bool:
-        return likelier(loss, _OF_A_TERM, than=(without, 0.0))
+    def pays(loss: float, without: float, count: float) -> bool:
+        return likelier(loss, count, than=(without, 0.0))
 
-    return Trial(candidate, evidence, held_out_loss(evidence), idle_terms(evidence, pays))
+    return Trial(candidate, evidence, held_out_loss(evidence), idle_numbers(evidence, pays))
 
 
 def falls(trials: Sequence[Trial], current: Array, layout: Layout) -> Array:
@@ -204,12 +209,13 @@ def stand(
         return None
     losses = np.array([t.held_out[here].sum() for t in mine])
     hypotheses = np.append(losses, [before, before - explained_share * explainable])
-    tempered = np.maximum(hypotheses, least) + _FORMULA_ERROR * explainable
+    tempered = np.maximum(hypotheses, least) + FORMULA_ERROR * explainable
     # An unknown cause has as many numbers to it as the known one that explains most.
     unknown = mine[int(np.argmin(losses))].cost
     cost = np.array([*(t.cost for t in mine), 0.0, unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - _PARAMETER_COST * cost
     fitted = np.array([_fitted_loss(t.evidence, here) for t in mine])
+    logp = _with_lags_apart(mine, axis, logp, np.maximum(losses, least), explainable)
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
@@ -226,6 +232,38 @@ def stand(
     ]
     ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
     return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
+
+
+# Share of the explained error that a delay or a lag leaves where it is the right one (one to two
+# thousandths, on simulated machines of other engines): there is one formula for each.
+_LAG_ERROR = 0.002
+
+
+def _with_lags_apart(
+    trials: Sequence[Trial], axis: int, logp: Array, losses: Array, explainable: float
+) -> Array:
+    """Return log-probabilities with delays and lags of an axis held against one another by what they leave.
+
+    Together they are as probable as they were; ``losses``: as predicted, the floor at least. On other
+    axes they leave what the rest of the model does.
+    """
+    lags = [
+        i
+        for i, t in enumerate(trials)
+        if t.candidate.effect.axis == axis + 1 and _family(t.candidate) == "timing"
+    ]
+    if len(lags) < 2:
+        return logp
+    cost = np.array([trials[i].cost for i in lags])
+    left = losses[lags] + _LAG_ERROR * explainable
+    sharper = -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - _PARAMETER_COST * cost
+    out = logp.copy()
+    out[lags] = logp[lags].max() + sharper - sharper.max()
+    return out
+
+
+def _family(candidate: FreeEffect) -> str:
+    return effect_info(candidate.effect.name).family
 
 
 # Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which
@@ -256,7 +294,7 @@ def _with_those_that_fit_better(
     out = logp.copy()
     for i, t in enumerate(trials):
         fits = fitted[i] < least and t.cost <= trials[first].cost
-        if fits and score[i] > score[first] - _FORMULA_ERROR:
+        if fits and score[i] > score[first] - FORMULA_ERROR:
             out[i] = logp[first]
     return out
 
@@ -292,7 +330,7 @@ def log_ratio(left: Array, explained: Array, samples: Array) -> Array:
     the wrong one leaves above the noise, and ``explained``, that there is without either. The last
     dimension is that of the parts.
     """
-    least = (samples * (1.0 + _FORMULA_ERROR * explained)).sum(axis=-1)
+    least = (samples * (1.0 + FORMULA_ERROR * explained)).sum(axis=-1)
     more = (samples * left).sum(axis=-1)
     return np.asarray(0.5 * _INDEPENDENT_BLOCKS * np.log1p(more / least))
 

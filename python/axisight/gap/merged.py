@@ -14,12 +14,23 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Standing, Trial, likelier, numbers, stand, trial
+from axisight.gap.decide import (
+    FORMULA_ERROR,
+    GEAR,
+    Ranked,
+    Standing,
+    Trial,
+    likelier,
+    numbers,
+    stand,
+    trial,
+)
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss
 from axisight.gap.settings import Settings
+from axisight.gap.trials import settled
 
 Array = NDArray[np.float64]
 
@@ -35,7 +46,8 @@ def one_for_several(
     """Return the first effect that does what several of its axis and family do; None without.
 
     ``options``: the candidates, which are tried in their place, as is each of the several; ``floor``
-    (n_blocks,): loss of noise alone. It has fewer numbers, and may leave a little more.
+    (n_blocks,): loss of noise alone. It has fewer numbers, and may leave a little more; of laws of a gear
+    what formulas of one effect differ by.
     """
     for (axis, family), several in several_together(model).items():
         rest = [f for f in model.free if f not in several]
@@ -56,7 +68,7 @@ def one_for_several(
             continue
         trials = [t for o in others if (t := _tried(fitter, rest, o, without)) is not None]
         standing = stand(
-            trials,
+            _best_settled(fitter, trials),
             held_out_loss(without),
             floor,
             layout,
@@ -66,9 +78,11 @@ def one_for_several(
         if standing is None:
             continue
         here = layout.axis == axis - 1
-        loss = float(held_out_loss(model)[here].sum())
+        both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
         best = standing.best.trial
-        if likelier(float(best.held_out[here].sum()), best.cost, than=(loss, count)):
+        alone = float(best.held_out[here].sum())
+        mends = family == GEAR and not fitter.adds_up and alone - both < FORMULA_ERROR * (none - both)
+        if mends or likelier(alone, best.cost, than=(both, count)):
             return standing.best, standing
     return None
 
@@ -80,6 +94,18 @@ def several_together(model: Evidence) -> dict[tuple[int, str], list[FreeEffect]]
         if f.effect.axis is not None:
             found[f.effect.axis, effect_info(f.effect.name).family].append(f)
     return {key: several for key, several in found.items() if len(several) > 1}
+
+
+def _best_settled(fitter: ModelFitter, trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials, the one that leaves least with sensitivities of its own."""
+    best = min(trials, key=lambda t: float(t.held_out.sum()), default=None)
+    if best is None:
+        return []
+    try:
+        fitted = settled(fitter, best.evidence.free, best.evidence)
+    except InputError:
+        return list(trials)
+    return [trial(t.candidate, fitted) if t is best else t for t in trials]
 
 
 def _tried(

@@ -22,7 +22,7 @@ from axisight.fitting import (
 )
 from axisight.gap.evidence import Evidence, FreeEffect, Linearized
 from axisight.gap.scales import NaturalSizes
-from axisight.gap.tolerances import tolerance_of
+from axisight.gap.tolerances import spring_changes, tolerance_of
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -72,6 +72,10 @@ class ModelFitter(ABC):
 
     def within_tolerance(self, effect: Effect) -> bool:
         """Whether an effect is no more than ordinary scatter of a parameter."""
+        if springs := spring_changes(effect):
+            stiffness = self.robot.axis_parameter(effect.axis or 1, "stiffness")
+            tolerance = 0.0 if stiffness is None else tolerance_of(self.tolerances, stiffness)
+            return max(map(abs, springs)) < 3 * (tolerance or 0.0)
         change = effect.values()[0]
         for own in self.robot.effects:
             if own.label == effect.label:

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, falls, without_composite
+from axisight.gap.decide import (
+    FORMULA_ERROR,
+    GEAR,
+    Ranked,
+    Standing,
+    Trial,
+    clearly_worse,
+    falls,
+    without_composite,
+)
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.jointly import Pairs, in_parts, without_rival_composites
@@ -100,6 +109,17 @@ class Search:
             settings.smallest_gain * self.layout.samples() + formulas,
             settings.smallest_share * self.to_explain(),
         )
+
+    def formula_error(self, effect: Effect, axis: int) -> float:
+        """Return what the formulas of causes in the gear of an effect may leave on an axis (from 0).
+
+        Another law of the same gear, which takes up no more than that, mends a formula.
+        """
+        gear = effect_info(effect.name).family == GEAR and not self.adds_up
+        laws = (e for e in self.model.effects if effect_info(e.name).family == GEAR)
+        if gear and any(e.axis == effect.axis for e in laws):
+            return FORMULA_ERROR * float(self.removed()[axis])
+        return 0.0
 
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
@@ -303,7 +323,8 @@ def _is_cause(
         float(scipy.stats.norm.isf(settings.false_alarms / max(2 * tried, 1))),
     )
     fall = best.gain * float(state.layout.samples()[standing.axis])
-    large = fall > float(state.least_falls(settings)[standing.axis])
+    least = float(state.least_falls(settings)[standing.axis])
+    large = fall > max(least, state.formula_error(best.trial.candidate.effect, standing.axis))
     worth = large and best.score > settings.smallest_score
     return best.significance > needed and worth and standing.best.probability > standing.p_none
 

@@ -1,7 +1,8 @@
-"""Terms of a series that a fit does not need: they are no cost of the effect that has them.
+"""Numbers of an effect that a fit does not need: they are no cost of the effect that has them.
 
 Orders of a ripple are taken from the residual of the simulator; beside the right one, what is left of it
-at neighbouring orders is taken in too. An effect is not to pay for what says nothing for it.
+at neighbouring orders is taken in too. Of a load or a centre of mass one coordinate may be all that a
+motion shows. An effect is not to pay for what says nothing for it.
 """
 
 from __future__ import annotations
@@ -9,37 +10,76 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.gap.evidence import Evidence
 
+Array = NDArray[np.float64]
+# Names of numbers that are idle or not together, and for how many they count.
+Term = tuple[tuple[str, ...], float]
 
-def idle_terms(evidence: Evidence, pays: Callable[[float, float], bool]) -> int:
-    """Return how many terms of the last effect's series do not pay for themselves; one always does.
+# Fitted values of a term of a series: cosine, sine and order.
+_OF_A_WAVE = 3.0
+_COORDINATES = ("x_m", "y_m", "z_m")
 
-    ``pays``: whether a loss of the second size is that much worse than one of the first. Without a term
-    all other parameters go where they leave least, to second order.
+
+def idle_numbers(evidence: Evidence, pays: Callable[[float, float, float], bool]) -> float:
+    """Return how many numbers of the last effect do not pay for themselves; one of them always does.
+
+    ``pays``: whether a loss of the second size is that much worse than one of the first, for so many
+    numbers. Without some, all other parameters go where they leave least, to second order. What costs
+    least goes first.
     """
     last = len(evidence.effects) - 1
-    effect = evidence.effects[last]
-    values = effect.parameters or {}
     places = {name: i for i, (place, name) in enumerate(evidence.parameters) if place == last}
-    terms = [
-        (places[cosine], places[sine])
+    terms = _terms(evidence, set(places))
+    if not terms:
+        return 0.0
+    effect = evidence.effects[last]
+    # An effect of the arm is seen on every axis.
+    here = np.ones(len(evidence.axis), dtype=bool)
+    if effect.axis is not None:
+        here = evidence.axis == effect.axis - 1
+    loss = float(evidence.loss[here].sum())
+    size, spread = _spread(evidence)
+    values = effect.parameters or {}
+
+    def worse(gone: list[str]) -> float:
+        at = [places[name] for name in gone]
+        theta = np.array([values[name] for name in gone]) * size[at]
+        return float(theta @ np.linalg.solve(spread[np.ix_(at, at)], theta))
+
+    # Something of it stays: another number, or the term that it needs most.
+    most = len(terms) - (len(places) == sum(len(names) for names, _ in terms))
+    gone: list[str] = []
+    idle = 0.0
+    for _ in range(most):
+        names, count = min(terms, key=lambda t: worse([*gone, *t[0]]))
+        if pays(loss, loss + worse([*gone, *names]), idle + count):
+            break
+        terms.remove((names, count))
+        gone += names
+        idle += count
+    return idle
+
+
+def _terms(evidence: Evidence, free: set[str]) -> list[Term]:
+    """Return what may be idle of the last effect: waves of a series, coordinates."""
+    effect = evidence.effects[-1]
+    values = effect.parameters or {}
+    waves: list[Term] = [
+        ((cosine, sine), _OF_A_WAVE)
         for order, cosine, sine in effect_info(effect.name).terms().values()
-        if values.get(order) and cosine in places and sine in places
+        if values.get(order) and cosine in free and sine in free
     ]
-    if len(terms) < 2:
-        return 0
+    coordinates: list[Term] = [((name,), 1.0) for name in _COORDINATES if name in free]
+    return [*waves, *coordinates]
+
+
+def _spread(evidence: Evidence) -> tuple[Array, Array]:
+    """Return the size of every parameter, and their covariance in these sizes."""
     matrix = evidence.matrix.sum(axis=0) + evidence.prior_matrix
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     spread = np.linalg.inv(matrix / np.outer(size, size) + 1e-9 * np.eye(len(matrix)))
-    here = evidence.axis == (effect.axis or 1) - 1
-    loss = float(evidence.loss[here].sum())
-    idle = 0
-    for term in terms:
-        pair = list(term)
-        theta = np.array([values[evidence.parameters[i][1]] for i in pair]) * size[pair]
-        worse = float(theta @ np.linalg.solve(spread[np.ix_(pair, pair)], theta))
-        idle += not pays(loss, loss + worse)
-    return min(idle, len(terms) - 1)
+    return size, spread

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from axisight.effects import Effect, effect_info
 from axisight.fitting import robot_parameters
 from axisight.gap.settings import Settings
 from axisight.robot import Robot
@@ -26,6 +27,15 @@ def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
     None: it is taken as exact.
     """
     return tolerances.get(name, tolerances.get(name.rsplit(".", 1)[1]))
+
+
+def spring_changes(effect: Effect) -> tuple[float, ...]:
+    """Return by what shares of its stiffness [1] a law makes a gear another spring; none of others."""
+    values = dict(zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True))
+    if effect.name == "piecewise_stiffness":
+        return values["within"], values["within"] + values["step"]
+    share = {"lost_motion": "softness", "gear_hysteresis": "share"}.get(effect.name)
+    return () if share is None else (values[share],)
 
 
 def with_tolerances(

@@ -15,6 +15,8 @@ from axisight.gap.named import NamedCause
 # The gains agree to this share, and the torque constant with their inverse to that.
 _SAME_GAINS = 0.008
 _INVERSE = 0.02
+# Gains alone agree to this share of theirs: of two that were set, one in fifty would.
+_ALONE = 0.02
 
 
 def with_torque_sensors(
@@ -35,6 +37,22 @@ def with_torque_sensors(
         acting = [e for e in acting if (e.name, e.axis) not in gone]
         acting = [Effect(TORQUE_SENSOR[0], gains.axis, value), *acting]
     return tuple(kept), tuple(acting)
+
+
+def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str], ...]:
+    """Return the labels of gains that may be a torque sensor's, each with that.
+
+    Both are off by one share, and by so little that a torque constant, which is ``unseen`` up to that
+    share, would not show.
+    """
+    alone = [c for c in causes if c.effect == OTHER_GAINS[0] and _small_and_one(c, unseen)]
+    return tuple((c.label, Effect(TORQUE_SENSOR[0], c.axis).label) for c in alone)
+
+
+def _small_and_one(gains: NamedCause, unseen: float) -> bool:
+    proportional, integral = (gains.parameters[name].value for name in OTHER_GAINS[1])
+    size = max(abs(proportional), abs(integral))
+    return abs(proportional - integral) < _ALONE * size < _ALONE * unseen
 
 
 def _agree(gains: NamedCause, constant: NamedCause) -> bool:

@@ -11,9 +11,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
+from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Standing, Trial, falls, stand, trial
+from axisight.gap.decide import Ranked, Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.kept import KeptColumns
@@ -349,14 +349,17 @@ class Trials:
                 continue
             bends = standing.axis in crooked
             count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
+            # What is more usual than the leader is it at its limits, until its own fit says no.
+            usual = self.usual | _more_usual(leader.trial)
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
-                # What began where the leader ended is it at its limits, until its own fit says no.
-                rivals = tuple(r for r in standing.ranked if r.trial.label in self.usual)
+                rivals = ()
+            rivals += tuple(r for r in standing.ranked if r.trial.label in usual and r not in rivals)
             for r in rivals:
                 place, label = r.trial.candidate.effect.axis, r.trial.label
                 here = place in (None, standing.axis + 1) or label in leaders
-                near = r.score > max(0.5 * self.settings.smallest_score, close * leader.score)
+                share = _FAR if label in usual else close
+                near = r.score > max(0.5 * self.settings.smallest_score, share * leader.score)
                 if here and near and label not in self.done and r.trial not in out:
                     out.append(r.trial)
         return out
@@ -426,11 +429,23 @@ def _clear(standing: Standing) -> bool:
     if len(standing.inseparable()) > 1 or standing.p_unknown > leader.probability:
         return False
     close = [r for r in standing.ranked[1:] if r.score >= _CLOSE * leader.score]
-    # What needs fewer numbers may catch up where its fit has not settled.
-    if any(r.trial.cost < leader.trial.cost and not _is_settled(r.trial) for r in close):
+    # What needs fewer numbers may catch up where its fit has not settled; and of lags every one.
+    open_ = (r for r in close if r.trial.cost < leader.trial.cost or _are_lags(r, leader))
+    if any(not _is_settled(r.trial) for r in open_):
         return False
     alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
+
+
+def _are_lags(one: Ranked, other: Ranked) -> bool:
+    """Whether both are held against one another by little."""
+    return one.family == other.family == "timing"
+
+
+def _more_usual(leader: Trial) -> set[str]:
+    """Return the labels of what is more usual than a leader, on its axis."""
+    effect = leader.candidate.effect
+    return {Effect(name, effect.axis).label for name in effect_info(effect.name).usual}
 
 
 def _is_settled(one: Trial) -> bool:

@@ -18,7 +18,7 @@ from axisight.gap.score import held_out_loss
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
-from axisight.gap.torque_sensor import with_torque_sensors
+from axisight.gap.torque_sensor import either, with_torque_sensors
 from axisight.gap.twins import about_twins, less_their_twins, open_twins, with_twins
 
 
@@ -46,6 +46,8 @@ class Conclusion:
         return replace(self, checks=(*self.checks, *more))
 
 
+# Tolerances of an inertia that a machine's may be off by.
+_EDGE = 3.0
 # What the controller's own law shows could still be something else that looks alike: a limit of the
 # supply, not of the drive.
 _SHOWN = 0.99
@@ -87,6 +89,12 @@ def conclude(
         (*map(_shown, shown), *searched) if believed else (),
         (*(x.effect for x in shown), *found.model.effects) if believed else (),
     )
+    unseen = _EDGE * (settings.tolerances or {}).get("motor_inertia", 0.0)
+    gains = either(causes, unseen)
+    if gains and verdict == "explained":
+        verdict = "undecidable"
+    causes = tuple(_or_another(c) if c.label in {one for one, _ in gains} else c for c in causes)
+    open_groups += gains
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
@@ -108,6 +116,11 @@ def conclude(
         ),
         effects=effects,
     )
+
+
+def _or_another(cause: NamedCause) -> NamedCause:
+    """Return a cause beside which another one is as likely."""
+    return replace(cause, probability=0.5 * cause.probability)
 
 
 def _shown(cause: ShownCause) -> NamedCause:

@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Arm,
     contains: &[],
     parts: &[],
-    usual: &[],
+    usual: &["link_inertia"],
     twins: &[],
     stands_for: None,
     linear: Linear::No,
