@@ -127,6 +127,23 @@ class Standing:
         held = (replace(r, probability=odds[r.trial.label]) for r in self.ranked)
         return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
 
+    def with_those_that_lead(self, others: Sequence[Standing]) -> Standing:
+        """Return the same with the first held against rivals by what axes say on which those lead.
+
+        ``others``: standings of other axes that rivals here lead surely. What is seen on two axes is
+        judged by both.
+        """
+        first = self.best
+        odds = {r.trial.label: r.probability for r in self.ranked}
+        mine = odds[first.trial.label]
+        for other in others:
+            there = {r.trial.label: r.probability for r in other.ranked}
+            rival = other.best
+            share = there.get(first.trial.label, 0.0) / rival.probability
+            mine = min(mine, first.probability * share)
+        held = (replace(r, probability=mine if r is first else r.probability) for r in self.ranked)
+        return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
+
     def inseparable(self) -> list[Ranked]:
         """Return the candidates the data cannot tell apart, the winner first; one if it is clear.
 

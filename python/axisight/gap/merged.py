@@ -81,7 +81,9 @@ def one_for_several(
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
         best = standing.best.trial
         alone = float(best.held_out[here].sum())
-        mends = family == GEAR and not fitter.adds_up and alone - both < FORMULA_ERROR * (none - both)
+        mends = (
+            family == GEAR and not fitter.adds_up and alone - both < FORMULA_ERROR * (none - both)
+        )
         if mends or likelier(alone, best.cost, than=(both, count)):
             return standing.best, standing
     return None

@@ -225,6 +225,9 @@ def _taken(
         led = causes[standing.axis]
         if led is None or _beaten_at_home(led, causes):
             continue
+        led = led.with_those_that_lead(
+            [s for s in standings if _rival_leads(led, s, fall, place, state, settings)]
+        )
         least = state.least_falls(settings)
         led = led.with_what_others_say(
             [s for s in standings if _leads(led, s, fall[place[led.best.trial.label]], least)]
@@ -255,6 +258,30 @@ def _beaten_at_home(led: Standing, causes: Mapping[int, Standing | None]) -> boo
         return False
     other = home.best.trial.candidate.effect
     return other.axis == effect.axis and other.label != effect.label
+
+
+def _rival_leads(
+    led: Standing,
+    other: Standing,
+    fall: Array,
+    place: Mapping[str, int],
+    state: Search,
+    settings: Settings,
+) -> bool:
+    """Whether a rival of what leads a standing, of the same axis, surely leads another one.
+
+    By more than what the formula of the first may leave there.
+    """
+    first, rival = led.best.trial, other.best.trial
+    mine = first.candidate.effect.axis
+    if other.axis == led.axis or mine is None or rival.candidate.effect.axis != mine:
+        return False
+    if rival is first or all(r.trial is not rival for r in led.ranked):
+        return False
+    more = fall[place[rival.label], other.axis] - fall[place[first.label], other.axis]
+    formula = settings.model_error**2 * float(fall[place[first.label]].sum())
+    sure = state.layout.significance(first.held_out, rival.held_out, other.axis)
+    return bool(more > formula and sure > settings.significance)
 
 
 def _leads(led: Standing, other: Standing, fall: Array, least: Array) -> bool:

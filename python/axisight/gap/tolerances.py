@@ -31,7 +31,9 @@ def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
 
 def spring_changes(effect: Effect) -> tuple[float, ...]:
     """Return by what shares of its stiffness [1] a law makes a gear another spring; none of others."""
-    values = dict(zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True))
+    values = dict(
+        zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True)
+    )
     if effect.name == "piecewise_stiffness":
         return values["within"], values["within"] + values["step"]
     share = {"lost_motion": "softness", "gear_hysteresis": "share"}.get(effect.name)

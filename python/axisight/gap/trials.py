@@ -354,7 +354,9 @@ class Trials:
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
                 rivals = ()
-            rivals += tuple(r for r in standing.ranked if r.trial.label in usual and r not in rivals)
+            rivals += tuple(
+                r for r in standing.ranked if r.trial.label in usual and r not in rivals
+            )
             for r in rivals:
                 place, label = r.trial.candidate.effect.axis, r.trial.label
                 here = place in (None, standing.axis + 1) or label in leaders

@@ -185,7 +185,8 @@ pub fn simulate<S: Scalar>(
             sample_time: run.sample_time,
         };
         stepper.enter(k);
-        let mut torque = SampleTorque::new(&mut paths, &signals.command, &mut buffers);
+        let mut torque =
+            SampleTorque::new(&mut paths, &signals.command, &signals.added, &mut buffers);
         let met = interval.advance(run.method, &mut x, stepper, &mut torque);
         torque.finish();
         if !all_finite(&x) {
@@ -228,6 +229,8 @@ pub struct Signals<S> {
     /// Commanded torques [Nm].
     pub command: Vec<S>,
     reference: Vec<S>,
+    /// What of the commands keeps the simulation on a log [Nm]; zero without one.
+    pub added: Vec<S>,
     /// Torque that effects add on the motors [Nm].
     pub torque_disturbance: Vec<S>,
     /// Error of the measured positions, noise included [rad].
@@ -252,6 +255,7 @@ impl<S: Scalar> Signals<S> {
             measured: zeros.clone(),
             command: zeros.clone(),
             reference: zeros.clone(),
+            added: zeros.clone(),
             torque_disturbance: zeros.clone(),
             position_disturbance: zeros.clone(),
             joint_error_at_start: zeros,
@@ -365,7 +369,10 @@ impl<S: Scalar> Signals<S> {
                     self.reference[i] = lane_value(position, k, i, n);
                     self.command[i] = self.commanded(lane_value(torque, k, i, n), i);
                 }
-                controller.follow(&self.measured, &self.reference, &mut self.command);
+                controller.follow(&self.measured, &self.reference, &mut self.added);
+                for (command, added) in self.command.iter_mut().zip(&self.added) {
+                    *command += *added;
+                }
             }
             Drive::Reference(reference) => {
                 for i in 0..n {

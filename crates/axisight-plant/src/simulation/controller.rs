@@ -105,10 +105,10 @@ impl<S: Scalar> ControlLoop<S> {
         }
     }
 
-    /// Add to `command` the feedback that keeps `measured` on the logged positions
+    /// Set `added` to the feedback that keeps `measured` on the logged positions
     /// `logged`, both counted from their first sample. Effects change nothing of it: it is none of
     /// the machine.
-    pub fn follow(&mut self, measured: &[S], logged: &[S], command: &mut [S]) {
+    pub fn follow(&mut self, measured: &[S], logged: &[S], added: &mut [S]) {
         let rate = 1.0 / self.sample_time;
         let first_sample = self.first_lag.is_empty();
         for i in 0..measured.len() {
@@ -121,7 +121,7 @@ impl<S: Scalar> ControlLoop<S> {
             let behind = lag - self.first_lag[i];
             let speed = (lag - self.last_lag[i]) * rate;
             self.last_lag[i] = lag;
-            command[i] += self.feedback(i, -speed, -behind, [S::one(); 2]);
+            added[i] = self.feedback(i, -speed, -behind, [S::one(); 2]);
         }
     }
 

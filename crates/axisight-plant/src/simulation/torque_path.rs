@@ -86,9 +86,12 @@ impl<S: Scalar> TorquePath<S> {
         }
     }
 
-    /// Take the command of a new sample; returns what the drive makes of it.
-    pub fn push(&mut self, command: S) -> S {
-        let command = self.kernels.iter().fold(command, |u, k| k.command(u));
+    /// Take the command of a new sample; returns what the drive makes of it, and of what is `added` to it.
+    ///
+    /// Limits and deadbands are those of what the machine was told: nothing is cut of what keeps a
+    /// simulation on a log.
+    pub fn push(&mut self, command: S, added: S) -> S {
+        let command = self.kernels.iter().fold(command, |u, k| k.command(u)) + added;
         if let Some(delay) = &mut self.delay {
             delay.history.rotate_left(1);
             if let Some(newest) = delay.history.last_mut() {
@@ -205,14 +208,16 @@ impl<S: Scalar> TorqueBuffers<S> {
 }
 
 impl<'a, S: Scalar> SampleTorque<'a, S> {
-    /// Take the commands of a new sample.
+    /// Take the commands of a new sample; `added`: what of each is none of the machine's.
     pub fn new(
         paths: &'a mut [TorquePath<S>],
         commands: &[S],
+        added: &[S],
         buffers: &'a mut TorqueBuffers<S>,
     ) -> Self {
-        for ((taken, path), u) in buffers.commands.iter_mut().zip(&mut *paths).zip(commands) {
-            *taken = path.push(*u);
+        let told = commands.iter().zip(added);
+        for ((taken, path), (u, own)) in buffers.commands.iter_mut().zip(&mut *paths).zip(told) {
+            *taken = path.push(*u - *own, *own);
         }
         let varies = paths.iter().any(TorquePath::varies);
         let mut torque = Self {

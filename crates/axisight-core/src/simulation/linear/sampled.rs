@@ -60,7 +60,12 @@ fn samples<S: Scalar>(
         }
         state.signals(run, k);
         observe(&state.signals.sample(k, &state.absolute));
-        let mut torque = SampleTorque::new(paths, &state.signals.command, &mut buffers);
+        let mut torque = SampleTorque::new(
+            paths,
+            &state.signals.command,
+            &state.signals.added,
+            &mut buffers,
+        );
         for substep in 0..state.substeps {
             state.step(torque.part(substep, state.substeps));
             torque.accept();

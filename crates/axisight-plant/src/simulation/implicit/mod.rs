@@ -340,7 +340,7 @@ mod tests {
             .map(|(axis, u)| TorquePath::new(axis, *u, duration))
             .collect();
         let mut buffers = TorqueBuffers::new(1);
-        let mut torque = SampleTorque::new(&mut paths, &command, &mut buffers);
+        let mut torque = SampleTorque::new(&mut paths, &command, &[0.0], &mut buffers);
         for i in 0..n {
             let step = Step {
                 command: &command,
