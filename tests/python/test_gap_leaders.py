@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from axisight import Effect, Settings
+from axisight.effects import effect_info
 from axisight.gap import trials
 from axisight.gap.trials import Trials
 
@@ -20,7 +21,8 @@ def ranked(effect: Effect, score: float, cost: float = 1.0, promise: float = 0.0
         cost=cost,
         evidence=SimpleNamespace(total=100.0, promise=100.0 * promise),
     )
-    return SimpleNamespace(trial=trial, score=score, gain=1.0, probability=0.98)
+    family = effect_info(effect.name).family
+    return SimpleNamespace(trial=trial, score=score, gain=1.0, probability=0.98, family=family)
 
 
 def standing(axis: int, *rivals):
@@ -50,6 +52,31 @@ def promised(monkeypatch: pytest.MonkeyPatch):
 )
 def test_a_leader_is_clear_of_what_cannot_catch_up(rival, clear: bool):
     assert trials._clear(standing(0, ranked(LOAD, 1.0, cost=4), rival)) == clear
+
+
+@pytest.mark.parametrize(("promise", "clear"), [(0.15, False), (1e-4, True)])
+def test_a_lag_is_clear_of_no_other_that_has_not_settled(promise: float, clear: bool):
+    """They are held against one another by little."""
+    delay = ranked(Effect("input_delay", 1), 0.999)
+    loop = ranked(Effect("current_loop", 1), 0.998, cost=2, promise=promise)
+    assert trials._clear(standing(0, delay, loop)) == clear
+
+
+def test_what_is_more_usual_than_a_clear_leader_is_refined():
+    """An inertia with sensitivities of another simulator left half; a mode beyond the band led."""
+    mode, inertia = Effect("extra_mode", 1), Effect("link_inertia", 1)
+    field = SimpleNamespace(
+        layout=SimpleNamespace(samples=lambda: np.ones(3)),
+        least=np.zeros(3),
+        settings=Settings(),
+        usual=set(),
+        done=set(),
+    )
+    for score, refined in ((0.5, ["link_inertia@1"]), (0.2, [])):
+        led = standing(0, ranked(mode, 0.995, cost=3), ranked(inertia, score))
+        field.standings = lambda _, led=led: [led]
+        todo = Trials._worth_refining(field, [], set(), even_felt=True)
+        assert [t.label for t in todo] == refined
 
 
 def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():

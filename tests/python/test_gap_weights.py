@@ -92,3 +92,23 @@ def test_what_the_references_drive_is_told_from_answers_to_noise():
     assert np.median(share[(f > 60) & (f < 120)]) < 0.1
     # Weight and other slow torque count, whatever the density of segments without their mean says.
     assert share[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size"),
+    [("torque_deadband", "width_nm", 0.3), ("torque_saturation", "limit_nm", 1.5)],
+)
+def test_a_drive_meets_noise_as_it_was(name: str, parameter: str, size: float):
+    """Noise dithers a deadband and a limit: the drive made its torque of what is in the log.
+
+    Of commands that hold what keeps the simulator there too, noise would be another, and a deadband came
+    out a seventh too narrow.
+    """
+    effect = Effect(name, 1, {parameter: size})
+    robot = bare_axis()
+    view = ClosedLoopView(robot, logs_of(robot, [effect], MOVES, 6.0), Settings())
+    begin = FreeEffect(Effect(name, 1, {parameter: 0.8 * size}), (parameter,))
+    found = view.fitter.fit([begin], refreshes=1)
+    assert found.effects[0].values()[0] == pytest.approx(size, rel=5e-3)
+    left = found.loss.sum() / found.samples.sum()
+    assert left == pytest.approx(view.floor.expected[0], rel=0.15)

@@ -106,5 +106,12 @@ TORQUE_CONSTANT = ("torque_constant", "relative_error")
 TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
 """What a torque that is reported too large or too small is, and its parameter."""
 
+SPRING_CHANGES = {
+    "piecewise_stiffness": (("within",), ("within", "step")),
+    "lost_motion": (("softness",),),
+    "gear_hysteresis": (("share",),),
+}
+"""Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
+
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""

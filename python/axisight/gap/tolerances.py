@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from axisight.effects import Effect, effect_info
+from axisight.effects.stated import SPRING_CHANGES
 from axisight.fitting import robot_parameters
 from axisight.gap.settings import Settings
 from axisight.robot import Robot
@@ -31,13 +32,10 @@ def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
 
 def spring_changes(effect: Effect) -> tuple[float, ...]:
     """Return by what shares of its stiffness [1] a law makes a gear another spring; none of others."""
-    values = dict(
-        zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True)
-    )
-    if effect.name == "piecewise_stiffness":
-        return values["within"], values["within"] + values["step"]
-    share = {"lost_motion": "softness", "gear_hysteresis": "share"}.get(effect.name)
-    return () if share is None else (values[share],)
+    names = [p.name for p in effect_info(effect.name).parameters]
+    values = dict(zip(names, effect.values(), strict=True))
+    sums = SPRING_CHANGES.get(effect.name, ())
+    return tuple(sum(values[name] for name in names) for names in sums)
 
 
 def with_tolerances(
