@@ -55,6 +55,8 @@ _FAR = 0.3
 # One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
 _ALONE = 0.5
+# A fit that has not settled may gain so many times what its next step promises.
+_STEPS_TO_COME = 3.0
 # How often sensitivities are renewed in a fit that is to last.
 _RENEWALS = 1
 # Share of the loss that it may promise then: where it is more, they are renewed at every step.
@@ -322,8 +324,8 @@ class Trials:
             return settled(self.fitter, start.free, start)
         begun = settled(self.rough, start.free, start)
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
-        # What is taken in is fitted on.
-        return replace(found, renewed=False)
+        # What is taken in is fitted on where it has not settled.
+        return replace(found, renewed=found.renewed and found.converged)
 
     def _crooked(self, trials: Sequence[Trial]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
@@ -433,7 +435,7 @@ def _clear(standing: Standing) -> bool:
     close = [r for r in standing.ranked[1:] if r.score >= _CLOSE * leader.score]
     # What needs fewer numbers may catch up where its fit has not settled; and of lags every one.
     open_ = (r for r in close if r.trial.cost < leader.trial.cost or _are_lags(r, leader))
-    if any(not _is_settled(r.trial) for r in open_):
+    if any(_may_catch_up(r, leader) for r in open_):
         return False
     alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
@@ -450,9 +452,11 @@ def _more_usual(leader: Trial) -> set[str]:
     return {Effect(name, effect.axis).label for name in effect_info(effect.name).usual}
 
 
-def _is_settled(one: Trial) -> bool:
-    """Whether a step from where its fit ended promises next to nothing."""
-    return linear_gain(one.evidence) < _SETTLED * one.evidence.total
+def _may_catch_up(one: Ranked, leader: Ranked) -> bool:
+    """Whether steps from where the fit of a rival ended may bring it near the leader."""
+    promise = linear_gain(one.trial.evidence) / one.trial.evidence.total
+    share_left = (1.0 - one.score) * max(0.0, 1.0 - _STEPS_TO_COME * promise)
+    return promise > _SETTLED and 1.0 - share_left > _GOOD_ENOUGH * leader.score
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:
