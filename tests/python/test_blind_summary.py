@@ -1,13 +1,16 @@
 """What a benchmark says in files and on a page: every count from cases made by hand."""
 
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from axisight.blind import markdown
+from axisight.blind.calibration import calibration_bins, carried_over
 from axisight.blind.page import render_score
-from axisight.blind.score import Judged, calibration_bins
+from axisight.blind.score import Judged
 from axisight.blind.summary import summary
 
 
@@ -112,7 +115,7 @@ def test_it_is_json_and_nothing_is_no_number():
     assert json.loads(json.dumps(summary(CASES), allow_nan=False)) == summary(CASES)
     bare = summary([judged((), (), "none", 0.0)])
     json.dumps(bare, allow_nan=False)
-    assert bare["calibration"] == {"error": None, "bins": []}
+    assert bare["calibration"] == {"error": None, "bins": [], "carried_over": None}
     assert bare["parameters_median_error"] is None
 
 
@@ -145,3 +148,30 @@ def test_the_page_marks_what_is_right_and_wrong():
     assert cells.classes.count("wrong") == 2
     assert page == render_score("<b>mine</b>", summary(CASES))
     assert "Nothing." in render_score("x", summary(CASES[:1]))
+
+
+def test_a_temperature_of_one_engine_is_judged_on_another():
+    """Of causes said with 0.9 three quarters are right on both engines: they were named too surely."""
+    right = judged(("backlash@1",), ("backlash@1",), "explained", 9.0)
+    wrong = judged(("backlash@1",), ("payload",), "explained", 9.0)
+    cases = [
+        replace(j, setting=s) for s in (right.setting, OTHER) for j in [right] * 30 + [wrong] * 10
+    ]
+    found = carried_over(cases)
+    assert found is not None and found["causes"] == 40
+    # Closed form: the temperature that takes the log-odds of 0.9 to those of 3 in 4.
+    assert found["temperature"] == pytest.approx(np.log(9) / np.log(3), rel=1e-3)
+    other = found["judged_on"]["pinocchio"]
+    assert other["error"] == pytest.approx(0.15) and other["error_scaled"] < 1e-3
+    assert other["log_loss_scaled"] == pytest.approx(-0.75 * np.log(0.75) - 0.25 * np.log(0.25))
+    assert other["log_loss"] == pytest.approx(-0.75 * np.log(0.9) - 0.25 * np.log(0.1))
+    text = markdown(summary(cases))
+    assert "| temperature that fits mujoco (40 causes) | 2.00 |" in text
+    assert "0.150, with it 0.000" in text
+    assert "temperature" in render_score("cases", summary(cases))
+
+
+def test_without_another_engine_or_with_few_causes_none_is_fitted():
+    assert carried_over(CASES) is None
+    assert carried_over([CASES[0]] * 30) is None
+    assert "temperature" not in markdown(summary(CASES))

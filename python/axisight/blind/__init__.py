@@ -3,7 +3,8 @@
 `axisight.blind.make` needs MuJoCo and Pinocchio (extra ``blind``), the others nothing.
 """
 
-from axisight.blind.score import Judged, Share, calibration_error, figures, judged_cases
+from axisight.blind.calibration import calibration_error
+from axisight.blind.score import Judged, Share, figures, judged_cases
 from axisight.blind.summary import summary
 from axisight.blind.table import markdown
 

@@ -21,6 +21,7 @@ def render_score(name: str, score: dict[str, Any]) -> str:
         "unknown": _share(score["unknown"]),
         "median": _percent(score["parameters_median_error"]),
         "calibration_error": _digits(score["calibration"]["error"]),
+        "carried_over": _carried_over(score["calibration"]["carried_over"]),
         "bins": [
             {
                 "range": f"{b['from']:.1f} to {b['to']:.1f}",
@@ -59,6 +60,19 @@ def render_score(name: str, score: dict[str, Any]) -> str:
         ],
     }
     return rendered("score.html.j2", page)
+
+
+def _carried_over(found: dict[str, Any] | None) -> list[dict[str, str]]:
+    """Return what a temperature of one engine does on the others, a row each."""
+    if found is None:
+        return []
+    rows = {
+        f"temperature that fits {found['fitted_on']}, {found['causes']} causes": f"{found['temperature']:.2f}"
+    }
+    for engine, x in found["judged_on"].items():
+        rows[f"calibration error on {engine}"] = _digits(x["error"])
+        rows[f"calibration error on {engine}, with that temperature"] = _digits(x["error_scaled"])
+    return [{"name": name, "value": value} for name, value in rows.items()]
 
 
 def _setting(key: str, values: dict[str, Any]) -> dict[str, Any]:

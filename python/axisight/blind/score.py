@@ -24,7 +24,6 @@ SETTING = ("engine", "arm", "motions")
 _POINTS = 0.05
 # Alternatives this likely belong to what a verdict allows.
 _ALTERNATIVE = 0.05
-_BINS = 10
 
 
 @dataclass(frozen=True)
@@ -245,39 +244,6 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         ratios=tuple(ratios),
         covered=tuple(covered),
     )
-
-
-def calibration_bins(judged: Sequence[Judged]) -> list[dict[str, float]]:
-    """Return by probability said: causes named (``count``), mean said and share right; empty bins left out."""
-    pairs = [
-        (p, label in j.truth)
-        for j in judged
-        for p, label in zip(j.probabilities, j.named, strict=True)
-    ]
-    said, right = (
-        (np.array(x, dtype=np.float64) for x in zip(*pairs, strict=True))
-        if pairs
-        else (np.empty(0), np.empty(0))
-    )
-    bins = np.minimum((said * _BINS).astype(int), _BINS - 1)
-    return [
-        {
-            "from": float(b / _BINS),
-            "to": float((b + 1) / _BINS),
-            "count": int(np.sum(bins == b)),
-            "probability": float(said[bins == b].mean()),
-            "right": float(right[bins == b].mean()),
-        }
-        for b in np.unique(bins)
-    ]
-
-
-def calibration_error(judged: Sequence[Judged]) -> float:
-    """Return the expected calibration error of the causes named (Naeini 2015), ten bins; NaN without."""
-    bins = calibration_bins(judged)
-    whole = sum(b["count"] for b in bins)
-    off = (b["count"] * abs(b["probability"] - b["right"]) for b in bins)
-    return sum(off) / whole if whole else float("nan")
 
 
 def figures(judged: Sequence[Judged]) -> dict[str, Share]:

@@ -9,14 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from axisight.blind.score import (
-    SETTING,
-    Judged,
-    Share,
-    calibration_bins,
-    calibration_error,
-    figures,
-)
+from axisight.blind.calibration import calibration_bins, calibration_error, carried_over
+from axisight.blind.score import SETTING, Judged, Share, figures
 from axisight.effects import effect_info, effect_table
 
 SCHEMA = "axisight.score/1"
@@ -42,6 +36,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
         "calibration": {
             "error": _number(calibration_error(judged)),
             "bins": calibration_bins(judged),
+            "carried_over": carried_over(judged),
         },
         "effects": _by_class(single, _effect),
         "families": _by_class(single, _family),

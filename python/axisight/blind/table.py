@@ -28,6 +28,7 @@ def markdown(score: Mapping[str, Any]) -> str:
         ["parameters, median error", "-" if off is None else f"{100 * off:.2g} %"],
         ["expected calibration error", "-" if error is None else f"{error:.3f}"],
     ]
+    figures += _carried_over(score["calibration"]["carried_over"])
     lines = _table(["figure", "measured"], figures)
     for key, values in score["settings"].items():
         rows = [
@@ -61,6 +62,19 @@ def markdown(score: Mapping[str, Any]) -> str:
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _carried_over(found: Mapping[str, Any] | None) -> list[list[str]]:
+    """Return what a temperature of one engine does on the others, a row each."""
+    if found is None:
+        return []
+    own, hot = found["fitted_on"], found["temperature"]
+    rows = [[f"temperature that fits {own} ({found['causes']} causes)", f"{hot:.2f}"]]
+    for engine, x in found["judged_on"].items():
+        errors = f"{x['error']:.3f}, with it {x['error_scaled']:.3f}"
+        losses = f"log-loss {x['log_loss']:.3f}, with it {x['log_loss_scaled']:.3f}"
+        rows.append([f"calibration error on {engine}", f"{errors}; {losses}"])
+    return rows
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
