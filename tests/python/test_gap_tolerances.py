@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from axisight import Settings, diagnose, load_robot
+from axisight import Effect, Settings, diagnose, load_robot
+from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import identified_tolerances, tolerance_of, with_tolerances
 from axisight.robot_file import Provenance, identified, write_identified
@@ -73,3 +74,23 @@ def test_an_inertia_known_badly_is_no_effect(written: Path):
     sidecar.unlink()
     found = diagnose(robot=written, estimation=logs[0], validation=logs[1], settings=settings)
     assert [c.effect for c in found.causes] == ["motor_inertia"]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "scatter"),
+    [
+        ("piecewise_stiffness", {"step": 0.003, "within": 0.003, "knee_rad": 3e-6}, True),
+        # Softer at first and stiffer beyond: either alone is more than scatter.
+        ("piecewise_stiffness", {"step": 0.1, "within": -0.09, "knee_rad": 3e-4}, False),
+        ("piecewise_stiffness", {"step": 0.1, "within": 0.0, "knee_rad": 3e-4}, False),
+        ("lost_motion", {"softness": 0.02, "half_width_rad": 1e-4}, True),
+        ("gear_hysteresis", {"share": 0.2, "deflection_rad": 1e-4}, False),
+    ],
+)
+def test_a_law_that_changes_a_spring_by_its_tolerance_is_scatter(name, values, scatter):
+    robot = bare_axis()
+    fitter = ClosedLoopView(robot, logs_of(robot, [], PLAN, 1.0), Settings()).fitter
+    effect = Effect(name, 1, values)
+    assert fitter.within_tolerance(effect) == scatter
+    # Three deviations of one and a half per cent.
+    assert fitter.tolerated(effect) == pytest.approx(0.045)

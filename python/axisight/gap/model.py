@@ -73,9 +73,7 @@ class ModelFitter(ABC):
     def within_tolerance(self, effect: Effect) -> bool:
         """Whether an effect is no more than ordinary scatter of a parameter."""
         if springs := spring_changes(effect):
-            stiffness = self.robot.axis_parameter(effect.axis or 1, "stiffness")
-            tolerance = 0.0 if stiffness is None else tolerance_of(self.tolerances, stiffness)
-            return max(map(abs, springs)) < 3 * (tolerance or 0.0)
+            return max(map(abs, springs)) < self.tolerated(effect)
         change = effect.values()[0]
         for own in self.robot.effects:
             if own.label == effect.label:
@@ -85,10 +83,14 @@ class ModelFitter(ABC):
     def tolerated(self, effect: Effect) -> float:
         """Return up to which size an effect is ordinary scatter of a parameter (three deviations)."""
         name = _same_quantity(self.robot, effect)
+        spring = bool(spring_changes(effect))
+        if spring and effect.axis is not None:
+            name = self.robot.axis_parameter(effect.axis, "stiffness")
         if name is None:
             return 0.0
         tolerance = tolerance_of(self.tolerances, name) or 0.0
-        nominal = 1.0 if _is_relative(effect.name) else robot_parameters(self.robot)[name]
+        relative = spring or _is_relative(effect.name)
+        nominal = 1.0 if relative else robot_parameters(self.robot)[name]
         return 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
