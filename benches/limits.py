@@ -1,0 +1,124 @@
+"""Whether effects at twice their detection limit are found, and at a third of it claimed.
+
+    python benches/limits.py [MACHINES] [SEED]
+
+Machines that scatter as any of their type and lack nothing, on the motions of the benchmark; their
+verdicts state limits. Then the same machines with one effect each, drawn among those limits, at twice and at
+a third of them, along the same references with other noise. A twin counts as the effect.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import Diagnosis, Effect, Log, Robot, diagnose, load_robot, simulate
+from axisight.blind import Share
+from axisight.blind.drawing import scattered
+from axisight.blind.motions import MOTIONS
+from axisight.effects import effect_info
+from axisight.gap.result import DetectionLimit
+from axisight.gap.twins import twins_of
+
+Array = NDArray[np.float64]
+References = dict[str, tuple[str, Array]]
+
+SETTINGS = (
+    ("irb6600_like", "slow_and_short"),
+    ("lever_like", "multisines"),
+    ("scara_like", "slow_and_short"),
+)
+# Effects of a machine that are tried.
+TRIED = 6
+SIZES = {"twice": 2.0, "a third": 1 / 3}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine of a robot's type, and what it is driven by."""
+
+    simulator: Robot
+    machine: Robot
+    references: References
+
+    def diagnosed(self, effects: list[Effect], run: int) -> Diagnosis:
+        """Return the verdict on its logs with effects; ``run`` numbers the noise of their sensors."""
+        logs: dict[str, list[Log]] = {"estimation": [], "validation": []}
+        for k, (name, (role, reference)) in enumerate(self.references.items()):
+            logs[role].append(log_of(self.machine, effects, reference, name, 100 * run + k))
+        return diagnose(
+            robot=self.simulator, estimation=logs["estimation"], validation=logs["validation"]
+        )
+
+
+def log_of(machine: Robot, effects: list[Effect], reference: Array, name: str, run: int) -> Log:
+    """Return a log of the machine along a reference (n, n_axes) [rad/s]."""
+    out = simulate(machine, reference, effects=effects, noise_seed=7, run=run, method="rk4")
+    return Log(
+        name=name,
+        source=Path(f"{name}.parquet"),
+        sample_time_s=machine.sample_time_s,
+        time_s=out.time.values,
+        velocity_ref_rad_s=reference,
+        torque_nm=out.torque_cmd_nm.values,
+        position_rad=out.position_rad.values,
+    )
+
+
+def machine_of(rng: np.random.Generator, arm: str, motions: str) -> Machine:
+    """Return another machine of an arm's type on a plan of motions."""
+    robot = load_robot(arm)
+    return Machine(robot, scattered(rng, robot), MOTIONS[motions](rng, robot))
+
+
+def at(limit: DetectionLimit, factor: float) -> Effect:
+    """Return the effect of a limit in so many times its size, shapes as usual."""
+    info = effect_info(limit.effect)
+    values = {p.name: p.typical if p.role == "shape" else p.neutral for p in info.parameters}
+    size = factor * float(limit.value or 0.0)
+    axis = None if limit.axes else limit.axis
+    return Effect(limit.effect, axis, {**values, limit.parameter: size}, limit.axes)
+
+
+def claimed(found: Diagnosis, effect: Effect, n_axes: int) -> bool:
+    """Whether a verdict names an effect or a twin of it."""
+    alike = {effect.label} | {
+        replace(effect, name=name).label for name in twins_of(effect.name, n_axes)
+    }
+    return any(c.label in alike for c in found.causes)
+
+
+def main(machines: int, seed: int) -> None:
+    """Print a line for every effect, and both shares."""
+    rng = np.random.default_rng(seed)
+    right: dict[str, list[bool]] = {name: [] for name in SIZES}
+    wrong = 0
+    for number in range(machines):
+        arm, motions = SETTINGS[number % len(SETTINGS)]
+        machine = machine_of(rng, arm, motions)
+        bare = machine.diagnosed([], 0)
+        print(f"{arm}, {motions}: {bare.verdict}, {len(bare.detection_limits)} limits", flush=True)
+        finite = [limit for limit in bare.detection_limits if limit.value is not None]
+        for k in rng.choice(len(finite), min(TRIED, len(finite)), replace=False):
+            line = [f"  {at(finite[k], 1.0).label:28s} {finite[k].value:.3g} {finite[k].unit}"]
+            for run, (name, factor) in enumerate(SIZES.items(), 1):
+                effect = at(finite[k], factor)
+                found = machine.diagnosed([effect], run)
+                hit = claimed(found, effect, machine.simulator.n_axes)
+                others = [] if hit else [c.label for c in found.causes]
+                wrong += found.verdict == "explained" and bool(others)
+                right[name].append(hit)
+                line.append(f"{name}: {'named' if hit else ', '.join(others) or found.verdict}")
+            print("   ".join(line), flush=True)
+    for name, hits in right.items():
+        print(f"at {name} of the limit named: {Share(sum(hits), len(hits))}")
+    print(f"another cause explained: {wrong}")
+
+
+if __name__ == "__main__":
+    given = [int(x) for x in sys.argv[1:]]
+    main(*given, *(3, 1)[len(given) :])
