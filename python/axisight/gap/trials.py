@@ -447,9 +447,10 @@ def _are_lags(one: Ranked, other: Ranked) -> bool:
 
 
 def _more_usual(leader: Trial) -> set[str]:
-    """Return the labels of what is more usual than a leader, on its axis."""
+    """Return the labels of what is more usual than a leader, on its axis or of the arm."""
     effect = leader.candidate.effect
-    return {Effect(name, effect.axis).label for name in effect_info(effect.name).usual}
+    usual = map(effect_info, effect_info(effect.name).usual)
+    return {Effect(i.name, None if i.scope == "arm" else effect.axis).label for i in usual}
 
 
 def _may_catch_up(one: Ranked, leader: Ranked) -> bool:
