@@ -7,7 +7,7 @@ import pytest
 
 from axisight import Settings, diagnose
 from axisight.errors import InputError
-from axisight.gap.cutoff import chosen_filtering
+from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
 from axisight.gap.inverse import InverseView, predicted_torque
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.modes import view_of
@@ -15,6 +15,7 @@ from axisight.gap.motion import Filtering, motion
 from axisight.gap.repeats import repeated_std_nm
 from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
 from axisight.gap.torques import AS_GIVEN
+from gap_data import bare_axis
 from rigid_arm import COULOMB_NM, RATE_HZ, TORQUE_NOISE_NM, arm, log_of
 from rigid_arm import motion as exact_motion
 
@@ -152,3 +153,19 @@ def test_periods_of_a_log_are_repeats():
     # Four periods after the first; a low-passed white noise keeps the share of the band it passes.
     found = repeated_std_nm([log], Filtering(5.0))
     assert found == pytest.approx(np.sqrt(5.0 / 50.0) * np.array(TORQUE_NOISE_NM), rel=0.1)
+
+
+def test_elastic_gears_are_rigid_up_to_a_third_of_their_first_mode():
+    """Closed form of the two-mass axis: both masses against each other on the spring between them."""
+    robot = bare_axis()
+    at, ratio = robot.parameters(), float(robot.gear_ratio[0])
+    link = next(j.link for j in robot.joints if j.link is not None)
+    arm_inertia = link.inertia_kg_m2[2] + link.mass_kg * np.sum(np.square(link.com_m[:2]))
+    both = 1 / arm_inertia + ratio**2 / at["axis1.motor_inertia"]
+    # The damper of the gear takes little off it: 4 % of the critical damping.
+    first = np.sqrt(at["axis1.stiffness"] * both) / (2 * np.pi)
+    assert rigid_below_hz(robot) == pytest.approx(first / 3, rel=0.01)
+    assert rigid_below_hz(ROBOT) == np.inf
+    log = log_of(ROBOT, 0, seconds=10.0)
+    free, capped = (chosen_filtering([log], rigid_torque, highest_hz=f) for f in (np.inf, 4.0))
+    assert 2.0 <= capped.cutoff_hz <= 4.0 < free.cutoff_hz

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from axisight.gap.motion import Filtering, Motion, has_velocity
 from axisight.logs import Log
+from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -18,6 +19,8 @@ _HIGHEST_HZ = 60.0
 _LOWEST_HZ = 2.0
 # A log has at least this many samples in a period of the cutoff.
 _OVERSAMPLING = 5.0
+# Of the first elastic mode, up to which gears are as good as rigid.
+_RIGID = 1 / 3
 # Corner of the sign of the speed, as a share of the largest speed.
 _CORNER = 0.01
 # A measured velocity has to leave less by this share than one differentiated from the position.
@@ -29,23 +32,38 @@ def highest_cutoff_hz(sample_time_s: float) -> float:
     return min(_HIGHEST_HZ, 1 / (_OVERSAMPLING * sample_time_s))
 
 
+def rigid_below_hz(robot: Robot) -> float:
+    """Return up to which frequency the torque of a robot is that of rigid gears [Hz]; infinity where they are.
+
+    A third of its first elastic mode: the masses behind a gear move by a ninth more there.
+    """
+    if all(robot.axis_is_rigid):
+        return float("inf")
+    modes = robot.modes()
+    swings = np.abs(modes["eigenvalue_rad_s"].values.imag) / (2 * np.pi)
+    # What swings more slowly hangs in gravity.
+    elastic = swings[swings > _LOWEST_HZ]
+    return float(elastic.min()) * _RIGID if len(elastic) else float("inf")
+
+
 def chosen_filtering(
     logs: Sequence[Log],
     predict: Callable[[Motion], Array],
     cutoff_hz: float | None = None,
     *,
     measured: Mask | None = None,
+    highest_hz: float = float("inf"),
 ) -> Filtering:
     """Return the filtering whose motion predicts torque best on data left out.
 
     ``predict`` is the torque of the rigid simulator along a motion. On every axis the torque *as
     logged* is regressed on the predicted one, the speed, its sign and an offset, on one half of
     each log, and predicted on the other: what a low cutoff takes from the motion and what a high
-    one leaves of the noise both count. Cutoffs are tried in half octaves, unless ``cutoff_hz`` is
-    given; with the best of them, the measured velocity of the axes that have one: ``measured``
+    one leaves of the noise both count. Cutoffs up to ``highest_hz`` are tried in half octaves, unless
+    ``cutoff_hz`` is given; with the best of them, the measured velocity of the axes that have one: ``measured``
     (n_axes,), by default those of these logs.
     """
-    highest = highest_cutoff_hz(logs[0].sample_time_s)
+    highest = max(min(highest_cutoff_hz(logs[0].sample_time_s), highest_hz), _LOWEST_HZ)
     count = int(2 * np.log2(highest / _LOWEST_HZ)) + 1
     grid = highest * 2.0 ** (-np.arange(max(count, 1)) / 2)
     best = cutoff_hz

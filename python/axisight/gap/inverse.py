@@ -13,7 +13,7 @@ from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
-from axisight.gap.cutoff import chosen_filtering
+from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
@@ -50,6 +50,7 @@ class InverseView(View):
             cutoff,
             # All logs are treated alike, those held out too.
             measured=has_velocity([*logs, *held_out]),
+            highest_hz=rigid_below_hz(robot),
         )
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
         floor = inverse_floor(logs, self.noise, settings)
@@ -83,9 +84,12 @@ class InverseView(View):
 
     def remarks(self) -> tuple[str, ...]:
         """Say how the logs were filtered, and what the floor is made of."""
-        chosen = (
-            "as given" if self.settings.cutoff_hz else "chosen as what predicts data left out best"
-        )
+        chosen = "chosen as what predicts data left out best"
+        highest = rigid_below_hz(self.robot)
+        if self.settings.cutoff_hz:
+            chosen = "as given"
+        elif np.isfinite(highest):
+            chosen += f", below a third of the first elastic mode ({highest:.3g} Hz)"
         out = [
             f"Motion, torque and their noise are low-passed alike at {self.filtering.cutoff_hz:.3g} Hz, {chosen}."
         ]
