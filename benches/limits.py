@@ -96,6 +96,7 @@ def main(machines: int, seed: int) -> None:
     """Print a line for every effect, and both shares."""
     rng = np.random.default_rng(seed)
     right: dict[str, list[bool]] = {name: [] for name in SIZES}
+    seen: dict[str, list[bool]] = {name: [] for name in SIZES}
     wrong = 0
     for number in range(machines):
         arm, motions = SETTINGS[number % len(SETTINGS)]
@@ -112,10 +113,12 @@ def main(machines: int, seed: int) -> None:
                 others = [] if hit else [c.label for c in found.causes]
                 wrong += found.verdict == "explained" and bool(others)
                 right[name].append(hit)
+                seen[name].append(found.verdict != "none")
                 line.append(f"{name}: {'named' if hit else ', '.join(others) or found.verdict}")
             print("   ".join(line), flush=True)
     for name, hits in right.items():
         print(f"at {name} of the limit named: {Share(sum(hits), len(hits))}")
+        print(f"  and anything seen: {Share(sum(seen[name]), len(hits))}")
     print(f"another cause explained: {wrong}")
 
 
