@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from axisight.effects import Effect
-from axisight.gap.decide import Standing, Trial, clearly_worse, stand
+from axisight.gap.decide import Standing, Trial, clearly_worse, stand, trial
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.score import held_out_loss, linear_gain
@@ -464,3 +464,32 @@ def test_lags_of_an_axis_are_held_against_one_another_by_less():
     p = {r.trial.candidate.effect.name: r.probability for r in standing(elsewhere).ranked}
     ratio = (1.05 + 0.2) / (1.02 + 0.2)
     assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**30)
+
+
+def test_what_one_log_tells_of_the_simulator_is_no_gain_of_an_effect_that_it_tells_of():
+    """Of a log that alone tells of both: with an effect of no size it is left out in stretches."""
+    rng = np.random.default_rng(3)
+    log = np.repeat([0, 1], 2000)
+    # Columns of a stiffness, say, and of the effect, both in the second log; the true effect is none.
+    x = rng.standard_normal((4000, 2)) * (log == 1)[:, None]
+    x += 1e-3 * rng.standard_normal(x.shape)
+    y = x[:, 0] + rng.standard_normal(4000)
+
+    def fit(columns: list[int], names) -> Evidence:
+        found = linear_evidence(x[:, columns], y, log)
+        prior, theta = (
+            np.zeros((len(columns),) * 2),
+            np.linalg.lstsq(x[:, columns], y, rcond=None)[0],
+        )
+        prior[0, 0] = 1.0
+        return replace(found, parameters=names, prior_matrix=prior, prior_gradient=prior @ theta)
+
+    model = fit([0], ((None, "p0"),))
+    effect = FreeEffect(Effect("viscous_friction", 1), ("viscous_nm_s_rad",))
+    with_it = fit([0, 1], ((None, "p0"), (0, "viscous_nm_s_rad")))
+    with_it = replace(with_it, effects=(effect.effect,), free=(effect,))
+    current = held_out_loss(model).sum()
+    # The other log knows the prior only: that the model leaves is no gap of the effect.
+    assert current - trial(effect, with_it).held_out.sum() > 500
+    assert abs(current - trial(effect, with_it, model).held_out.sum()) < 10
+    assert held_out_loss(model, like=model).sum() == current

@@ -185,13 +185,20 @@ _RIVAL = 0.2
 _RIVALS = 0.25
 
 
-def trial(candidate: FreeEffect, evidence: Evidence) -> Trial:
-    """Score a fitted candidate on held-out data."""
+def trial(candidate: FreeEffect, evidence: Evidence, model: Evidence | None = None) -> Trial:
+    """Score a fitted candidate on held-out data.
+
+    ``model``: without it, on top of which it is judged. Where parts of the data are left out otherwise than
+    of that alone, what it lowers the loss by is counted with these.
+    """
 
     def pays(loss: float, without: float, count: float) -> bool:
         return likelier(loss, count, than=(without, 0.0))
 
-    return Trial(candidate, evidence, held_out_loss(evidence), idle_numbers(evidence, pays))
+    held_out = held_out_loss(evidence)
+    if model is not None:
+        held_out = held_out + held_out_loss(model) - held_out_loss(model, like=evidence)
+    return Trial(candidate, evidence, held_out, idle_numbers(evidence, pays))
 
 
 def falls(trials: Sequence[Trial], current: Array, layout: Layout) -> Array:

@@ -11,7 +11,7 @@ from axisight.gap.evidence import Evidence, Linearized
 Array = NDArray[np.float64]
 
 
-def held_out_loss(evidence: Evidence) -> Array:
+def held_out_loss(evidence: Evidence, like: Evidence | None = None) -> Array:
     """Return the loss of every block (n_blocks,) predicted without its own log.
 
     Each log in turn is left out, the parameters are re-estimated on the others
@@ -20,9 +20,10 @@ def held_out_loss(evidence: Evidence) -> Array:
     left out in five interleaved groups instead.
 
     A log that alone tells of an effect is left out in stretches: what others make of it is no more
-    than their noise.
+    than their noise. So it is of a model that is compared with one of ``like``, a fit to the same data with
+    that effect: the log may be alone with a parameter of the simulator, too.
     """
-    groups = _groups(evidence)
+    groups = _groups(evidence if like is None else like)
     out = np.zeros(len(evidence.loss))
     for group in np.unique(groups):
         inside = groups == group

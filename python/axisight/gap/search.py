@@ -85,7 +85,7 @@ class Search:
     def to_explain(self) -> Array:
         """Return the held-out loss of the re-fitted simulator above the floor, by axis (n_axes,)."""
         used = predictable(self.model)
-        above = held_out_loss(self.baseline) - self.floor
+        above = held_out_loss(self.baseline, like=self.model) - self.floor
         return self.layout.by_axis(np.where(used, above, 0.0))
 
     def left(self) -> Array:
@@ -95,7 +95,7 @@ class Search:
     def removed(self) -> Array:
         """Return how much of it the causes remove, by axis (n_axes,)."""
         used = predictable(self.model)
-        fall = held_out_loss(self.baseline) - held_out_loss(self.model)
+        fall = held_out_loss(self.baseline, like=self.model) - held_out_loss(self.model)
         return self.layout.by_axis(np.where(used, fall, 0.0))
 
     def least_falls(self, settings: Settings) -> Array:

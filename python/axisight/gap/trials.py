@@ -316,7 +316,7 @@ class Trials:
         except InputError as error:
             self.skipped[one.label] = str(error)
             return None
-        return trial(one.candidate, evidence)
+        return trial(one.candidate, evidence, self.model)
 
     def _compared(self, start: Evidence) -> Evidence:
         """Return a fit good enough to be compared: settled on part of the data, looked at on all."""

@@ -68,7 +68,7 @@ class Tryout:
         would gain is part of its score.
         """
         found = self._fit(self.bench, begun, _STEPS if begun.beside is None else 0)
-        return None if found is None else trial(begun.start.option, found)
+        return None if found is None else trial(begun.start.option, found, self.bench.model)
 
     def _fit(self, bench: Bench, begun: Begun, steps: int) -> Evidence | None:
         lazy = not self.bends(begun.start)

@@ -225,7 +225,7 @@ def _named(
 
 def _checks(found: Search, settings: Settings, explained: float) -> tuple[str, ...]:
     tried = sum(len({r.trial.label for s in x.standings for r in s.ranked}) for x in found.rounds)
-    before = held_out_loss(found.baseline)
+    before = held_out_loss(found.baseline, like=found.model)
     size = float(found.baseline.samples.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
     out = [
