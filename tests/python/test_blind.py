@@ -372,18 +372,18 @@ def test_what_is_missed_is_held_against_the_limit_said_of_it():
         {"effect": "torque_ripple", "axis": 2, "parameter": "cosine_1_nm", "value": 0.02},
         {"effect": "torque_offset", "axis": 3, "parameter": "offset_nm", "value": None},
     ]
-    found = _missed(withheld, {"payload"}, limits)
+    found = _missed(withheld, {"payload"}, limits, 3)
     assert found == pytest.approx(
         {"backlash@1": 0.25, "torque_ripple@2": 5.0, "torque_offset@3": 0.0}
     )
-    assert np.isnan(_missed(withheld[3:], set(), limits)["payload"])
+    assert np.isnan(_missed(withheld[3:], set(), limits, 3)["payload"])
 
 
 def test_what_is_said_of_a_cause_counts_for_its_twin():
     cause = {"effect": "torque_offset", "axis": 2, "probability": 0.76}
     # Four to one among the twins: both together are five quarters of what is named.
-    assert _said(cause) == pytest.approx(0.95)
-    assert _said({"effect": "backlash", "axis": 2, "probability": 0.76}) == 0.76
+    assert _said(cause, 3) == pytest.approx(0.95)
+    assert _said({"effect": "backlash", "axis": 2, "probability": 0.76}, 3) == 0.76
 
 
 def test_waves_are_compared_by_their_order():
