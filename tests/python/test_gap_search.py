@@ -126,10 +126,10 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     field.settings = Settings()
     field.bench = SimpleNamespace(skipped={})
     field.screen = SimpleNamespace(bench=field.bench)
-    field.fitter = None
+    field.fitter = field.model = None
     field.done = set()
     monkeypatch.setattr(trials, "settled", settled)
-    monkeypatch.setattr(trials, "trial", lambda candidate, evidence: other)
+    monkeypatch.setattr(trials, "trial", lambda candidate, evidence, model: other)
     assert Trials.refined(field, [whole, other], 1) == [other]
     assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}
 
