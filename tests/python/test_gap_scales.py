@@ -71,8 +71,18 @@ def test_a_small_robots_friction_promises_what_a_fit_gains(
     truth: Effect, moving: bool, small: Robot
 ):
     # With sizes of large robots half of the blocks had no derivative, and friction no promise.
-    logs = logs_of(small, [truth], 10.0 if moving else 4.0, moving=moving)
-    view = ClosedLoopView(small, logs, Settings())
+    assert_promised(small, truth, logs_of(small, [truth], 10.0 if moving else 4.0, moving=moving))
+
+
+def test_a_sagging_supply_promises_what_a_fit_gains():
+    # With a size for small powers the blocks with most of it had no derivative.
+    robot = load_robot("irb6600_like")
+    truth = Effect("power_supply_sag", 3, {"sag_1_w": 1e-4, "curvature": 0.0})
+    assert_promised(robot, truth, logs_of(robot, [truth], 4.0))
+
+
+def assert_promised(robot: Robot, truth: Effect, logs: list[Log]) -> None:
+    view = ClosedLoopView(robot, logs, Settings())
     base = view.fitter.fit([])
     option = next(c for c in view.candidates(base) if c.effect.label == truth.label)
     fitted = view.fitter.fit([option], base)

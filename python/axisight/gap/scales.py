@@ -48,9 +48,12 @@ _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "Nm s/rad": lambda a: a.torque_nm / a.speed_rad_s,
     "Nm s^2/rad^2": lambda a: a.torque_nm / a.speed_rad_s**2,
     "Nm (joint side)": lambda a: a.torque_nm / a.ratio,
+    "Nm s^2/rad": lambda a: a.motor_inertia,
+    "Nm/rad^3": lambda a: a.torque_nm / a.ratio / a.deflection_rad**3,
     "Nm/rad (joint side)": lambda a: a.torque_nm / a.ratio,
     "kg m^2 (joint side)": lambda a: a.motor_inertia / a.ratio**2,
     "kg": lambda a: a.last_kg,
+    "1/W": lambda a: 1 / max(a.torque_nm * a.speed_rad_s, 1e-300),
 }
 
 

@@ -110,21 +110,26 @@ class Search:
             settings.smallest_share * self.to_explain(),
         )
 
-    def formula_error(self, effect: Effect, axis: int) -> float:
-        """Return what the formulas of causes in the gear of an effect may leave on an axis (from 0).
+    def mends(self, one: Trial) -> bool:
+        """Whether a trial mends the formula of a cause: it is another law of the same gear.
 
-        Another law of the same gear, which takes up no more than that, mends a formula.
+        One that takes away no more on its own axis than what formulas may leave of what was removed there.
         """
-        gear = effect_info(effect.name).family == GEAR and not self.adds_up
-        laws = (e for e in self.model.effects if effect_info(e.name).family == GEAR)
-        if gear and any(e.axis == effect.axis for e in laws):
-            return FORMULA_ERROR * float(self.removed()[axis])
-        return 0.0
+        axis = one.candidate.effect.axis
+        laws = [e for e in self.model.effects if e.axis == axis and _in_a_gear(e)]
+        if self.adds_up or axis is None or not laws or not _in_a_gear(one.candidate.effect):
+            return False
+        fall = self.layout.by_axis(held_out_loss(self.model) - one.held_out)
+        return bool(fall[axis - 1] < FORMULA_ERROR * self.removed()[axis - 1])
 
     def explained(self) -> float:
         """Return the share of the explainable held-out error the model removes."""
         total = float(self.to_explain().sum())
         return float(self.removed().sum()) / total if total > 0 else 0.0
+
+
+def _in_a_gear(effect: Effect) -> bool:
+    return effect_info(effect.name).family == GEAR
 
 
 def search(
@@ -148,7 +153,17 @@ def search(
     kept = KeptColumns()
     for number in range(1, _MOST_ROUNDS + 1):
         least = out.least_falls(settings)
-        round_ = Trials(fitter, out.model, floor, out.layout, least, settings, progress, kept)
+        round_ = Trials(
+            fitter,
+            out.model,
+            floor,
+            out.layout,
+            least,
+            settings,
+            progress,
+            kept,
+            out.mends,
+        )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
         trials = round_.refined(round_.run(options, number), number)
@@ -351,7 +366,7 @@ def _is_cause(
     )
     fall = best.gain * float(state.layout.samples()[standing.axis])
     least = float(state.least_falls(settings)[standing.axis])
-    large = fall > max(least, state.formula_error(best.trial.candidate.effect, standing.axis))
+    large = fall > least and not state.mends(best.trial)
     worth = large and best.score > settings.smallest_score
     return best.significance > needed and worth and standing.best.probability > standing.p_none
 

@@ -49,6 +49,8 @@ _AS_MUCH = 0.9
 # with sensitivities of its own does not make more of the rest.
 _REFINED = 2
 _CLOSE = 0.6
+# So many are refined at once, whatever the number of threads: what they show decides on the next.
+_AT_ONCE = 2
 # The same where the leader bends the simulator.
 _REFINED_BENT = 4
 _FAR = 0.3
@@ -111,9 +113,9 @@ def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evide
 class Trials:
     """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
 
-    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``kept``: what candidates
-    did to models before, and will have done to this; ``sensitivities`` by label,
-    of candidates that were screened.
+    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``mends``: whether one only
+    mends a formula of the model; ``kept``: what candidates did to models before, and will have done to
+    this; ``sensitivities`` by label, of candidates that were screened.
     """
 
     def __init__(
@@ -126,9 +128,10 @@ class Trials:
         settings: Settings,
         progress: Progress,
         kept: KeptColumns,
+        mends: Callable[[Trial], bool],
     ) -> None:
         self.fitter, self.model, self.floor, self.kept = fitter, model, floor, kept
-        self.layout, self.least = layout, least
+        self.layout, self.least, self.mends = layout, least, mends
         self.settings, self.progress = settings, progress
         self.current = held_out_loss(model)
         self.bench = Bench(fitter, model)
@@ -307,7 +310,7 @@ class Trials:
         """
         crooked = self._crooked(trials)
         todo = self._worth_refining(trials, crooked, even_felt=even_felt)
-        return todo[: self.settings.threads if crooked else 1]
+        return todo[: _AT_ONCE if crooked else 1]
 
     def _refined(self, one: Trial) -> Trial | None:
         """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
@@ -347,7 +350,7 @@ class Trials:
         for standing in standings if even_felt else self._not_felt(standings, trials):
             leader = standing.best
             gain = leader.gain * self.layout.samples()[standing.axis]
-            if gain < self.least[standing.axis]:
+            if gain < self.least[standing.axis] or self.mends(leader.trial):
                 continue
             bends = standing.axis in crooked
             count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
