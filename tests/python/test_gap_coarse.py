@@ -56,8 +56,22 @@ def test_steps_are_the_cause_of_a_gap_that_they_make(logs):
     assert said.axes[0].verdict == "explained"
 
 
-def test_steps_are_no_cause_of_a_gap_that_is_something_else(logs):
+def test_steps_are_named_beside_another_cause(logs):
     friction = Effect("coulomb_friction", 1, {"coulomb_nm": 8.0, "smoothing_rad_s": 0.05})
     both = [logs_of(scattered(bare_axis(), 4), [steps_of(STEP), friction], p) for p in (PLAN, HELD)]
     said = diagnose(robot=bare_axis(), estimation=both[0], validation=both[1])
-    assert "position_quantization@1" not in {c.label for c in said.causes}
+    assert [c.label for c in said.causes] == ["coulomb_friction@1", "position_quantization@1"]
+    # Each takes its own part of the gap.
+    assert said.causes[0].gap_reduction.value > 0.9
+    assert said.axes[0].causes == (0, 1)
+    assert "adding Coulomb friction on axis 1 shrinks" in said.headline
+
+
+def test_where_something_is_unknown_the_floor_tells_nothing_of_steps(logs):
+    hand = [
+        replace(x, torque_nm=x.torque_nm + 15 * np.sin(2 * np.pi * 3.3 * x.time_s)[:, None])
+        for x in logs
+    ]
+    said = diagnose(robot=bare_axis(), estimation=hand[:-1], validation=hand[-1:])
+    assert said.verdict == "unknown"
+    assert "position_quantization" not in {c.effect for c in said.causes}

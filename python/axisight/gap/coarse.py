@@ -2,7 +2,7 @@
 
 What steps of an encoder do to the torque differs from run to run, and no simulator can repeat it: they raise
 the floor. Where a simulator leaves no more than that floor, and the noise of its own sensor would leave
-much less, the steps are what the gap is made of.
+much less, the steps are what the gap is made of, or what is left of it beside other causes.
 """
 
 from __future__ import annotations
@@ -58,11 +58,12 @@ def with_coarse_encoders(
     stages: Stages,
     measure: Callable[[Sequence[Array]], Stage],
 ) -> tuple[Conclusion, list[Interval]]:
-    """Return *explained* by the steps of encoders instead of *none*, and what each explains of the gap.
+    """Return a conclusion with the steps of encoders among its causes, and what each explains of the gap.
 
+    *Explained* by them instead of *none*. Where something is unknown, the floor tells nothing.
     ``logs``: of validation, ``stages`` of them. Unchanged where nothing is made of steps.
     """
-    steps = encoder_steps(view.robot, view.logs) if conclusion.verdict == "none" else np.zeros(1)
+    steps = np.zeros(1) if conclusion.verdict == "unknown" else encoder_steps(view.robot, view.logs)
     if not steps.any():
         return conclusion, []
     quiet = measure(view.sensor_noises(logs, len(view.logs)))
@@ -71,22 +72,27 @@ def with_coarse_encoders(
     if not axes:
         return conclusion, []
     shares = [_share(i, stages, quiet, view.settings) for i in axes]
-    causes = tuple(_named(i, float(steps[i])) for i in axes)
-    verdicts = tuple(
-        replace(a, verdict="explained", causes=(axes.index(a.axis - 1),))
-        if a.axis - 1 in axes
+    named = _with_causes(conclusion, [_named(i, float(steps[i])) for i in axes])
+    return named.with_checks([_says(i, float(steps[i])) for i in axes]), shares
+
+
+def _with_causes(conclusion: Conclusion, steps: Sequence[NamedCause]) -> Conclusion:
+    """Return a conclusion with steps of encoders behind its other causes."""
+    place = {c.axis: len(conclusion.causes) + k for k, c in enumerate(steps)}
+    axes = tuple(
+        replace(
+            a,
+            verdict="explained" if a.verdict == "none" else a.verdict,
+            causes=(*a.causes, place[a.axis]),
+        )
+        if a.axis in place
         else a
         for a in conclusion.axes
     )
-    named = replace(
-        conclusion,
-        verdict="explained",
-        causes=causes,
-        p_none=0.0,
-        p_unknown=1.0 - _SURE,
-        axes=verdicts,
-    )
-    return named.with_checks([_says(i, float(steps[i])) for i in axes]), shares
+    out = replace(conclusion, causes=(*conclusion.causes, *steps), axes=axes)
+    if conclusion.verdict != "none":
+        return out
+    return replace(out, verdict="explained", p_none=0.0, p_unknown=1.0 - _SURE)
 
 
 def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Interval:

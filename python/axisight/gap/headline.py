@@ -44,19 +44,24 @@ def headline(
 def _of_causes(
     conclusion: Conclusion, gap: Gap, causes: Sequence[Cause], own: Sequence[Effect]
 ) -> str:
-    shrinks = (
-        f"adding {'it' if len(causes) == 1 else 'them'} shrinks the gap on held-out data from "
-        f"{percent(gap.before)} to {percent(gap.after)} of the torque (noise alone: {percent(gap.floor)})."
-    )
-    if conclusion.verdict == "undecidable":
-        rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])
-        return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
+    steps = [c for c in causes if c.effect == STEPS[0]]
     missing = named(causes, own, len(gap.before_per_axis))
-    if all(c.effect == STEPS[0] for c in causes):
+    if causes and len(steps) == len(causes):
         return (
             f"The simulator lacks {missing}: the steps of the encoders are the noise at which the gap of "
             f"{percent(gap.refitted)} of the torque stands (noise and steps: {percent(gap.floor)})."
         )
+    others = [c for c in causes if c not in steps]
+    added = "it" if len(others) == 1 else "them"
+    if steps:
+        added = named(others, own, len(gap.before_per_axis))
+    shrinks = (
+        f"adding {added} shrinks the gap on held-out data from {percent(gap.before)} to "
+        f"{percent(gap.after)} of the torque (noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
+    )
+    if conclusion.verdict == "undecidable":
+        rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])
+        return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
     return f"The simulator lacks {missing}: {shrinks}"
 
 

@@ -298,7 +298,7 @@ def _assemble(
         reach.judged,
         lambda errors: stage(held_logs, errors, settings.block_s, measured),
     )
-    causes = _causes(conclusion, reach.reductions or of_steps)
+    causes = _causes(conclusion, [*reach.reductions, *of_steps])
     places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
