@@ -148,6 +148,23 @@ def test_repeats_are_the_floor():
     assert not InverseNoise.of(ROBOT, [logs[0], other], filtering, 0).repeated
 
 
+def test_other_multisines_on_one_square_wave_are_no_repeats():
+    # Positions follow the wave, within a hundredth of it whatever the multisine.
+    def riding(seed):
+        log = log_of(ROBOT, 0, seconds=20.0)
+        lines = np.arange(2.0, 8.0, 0.1)
+        phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+        wave = np.cos(2 * np.pi * np.outer(log.time_s, lines) + phases).sum(axis=1)
+        ride = 0.01 * np.ptp(log.position_rad, axis=0) * wave[:, None] / np.abs(wave).max()
+        return replace(log, name=f"run {seed}", position_rad=log.position_rad + ride)
+
+    logs, filtering = [riding(seed) for seed in range(2)], Filtering(10.0)
+    apart = np.std(logs[0].position_rad - logs[1].position_rad, axis=0)
+    assert np.all(apart < 0.01 * np.ptp(logs[0].position_rad, axis=0))
+    assert repeated_std_nm(logs, filtering) is None
+    assert repeated_std_nm([logs[0], logs[0]], filtering) is not None
+
+
 def test_periods_of_a_log_are_repeats():
     log = replace(log_of(ROBOT, 0, seconds=50.0), period_s=10.0)
     # Four periods after the first; a low-passed white noise keeps the share of the band it passes.

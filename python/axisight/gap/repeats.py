@@ -13,8 +13,10 @@ from axisight.logs import Log
 Array = NDArray[np.float64]
 
 # Positions of a repeated motion differ by less than this share of their range, on every axis:
-# controllers repeat themselves to a thousandth, and other motions are not alike by chance.
+# controllers repeat themselves to a thousandth, and other motions are not alike by chance. Positions of
+# multisines on one square wave are: speeds tell them apart, which have more noise.
 _SAME = 0.01
+_SAME_SPEED = 0.02
 
 
 def repeated_std_nm(logs: Sequence[Log], filtering: Filtering) -> Array | None:
@@ -53,5 +55,10 @@ def _periods(log: Log, whole: Motion) -> list[Motion]:
 def _same(one: Motion, other: Motion) -> bool:
     if one[0].shape != other[0].shape:
         return False
-    allowed = _SAME * np.maximum(np.ptp(one[0], axis=0), 1e-12)
-    return bool(np.all(np.sqrt(np.mean((one[0] - other[0]) ** 2, axis=0)) <= allowed))
+    return _alike(one[0], other[0], _SAME) and _alike(one[1], other[1], _SAME_SPEED)
+
+
+def _alike(one: Array, other: Array, share: float) -> bool:
+    """Whether signals (n, n_axes) differ by less than a share of their range, on every axis."""
+    allowed = share * np.maximum(np.ptp(one, axis=0), 1e-12)
+    return bool(np.all(np.sqrt(np.mean((one - other) ** 2, axis=0)) <= allowed))
