@@ -1,6 +1,6 @@
 """Pairs of causes that weak logs leave open, and what the designed experiment makes of them.
 
-    python benches/separating.py
+    python benches/separating.py [NAME ...]
 
 One elastic axis, simulated: two logs to fit and choose on, one to validate, 6 s each, which hardly show
 the effect that is withheld. Diagnosed, with the experiment that separates the rivals; run as often as it says,
@@ -9,6 +9,7 @@ on the same machine; diagnosed again with those runs beside the logs.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,34 @@ Array = NDArray[np.float64]
 SECONDS = 6.0
 # What is withheld; then peak, band and square wave of the multisine of the logs, and a constant speed.
 CASES = {
+    "backlash, cubic stiffness": (
+        Effect("backlash", 1, {"half_width_rad": 6e-5}),
+        (2.0, (1.0, 15.0), 3.0, 0.0),
+    ),
+    "cubic stiffness, backlash": (
+        Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 2e10}),
+        (4.0, (1.0, 15.0), 3.0, 0.0),
+    ),
+    "delay, current loop": (
+        Effect("input_delay", 1, {"delay_s": 6e-4}),
+        (1.0, (1.0, 15.0), 3.0, 0.0),
+    ),
+    "current loop, delay": (
+        Effect("current_loop", 1, {"time_constant_s": 6e-4, "damping": 0.7}),
+        (1.0, (1.0, 15.0), 3.0, 0.0),
+    ),
+    "torque constant, payload": (
+        Effect("torque_constant", 1, {"relative_error": 0.06}),
+        (4.0, (1.0, 4.0), 4.0, 0.0),
+    ),
+    "payload, torque constant": (
+        Effect("payload", None, {"mass_kg": 15.0, "x_m": 1.0}),
+        (4.0, (1.0, 4.0), 4.0, 0.0),
+    ),
+    "load-dependent friction, Stribeck": (
+        Effect("load_dependent_friction", 1, {"coefficient": 0.01, "smoothing_rad_s": 0.1}),
+        (1.0, (1.0, 12.0), 3.0, 0.0),
+    ),
     "delay, lag": (
         Effect("input_delay", 1, {"delay_s": 6e-4}),
         (1.0, (1.0, 15.0), 3.0, 0.0),
@@ -107,8 +136,11 @@ def main() -> None:
     off = {"axis1.stiffness": 1.007, "axis1.motor_inertia": 0.994, "axis1.damping": 1.03}
     nominal = robot.parameters()
     machine = robot.with_parameters({k: nominal[k] * f for k, f in off.items()})
+    wanted = set(sys.argv[1:])
     print("| withheld, rival | before | experiment | after |\n|---|---|---|---|")
     for name, (effect, wave) in CASES.items():
+        if wanted and name not in wanted:
+            continue
         refs = [reference(seed, robot.sample_time_s, wave) for seed in (1, 2, 3)]
         logs = [log_of(machine, effect, r, k) for k, r in enumerate(refs)]
         before = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:], separate=True)

@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from axisight import Effect, Settings
+from axisight import Effect, Settings, diagnose
 from axisight.gap import trials
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.search import _beaten_at_home
 from axisight.gap.trials import Trials
 from axisight.gap.usual import begun_where_it_ended
+from gap_data import PLAN, bare_axis, logs_of, scattered
 
 WIDTH = 2.1e-4
 PLAY = FreeEffect(Effect("backlash", 1, {"half_width_rad": 0.0}), ("half_width_rad",))
@@ -77,7 +78,7 @@ def test_it_stands_where_its_own_axis_has_no_other(home):
 # Falls of a cube of axis 3, a play of axis 1 that feels it, and friction of axis 2 that does not.
 NONE_USUAL = SimpleNamespace(effect=Effect("viscous_friction", 1))
 TRIED = [
-    SimpleNamespace(label=label, candidate=NONE_USUAL)
+    SimpleNamespace(label=label, candidate=NONE_USUAL, cost=2.0)
     for label in ("cube@3", "play@1", "friction@2")
 ]
 FALLS = np.array([[30.0, 1.0, 90.0], [60.0, 1.0, 5.0], [0.1, 9.0, 0.1]])
@@ -100,24 +101,56 @@ def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     assert [s.axis for s in kept] == [1, 2]
 
 
-@pytest.mark.parametrize("begun", [set(), {"backlash@1"}])
-def test_what_began_where_a_clear_leader_ended_is_refined(monkeypatch, begun: set):
-    """A leader that is clear needs no better fit itself, but not while it may be another at its limits."""
-    rival = SimpleNamespace(
-        score=0.89,
-        trial=SimpleNamespace(
-            label="backlash@1", candidate=SimpleNamespace(effect=Effect("backlash", 1))
-        ),
-    )
+def rival_of(score: float, cost: float):
+    effect = Effect("backlash", 1)
+    candidate = SimpleNamespace(effect=effect)
+    trial = SimpleNamespace(label=effect.label, candidate=candidate, cost=cost)
+    return SimpleNamespace(score=score, trial=trial)
+
+
+def refined_next(monkeypatch, rival, begun: set | None = None, *, mends: bool = False) -> list[str]:
     standing = led(0, rivals=(rival,))
     monkeypatch.setattr(trials, "_clear", lambda _: True)
     field = SimpleNamespace(
         standings=lambda _: [standing],
         layout=SimpleNamespace(samples=lambda: np.ones(3)),
         least=np.zeros(3),
+        mends=lambda _: mends,
         settings=Settings(),
-        usual=begun,
+        usual=begun or set(),
         done=set(),
     )
     todo = Trials._worth_refining(field, TRIED, set(), even_felt=True)
-    assert [t.label for t in todo] == sorted(begun)
+    return [t.label for t in todo]
+
+
+@pytest.mark.parametrize("begun", [set(), {"backlash@1"}])
+def test_what_began_where_a_clear_leader_ended_is_refined(monkeypatch, begun: set):
+    """A leader that is clear needs no better fit itself, but not while it may be another at its limits."""
+    assert refined_next(monkeypatch, rival_of(0.89, cost=2.0), begun) == sorted(begun)
+
+
+def test_what_does_as_well_with_less_is_refined(monkeypatch):
+    """Two per cent are the error of sensitivities that are not its own, or of a formula."""
+    assert refined_next(monkeypatch, rival_of(0.98, cost=1.0)) == ["backlash@1"]
+    assert refined_next(monkeypatch, rival_of(0.98, cost=2.0)) == []
+    assert refined_next(monkeypatch, rival_of(0.96, cost=1.0)) == []
+
+
+def test_what_mends_a_formula_is_not_refined(monkeypatch):
+    assert refined_next(monkeypatch, rival_of(0.98, cost=1.0), mends=True) == []
+
+
+def test_a_heavier_link_is_not_an_eccentric_encoder():
+    """Over a short way the encoder's wave is a slope, and does as well with one number more."""
+    robot = bare_axis()
+    machine = scattered(robot, 4)
+    load = Effect("payload", None, {"mass_kg": 200.0, "x_m": 1.0})
+    wanted = robot.parameters()["axis1.inertia_scale"]
+    logs = logs_of(machine, [load], PLAN, seconds=4.0)
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    (cause,) = found.causes
+    assert cause.label == "link_inertia@1"
+    # The link turns about the axis of the joint: 1130 kg m^2, and 200 kg at one metre more.
+    heavier = 200.0 / (1130.0 * wanted)
+    assert cause.parameters["relative_change"].value == pytest.approx(heavier, rel=0.05)

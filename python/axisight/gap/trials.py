@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Standing, Trial, falls, stand, trial
+from axisight.gap.decide import FORMULA_ERROR, Ranked, Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.kept import KeptColumns
@@ -359,6 +359,7 @@ class Trials:
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
                 rivals = ()
+            usual |= {r.trial.label for r in _as_good_with_less(standing)}
             rivals += tuple(
                 r for r in standing.ranked if r.trial.label in usual and r not in rivals
             )
@@ -442,6 +443,19 @@ def _clear(standing: Standing) -> bool:
         return False
     alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
+
+
+def _as_good_with_less(standing: Standing) -> list[Ranked]:
+    """Return the rivals that need fewer numbers than the leader, and explain nearly as much.
+
+    What they leave more may be the error of sensitivities that are not their own.
+    """
+    leader = standing.best
+    return [
+        r
+        for r in standing.ranked[1:]
+        if r.trial.cost < leader.trial.cost and r.score > leader.score - FORMULA_ERROR
+    ]
 
 
 def _are_lags(one: Ranked, other: Ranked) -> bool:
