@@ -23,12 +23,12 @@ SECONDS = 6.0
 # What is withheld; then peak, band and square wave of the multisine of the logs, and a constant speed.
 CASES = {
     "backlash, cubic stiffness": (
-        Effect("backlash", 1, {"half_width_rad": 6e-5}),
-        (2.0, (1.0, 15.0), 3.0, 0.0),
+        Effect("backlash", 1, {"half_width_rad": 1e-5}),
+        (1.0, (1.0, 6.0), 2.0, 0.0),
     ),
     "cubic stiffness, backlash": (
-        Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 2e10}),
-        (4.0, (1.0, 15.0), 3.0, 0.0),
+        Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 3e10}),
+        (1.0, (1.0, 6.0), 1.0, 0.0),
     ),
     "delay, current loop": (
         Effect("input_delay", 1, {"delay_s": 6e-4}),
@@ -38,16 +38,16 @@ CASES = {
         Effect("current_loop", 1, {"time_constant_s": 6e-4, "damping": 0.7}),
         (1.0, (1.0, 15.0), 3.0, 0.0),
     ),
-    "torque constant, payload": (
-        Effect("torque_constant", 1, {"relative_error": 0.06}),
+    "torque constant, load": (
+        Effect("torque_constant", 1, {"relative_error": -0.06}),
         (4.0, (1.0, 4.0), 4.0, 0.0),
     ),
-    "payload, torque constant": (
-        Effect("payload", None, {"mass_kg": 15.0, "x_m": 1.0}),
+    "load, torque constant": (
+        Effect("payload", None, {"mass_kg": 100.0, "x_m": 1.0}),
         (4.0, (1.0, 4.0), 4.0, 0.0),
     ),
     "load-dependent friction, Stribeck": (
-        Effect("load_dependent_friction", 1, {"coefficient": 0.01, "smoothing_rad_s": 0.1}),
+        Effect("load_dependent_friction", 1, {"coefficient": 0.002, "smoothing_rad_s": 0.1}),
         (1.0, (1.0, 12.0), 3.0, 0.0),
     ),
     "delay, lag": (

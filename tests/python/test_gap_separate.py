@@ -16,6 +16,7 @@ from axisight.gap.layout import layout_of
 from axisight.gap.separate.design import separating
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
+from axisight.logs import lowpass
 from gap_data import bare_axis, log_of, scattered
 
 
@@ -133,6 +134,16 @@ def test_a_motion_begins_and_ends_at_rest_where_it_began(logs: list[Log]):
         speed = motion.reference[:, 0]
         assert abs(speed[0]) <= 1e-12
         assert abs(speed.sum()) <= 1e-9 * np.abs(speed).sum()
+
+
+def test_multisines_ride_on_a_wave_that_keeps_the_motor_turning(logs: list[Log]):
+    # At rest a diagnosis hardly counts what it sees: dry friction may hold any torque there.
+    step_s = MACHINE.sample_time_s
+    found = {m.words: m.reference[:, 0] for m in motions(seen_range(logs), (1,), step_s, 400.0, 0)}
+    for words in ("A multisine", "A wide multisine", "A multisine of high frequencies"):
+        wave = found[words]
+        turns = np.abs(lowpass(wave[:, None], step_s, 5.0)) > 0.2 * np.abs(wave).max()
+        assert np.mean(turns) > 0.9
 
 
 def test_the_design_is_a_function_of_the_seed(view: ClosedLoopView):

@@ -116,8 +116,10 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     steps = np.repeat([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0], n // 8)
     louder = np.repeat([0.1, 0.1, 0.3, 0.3, 0.3, 1.0, 1.0, 1.0], n // 8) * out["a multisine"]
     out |= {
-        "a wide multisine": _unit(wide),
-        "a multisine of high frequencies": _unit(high),
+        # These ride on a square wave, too: what dry friction makes of a motor that trembles at rest is
+        # open, and counts for little.
+        "a wide multisine": _unit(_unit(wide) + flat),
+        "a multisine of high frequencies": _unit(_unit(high) + flat),
         "a multisine that grows": _unit(louder),
         "one turn each way at constant speed": slow,
         "constant speeds both ways": _smooth(speeds, sample_time_s),
