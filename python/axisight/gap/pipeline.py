@@ -28,6 +28,7 @@ from axisight.gap.gate import pass_gate
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.modes import view_of
+from axisight.gap.recovered import SAYS, with_references
 from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
@@ -77,7 +78,8 @@ def diagnose(
     Returns
     -------
     The diagnosis. Closed loop when the robot has a controller and every log its
-    velocity references, inverse dynamics otherwise. The same input, settings
+    velocity references, or none has and the gears are elastic (the references are then those for
+    which the controller commands the logged torque); inverse dynamics otherwise. The same input, settings
     and version give the same result.
 
     Raises
@@ -93,6 +95,9 @@ def diagnose(
     progress("looking at the logs", 0, 1)
     noted = pass_gate(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
+    recovered = with_references(machine, [*fit_logs, *held_logs])
+    if recovered is not None:
+        fit_logs, held_logs = recovered[: len(fit_logs)], recovered[len(fit_logs) :]
     view = view_of(machine, fit_logs, held_logs, chosen)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     found = believed_by_axis(found, view.fitter, chosen)
@@ -108,6 +113,9 @@ def diagnose(
         progress("designing an experiment", 1, 1)
         if experiment is not None:
             out = replace(out, experiment=experiment, next_experiment=str(experiment))
+    if recovered is not None:
+        out = replace(out, checks=(*out.checks, SAYS))
+    out.provenance["references"] = "logged" if recovered is None else "recovered"
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
 

@@ -1,0 +1,100 @@
+"""References that were not logged: those with which the stated controller commands the logged torque.
+
+Its law is algebra of references, positions and torques: what is missing is found sample by sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.gap.cutoff import rigid_below_hz
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import simulate
+
+Array = NDArray[np.float64]
+
+# Of the noise of measured speeds, in the upper part of the band: references have none of it. More is left
+# where the machine's controller is not the stated one.
+_NOISE_LEFT = 0.1
+_UPPER = 0.8
+# Of the largest speed: what would begin with less begins at rest, its weight not quite the simulator's.
+_STEP = 0.01
+
+SAYS = (
+    "References were not logged: those are taken with which the stated controller commands the logged torque. "
+    "By what the machine's controller differs from it, and which limit cut its torque, cannot show."
+)
+
+
+def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
+    """Return logs with the references (n, n_axes) [rad/s] that they lack; None where none are to be had.
+
+    Only for a robot of elastic gears with a controller, whose torque no inverse dynamics predicts, and
+    where no log has references. Every log begins at rest. None, too, where they are as noisy as measured
+    speeds: the torque is not that of this controller.
+    """
+    missing = all(log.velocity_ref_rad_s is None for log in logs)
+    if robot.controller_kind == "none" or not missing or rigid_below_hz(robot) == np.inf:
+        return None
+    found = [reference_of(robot, log) for log in logs]
+    if any(_noisy(r, log) for r, log in zip(found, logs, strict=True)):
+        return None
+    return [replace(log, velocity_ref_rad_s=r) for r, log in zip(found, logs, strict=True)]
+
+
+def reference_of(robot: Robot, log: Log) -> Array:
+    """Return the velocity reference (n, n_axes) [rad/s] for which the controller commands the torque of a log.
+
+    `gain_shares` solved for the reference. Either the first sample commands what holds the arm, or the
+    reference begins with a step and the simulator's weight holds it: what that is off by is forgotten as
+    the integral of the error is.
+    """
+    gains, step = robot.controller_gains, log.sample_time_s
+    kp, ki = np.asarray(gains["kp"]), np.asarray(gains.get("ki", np.zeros(log.n_axes)))
+    position = log.position_rad - log.position_rad[0]
+    speed = np.diff(position, axis=0, prepend=position[:1]) / step
+    torque = log.torque_nm - _holding_nm(robot, log)
+    if "kv" not in gains:
+        return _solved(speed + (torque + ki * position) / kp, ki / kp * step)
+    error = _solved(torque / kp, ki / kp * step)
+    kv = np.asarray(gains["kv"])
+    return _solved(error + speed + kv * position, kv * step)
+
+
+def _holding_nm(robot: Robot, log: Log) -> Array:
+    """Return the torque (n_axes,) [Nm] that holds the arm before the log begins.
+
+    The first one, or the simulator's where that would make the first one a step of the reference.
+    """
+    simulated = simulate(robot, np.zeros((1, log.n_axes)))["torque_cmd_nm"].values[0]
+    speed = np.abs(np.diff(log.position_rad, axis=0)).max(axis=0) / log.sample_time_s
+    first, slight = log.torque_nm[0], _STEP * robot.controller_gains["kp"] * speed
+    return np.asarray(np.where(np.abs(first - simulated) < slight, first, simulated))
+
+
+def _solved(given: Array, share: Array) -> Array:
+    """Return x (n, n_axes) with ``x + share * (sum of all x before) = given``."""
+    columns = [
+        scipy.signal.lfilter([1.0, -1.0], [1.0, float(s) - 1.0], g)
+        for s, g in zip(np.broadcast_to(share, given.shape[1:]), given.T, strict=True)
+    ]
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _noisy(reference: Array, log: Log) -> bool:
+    """Whether a reference has the noise of measured speeds on any axis."""
+    speed = np.diff(log.position_rad, axis=0) / log.sample_time_s
+    ours, theirs = _upper_rms(reference[1:]), _upper_rms(speed)
+    return bool(np.any(ours > _NOISE_LEFT * theirs))
+
+
+def _upper_rms(x: Array) -> Array:
+    """Return the rms (n_axes,) of what lies in the upper part of the band."""
+    spectrum = np.abs(np.fft.rfft(x * np.hanning(len(x))[:, None], axis=0)) ** 2
+    return np.asarray(np.sqrt(spectrum[int(_UPPER * len(spectrum)) :].mean(axis=0)))
