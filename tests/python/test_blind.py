@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.stats
 from typer.testing import CliRunner
@@ -21,6 +22,7 @@ from axisight.blind import (
     mujoco_engine,
     pinocchio_engine,
 )
+from axisight.blind.case_files import CaseFolder
 from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
 from axisight.blind.formulas import (
     ConstantTorque,
@@ -32,7 +34,7 @@ from axisight.blind.formulas import (
 )
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
-from axisight.blind.make import _noise, make_cases
+from axisight.blind.make import _in_steps, _noise, make_cases
 from axisight.blind.motions import MOTIONS, multisines
 from axisight.blind.scene import Scene
 from axisight.blind.score import _missed, _said, comparable, sizes
@@ -236,6 +238,25 @@ def test_a_case_is_a_function_of_seed_and_number():
     assert any(len(pair) == 2 for pair in pairs)
 
 
+def test_some_logs_have_no_references_and_some_torques_steps(tmp_path: Path):
+    drawn = [draw(0, n) for n in range(200)]
+    bare = [d for d in drawn if not d.referenced]
+    assert 10 < len(bare) < 40
+    assert not {e.effect for d in bare for e in d.effects} & {"controller_gain", "clock_drift"}
+    stepped = [d for d in drawn if d.bits is not None]
+    assert 10 < len(stepped) < 40 and all(12 <= d.bits <= 15 for d in stepped)
+    torque = np.random.default_rng(0).uniform(-5, 5, (1000, 1))
+    rounded = _in_steps(torque, np.array([5.0]), 12)
+    step = 20.0 / 2**12
+    np.testing.assert_allclose(rounded / step, np.round(rounded / step), atol=1e-9)
+    assert np.abs(rounded - torque).max() <= step / 2 * (1 + 1e-9)
+    assert _in_steps(torque, np.array([5.0]), None) is torque
+    case = CaseFolder(tmp_path, "x")
+    case.add("moves", "estimation", np.arange(3.0), None, torque[:3], torque[:3])
+    columns = pd.read_parquet(tmp_path / "logs" / "moves.parquet").columns
+    assert list(columns) == ["time_s", "torque_cmd_1", "position_1"]
+
+
 def test_noise_of_some_sensors_is_coloured_and_as_large():
     drawn = [draw(3, n, Choice(arm="lever_like", motions="slow_and_short")) for n in range(12)]
     coloured = [d for d in drawn if d.corner_hz is not None]
@@ -317,7 +338,12 @@ def judged(
         "where": frozenset(),
         "ratios": (),
         "covered": (),
-        "setting": {"engine": "mujoco", "arm": "irb6600_like", "motions": "multisines"},
+        "setting": {
+            "engine": "mujoco",
+            "arm": "irb6600_like",
+            "motions": "multisines",
+            "references": "logged",
+        },
     }
     return Judged(**{**values, **more})  # type: ignore[arg-type]
 
@@ -418,7 +444,12 @@ def test_from_machine_to_score(tmp_path: Path):
     assert solved.exit_code == 0, solved.output
     (found,) = judged_cases(cases, truth, out)
     assert (found.kind, found.verdict, found.right) == ("nothing", "none", True)
-    assert found.setting == {"engine": "mujoco", "arm": "lever_like", "motions": "multisines"}
+    assert found.setting == {
+        "engine": "mujoco",
+        "arm": "lever_like",
+        "motions": "multisines",
+        "references": "logged",
+    }
     table = tmp_path / "score.md"
     arguments = ["--truth", str(truth), "--verdicts", str(out), "--out", str(table)]
     scored = shell.invoke(app, ["blind", "score", str(cases), *arguments])

@@ -29,12 +29,17 @@ def judged(
         "where": frozenset(),
         "ratios": (),
         "covered": (),
-        "setting": {"engine": "mujoco", "arm": "lever_like", "motions": "moves"},
+        "setting": {
+            "engine": "mujoco",
+            "arm": "lever_like",
+            "motions": "moves",
+            "references": "logged",
+        },
     }
     return Judged(**{**values, **more})
 
 
-OTHER = {"engine": "pinocchio", "arm": "lever_like", "motions": "moves"}
+OTHER = {"engine": "pinocchio", "arm": "lever_like", "motions": "moves", "references": "logged"}
 CASES = [
     judged(
         ("backlash@1",),

@@ -67,6 +67,19 @@ def test_rigid_robots_and_logs_with_references_stay_as_they_are():
     assert with_references(bare_axis(), [*without(logs[:1]), *logs[1:]]) is None
 
 
+def test_a_log_that_begins_in_motion_has_none():
+    logs = without(logs_of(bare_axis(), [], PLAN, seconds=2.0))
+    assert with_references(bare_axis(), logs) is not None
+    at = int(np.argmax(np.abs(np.diff(logs[-1].position_rad[:, 0]))))
+    cut = replace(
+        logs[-1],
+        time_s=logs[-1].time_s[at:],
+        torque_nm=logs[-1].torque_nm[at:],
+        position_rad=logs[-1].position_rad[at:],
+    )
+    assert with_references(bare_axis(), [*logs[:-1], cut]) is None
+
+
 def test_the_verdict_is_that_with_references():
     robot, machine = bare_axis(), scattered(bare_axis(), 4)
     fit, held = logs_of(machine, [FRICTION], PLAN), logs_of(machine, [FRICTION], HELD)

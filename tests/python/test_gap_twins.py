@@ -86,7 +86,12 @@ def test_a_score_takes_one_for_the_other_and_nothing_else():
             "where": [],
             "detection_limits": [],
         }
-        setting = {"engine": "mujoco", "arm": "lever_like", "motions": "moves"}
+        setting = {
+            "engine": "mujoco",
+            "arm": "lever_like",
+            "motions": "moves",
+            "references": "logged",
+        }
         return _judged("case", {"effects": [effect], "severity": [9.0], **setting}, verdict)
 
     assert judged("torque_sensor_offset", "torque_offset").truth == ("torque_offset@1",)

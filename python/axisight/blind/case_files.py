@@ -22,12 +22,22 @@ class CaseFolder:
         self._toml = ['schema = "axisight.case/1"', f'name = "{name}"', 'robot = "robot.toml"', ""]
 
     def add(
-        self, name: str, role: str, time_s: Array, reference: Array, torque: Array, angle: Array
+        self,
+        name: str,
+        role: str,
+        time_s: Array,
+        reference: Array | None,
+        torque: Array,
+        angle: Array,
     ) -> None:
-        """Write a log: time (n,), velocity reference [rad/s], torque [Nm], angle [rad], (n, n_axes)."""
+        """Write a log: time (n,), velocity reference [rad/s], torque [Nm], angle [rad], (n, n_axes).
+
+        Without a reference where there is none.
+        """
         data = {"time_s": time_s}
-        for i in range(reference.shape[1]):
-            data[f"velocity_ref_{i + 1}"] = reference[:, i]
+        for i in range(torque.shape[1]):
+            if reference is not None:
+                data[f"velocity_ref_{i + 1}"] = reference[:, i]
             data[f"torque_cmd_{i + 1}"] = torque[:, i]
             data[f"position_{i + 1}"] = angle[:, i]
         path = self.folder / "logs" / f"{name}.parquet"

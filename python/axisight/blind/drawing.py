@@ -45,6 +45,20 @@ _MOTIONS = {"multisines": 0.6, "moves": 0.2, "slow_and_short": 0.2}
 # Of so many cases one has sensors with noise of first order, of a corner between these.
 _COLOURED_ONE_IN = 5
 _CORNER_HZ = (300.0, 800.0)
+# One has logs without references, unless its effect shows by them only or is in the logged torque; and one
+# torques in steps, of a converter of so many bits over twice the largest torque.
+_UNREFERENCED_ONE_IN = 8
+_BY_REFERENCES = {
+    "clock_drift",
+    "controller_gain",
+    "feedforward_missing",
+    "torque_saturation",
+    "torque_sensor_gain",
+    "torque_sensor_offset",
+    "velocity_filter",
+}
+_STEPPED_ONE_IN = 8
+_BITS = (12, 16)
 
 
 @dataclass(frozen=True)
@@ -68,7 +82,8 @@ class Draw:
     """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role.
 
     ``robot``: the simulator that the case gets; ``corner_hz``: of the noise of its sensors, None where
-    it is white.
+    it is white; ``referenced``: whether logs have references; ``bits`` of the torques, None where they have
+    no steps.
     """
 
     number: int
@@ -81,6 +96,8 @@ class Draw:
     bare: Machine
     references: dict[str, tuple[str, Array]]
     corner_hz: float | None = None
+    referenced: bool = True
+    bits: int | None = None
 
 
 DRAWN = Choice()
@@ -105,8 +122,23 @@ def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Dr
     machine = _without_scatter_of(effects, scattered(rng, robot), robot)
     with_effects, bare = machine_of(machine, effects), machine_of(machine, ())
     corner_hz = float(rng.uniform(*_CORNER_HZ)) if rng.integers(_COLOURED_ONE_IN) == 0 else None
+    referenced = bool(rng.integers(_UNREFERENCED_ONE_IN)) or any(
+        e.effect in _BY_REFERENCES for e in effects
+    )
+    bits = int(rng.integers(*_BITS)) if rng.integers(_STEPPED_ONE_IN) == 0 else None
     return Draw(
-        number, engine, arm, motions, robot, effects, with_effects, bare, references, corner_hz
+        number,
+        engine,
+        arm,
+        motions,
+        robot,
+        effects,
+        with_effects,
+        bare,
+        references,
+        corner_hz,
+        referenced,
+        bits,
     )
 
 

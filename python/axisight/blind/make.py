@@ -110,14 +110,26 @@ def _validation(drawn: Draw) -> list[Array]:
 def _write(folder: Path, truth: Path, drawn: Draw, runs: tuple[Logs, Logs], seed: int) -> None:
     case = CaseFolder(folder, folder.name)
     logs, quiet = runs
-    for (name, (role, reference)), log in zip(drawn.references.items(), logs, strict=True):
+    largest = np.max([np.abs(torque).max(axis=0) for torque, _ in logs], axis=0)
+    for (name, (role, reference)), (torque, angle) in zip(
+        drawn.references.items(), logs, strict=True
+    ):
         time_s = np.arange(len(reference), dtype=np.float64) * drawn.robot.sample_time_s
-        case.add(name, role, time_s, reference, *log)
+        known = reference if drawn.referenced else None
+        case.add(name, role, time_s, known, _in_steps(torque, largest, drawn.bits), angle)
     case.finish(drawn.arm)
     text = json.dumps(_truth(drawn, seed, _severity(drawn, quiet)), indent=1)
     write_whole(truth, text)
     # Last: a case with its seal is whole.
     write_whole(folder / SEAL, seal_of(text) + "\n")
+
+
+def _in_steps(torque: Array, largest: Array, bits: int | None) -> Array:
+    """Return torques (n, n_axes) as a converter over twice the ``largest``, either way, has them."""
+    if bits is None:
+        return torque
+    step = 4 * np.maximum(largest, 1e-300) / 2**bits
+    return np.asarray(np.round(torque / step) * step)
 
 
 def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
@@ -127,6 +139,8 @@ def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
         "arm": drawn.arm,
         "motions": drawn.motions,
         "noise_corner_hz": drawn.corner_hz,
+        "references": "logged" if drawn.referenced else "missing",
+        "torque_bits": drawn.bits,
         "seed": seed,
         "number": drawn.number,
         "effects": [

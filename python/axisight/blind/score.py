@@ -18,8 +18,10 @@ from axisight.gap.twins import TWIN_SHARE, twins_of
 
 SEVERE = 3.0
 """Change of the torque over its noise from which an effect counts as there to be found."""
-SETTING = ("engine", "arm", "motions")
+SETTING = ("engine", "arm", "motions", "references")
 """What a case is drawn with, as its truth says."""
+# What truths before it was drawn do not say.
+_ALWAYS = {"references": "logged"}
 # Of a gap's reduction, that count as right.
 _POINTS = 0.05
 # Alternatives this likely belong to what a verdict allows.
@@ -33,10 +35,11 @@ class Judged:
     Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
     ``where``: the axis on which the gap mainly lies. ``ratios``: named value over true value of the
     parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
-    names of engine, arm and motions. ``missed``: by label of effects of the library that are not named,
-    their size over the detection limit that the verdict states for it; 0 where it says that no size would
-    show, NaN where it says nothing. ``reduction``: `gap_reduction` of the first cause; of the true cause of
-    a gap, where it is the only one, all of the gap goes.
+    names of engine, arm and motions, and whether references were logged. ``missed``: by label of
+    effects of the library that are not named, their size over the detection limit that the verdict
+    states for it; 0 where it says that no size would show, NaN where it says nothing. ``reduction``:
+    `gap_reduction` of the first cause; of the true cause of a gap, where it is the only one, all of
+    the gap goes.
     """
 
     name: str
@@ -167,10 +170,11 @@ def _as_named(effect: dict[str, Any], named: set[str], n_axes: int) -> dict[str,
 
 
 def _setting(name: str, truth: dict[str, Any]) -> dict[str, str]:
-    absent = [key for key in SETTING if key not in truth]
+    known = _ALWAYS | truth
+    absent = [key for key in SETTING if key not in known]
     if absent:
         raise InputError(f"{name}.json: expected {', '.join(absent)} of the case")
-    return {key: truth[key] for key in SETTING}
+    return {key: known[key] for key in SETTING}
 
 
 def _missed(

@@ -21,7 +21,7 @@ _SEVERITIES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, float("inf"))
 def summary(judged: Sequence[Judged]) -> dict[str, Any]:
     """Return figures, classes, confusion, calibration, a curve of detection and what is not right.
 
-    ``settings``: the figures by engine, arm and motions. ``confusion``: of single effects and of
+    ``settings``: the figures by what cases are drawn with. ``confusion``: of single effects and of
     nothing withheld, how often each was named as what; a verdict without a cause counts by its word.
     Twins count as one another. Shares have Wilson's interval.
     """
@@ -94,7 +94,7 @@ def _by_class(single: Sequence[Judged], of: Callable[[str], str]) -> dict[str, A
 
 
 def _by_setting(judged: Sequence[Judged], key: str) -> dict[str, Any]:
-    """Return the figures of the cases of every engine, arm or plan of motions."""
+    """Return the figures of the cases of every engine, arm or plan of motions, say."""
     out = {}
     for value in sorted({j.setting[key] for j in judged}):
         mine = [j for j in judged if j.setting[key] == value]

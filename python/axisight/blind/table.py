@@ -7,7 +7,7 @@ from typing import Any
 
 from axisight.blind.score import Share
 
-# Figures told apart by engine, arm and motions, under short names.
+# Figures told apart by what cases are drawn with, under short names.
 _BRIEF = {
     "effect first, severity 3 and more": "effect first",
     "axis": "axis",

@@ -25,6 +25,10 @@ _NOISE_LEFT = 0.1
 _UPPER = 0.8
 # Of the largest speed: what would begin with less begins at rest, its weight not quite the simulator's.
 _STEP = 0.01
+# Share of its largest speed with which a motor still begins at rest, and how often the noise of a position over
+# a sample that may be: six deviations of the parabola's slope.
+_AT_REST = 0.03
+_BY_NOISE = 15.0
 
 SAYS = (
     "References were not logged: those are taken with which the stated controller commands the logged torque. "
@@ -36,11 +40,13 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     """Return logs with the references (n, n_axes) [rad/s] that they lack; None where none are to be had.
 
     Only for a robot of elastic gears with a controller, whose torque no inverse dynamics predicts, and
-    where no log has references. Every log begins at rest. None, too, where they are as noisy as measured
+    where no log has references and all begin at rest. None, too, where they are as noisy as measured
     speeds: the torque is not that of this controller.
     """
     missing = all(log.velocity_ref_rad_s is None for log in logs)
     if robot.controller_kind == "none" or not missing or rigid_below_hz(robot) == np.inf:
+        return None
+    if not all(_begins_at_rest(log, robot.position_noise_std) for log in logs):
         return None
     found = [reference_of(robot, log) for log in logs]
     if any(_noisy(r, log) for r, log in zip(found, logs, strict=True)):
@@ -85,6 +91,14 @@ def _solved(given: Array, share: Array) -> Array:
         for s, g in zip(np.broadcast_to(share, given.shape[1:]), given.T, strict=True)
     ]
     return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _begins_at_rest(log: Log, noise_std: float) -> bool:
+    """Whether the motors stand where a log begins, by a parabola through its first positions."""
+    step, x = log.sample_time_s, log.position_rad
+    speed = np.abs(4 * x[1] - x[2] - 3 * x[0]) / (2 * step)
+    top = np.abs(np.diff(x, axis=0)).max(axis=0) / step
+    return bool(np.all(speed < np.maximum(_AT_REST * top, _BY_NOISE * noise_std / step)))
 
 
 def _noisy(reference: Array, log: Log) -> bool:
