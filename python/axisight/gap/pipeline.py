@@ -113,9 +113,10 @@ def diagnose(
         progress("designing an experiment", 1, 1)
         if experiment is not None:
             out = replace(out, experiment=experiment, next_experiment=str(experiment))
+    out.provenance["references"] = "logged" if view.mode == "closed_loop" else None
     if recovered is not None:
         out = replace(out, checks=(*out.checks, SAYS))
-    out.provenance["references"] = "logged" if recovered is None else "recovered"
+        out.provenance["references"] = "recovered"
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
 
