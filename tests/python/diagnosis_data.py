@@ -166,6 +166,7 @@ def explained(n_axes: int = 3) -> Diagnosis:
             "estimation_logs": ["a", "b"],
             "validation_logs": ["validation_multisine", "validation_trajectory"],
             "position_noise_std_rad": [1e-5] * n_axes,
+            "references": "logged",
             "cutoff_hz": None,
             "seconds": 12.3,
         },
