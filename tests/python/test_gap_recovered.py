@@ -67,6 +67,21 @@ def test_rigid_robots_and_logs_with_references_stay_as_they_are():
     assert with_references(bare_axis(), [*without(logs[:1]), *logs[1:]]) is None
 
 
+def test_a_log_of_every_tenth_sample_has_none():
+    logs = without(logs_of(bare_axis(), [], PLAN, seconds=2.0))
+    few = [
+        replace(
+            log,
+            sample_time_s=10 * log.sample_time_s,
+            time_s=log.time_s[::10],
+            torque_nm=log.torque_nm[::10],
+            position_rad=log.position_rad[::10],
+        )
+        for log in logs
+    ]
+    assert with_references(bare_axis(), few) is None
+
+
 def test_a_log_that_begins_in_motion_has_none():
     logs = without(logs_of(bare_axis(), [], PLAN, seconds=2.0))
     assert with_references(bare_axis(), logs) is not None

@@ -30,6 +30,9 @@ _STEP = 0.01
 _AT_REST = 0.03
 _BY_NOISE = 15.0
 
+# By how much a sample time may be off and still be that of the controller.
+_SAME_CLOCK = 1e-3
+
 SAYS = (
     "References were not logged: those are taken with which the stated controller commands the logged torque. "
     "By what the machine's controller differs from it, and which limit cut its torque, cannot show."
@@ -40,13 +43,15 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     """Return logs with the references (n, n_axes) [rad/s] that they lack; None where none are to be had.
 
     Only for a robot of elastic gears with a controller, whose torque no inverse dynamics predicts, and
-    where no log has references and all begin at rest. None, too, where they are as noisy as measured
-    speeds: the torque is not that of this controller.
+    where no log has references, and all begin at rest and have every sample of the controller. None, too,
+    where they are as noisy as measured speeds: the torque is not that of this controller.
     """
     missing = all(log.velocity_ref_rad_s is None for log in logs)
     if robot.controller_kind == "none" or not missing or rigid_below_hz(robot) == np.inf:
         return None
-    if not all(_begins_at_rest(log, robot.position_noise_std) for log in logs):
+    if np.any(np.asarray(robot.controller_gains["kp"]) <= 0):
+        return None
+    if not all(_has_every_sample(log, robot) and _begins_at_rest(log, robot) for log in logs):
         return None
     found = [reference_of(robot, log) for log in logs]
     if any(_noisy(r, log) for r, log in zip(found, logs, strict=True)):
@@ -93,9 +98,13 @@ def _solved(given: Array, share: Array) -> Array:
     return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
-def _begins_at_rest(log: Log, noise_std: float) -> bool:
+def _has_every_sample(log: Log, robot: Robot) -> bool:
+    return abs(log.sample_time_s / robot.sample_time_s - 1) < _SAME_CLOCK
+
+
+def _begins_at_rest(log: Log, robot: Robot) -> bool:
     """Whether the motors stand where a log begins, by a parabola through its first positions."""
-    step, x = log.sample_time_s, log.position_rad
+    step, x, noise_std = log.sample_time_s, log.position_rad, robot.position_noise_std
     speed = np.abs(4 * x[1] - x[2] - 3 * x[0]) / (2 * step)
     top = np.abs(np.diff(x, axis=0)).max(axis=0) / step
     return bool(np.all(speed < np.maximum(_AT_REST * top, _BY_NOISE * noise_std / step)))
