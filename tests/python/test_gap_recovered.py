@@ -2,12 +2,13 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from axisight import Effect, Log, diagnose, load_robot
-from axisight.gap.recovered import SAYS, reference_of, with_references
+from axisight import Effect, Log, diagnose, load_robot, simulate
+from axisight.gap.recovered import SAYS, _has_every_sample, reference_of, with_references
 from gap_data import HELD, PLAN, bare_axis, log_of, logs_of, reference, scattered
 
 FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.1})
@@ -68,18 +69,29 @@ def test_rigid_robots_and_logs_with_references_stay_as_they_are():
 
 
 def test_a_log_of_every_tenth_sample_has_none():
-    logs = without(logs_of(bare_axis(), [], PLAN, seconds=2.0))
-    few = [
-        replace(
-            log,
-            sample_time_s=10 * log.sample_time_s,
-            time_s=log.time_s[::10],
-            torque_nm=log.torque_nm[::10],
-            position_rad=log.position_rad[::10],
-        )
-        for log in logs
-    ]
-    assert with_references(bare_axis(), few) is None
+    robot = bare_axis()
+    wave = reference("moves", 0, 6000, robot.sample_time_s)
+    data = simulate(robot, wave)
+    every = Log(
+        name="moves",
+        source=Path("moves"),
+        sample_time_s=robot.sample_time_s,
+        time_s=data.time.values,
+        velocity_ref_rad_s=None,
+        torque_nm=data.torque_cmd_nm.values,
+        position_rad=data.position_rad.values,
+    )
+    few = replace(
+        every,
+        sample_time_s=10 * every.sample_time_s,
+        time_s=every.time_s[::10],
+        torque_nm=every.torque_nm[::10],
+        position_rad=every.position_rad[::10],
+    )
+    # Without noise of its own, a log has the stated one.
+    assert with_references(robot, [every]) is not None
+    assert with_references(robot, [few]) is None
+    assert _has_every_sample(every, robot) and not _has_every_sample(few, robot)
 
 
 def test_a_log_that_begins_in_motion_has_none():

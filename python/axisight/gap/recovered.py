@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from axisight.gap.cutoff import rigid_below_hz
 from axisight.logs import Log
 from axisight.robot import Robot
-from axisight.simulation import simulate
+from axisight.simulation import simulate, white_noise
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,8 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     if not all(_has_every_sample(log, robot) and _begins_at_rest(log, robot) for log in logs):
         return None
     found = [reference_of(robot, log) for log in logs]
-    if any(_noisy(r, log) for r, log in zip(found, logs, strict=True)):
+    std = robot.position_noise_std
+    if any(_noisy(r, log, std) for r, log in zip(found, logs, strict=True)):
         return None
     return [replace(log, velocity_ref_rad_s=r) for r, log in zip(found, logs, strict=True)]
 
@@ -110,11 +111,12 @@ def _begins_at_rest(log: Log, robot: Robot) -> bool:
     return bool(np.all(speed < np.maximum(_AT_REST * top, _BY_NOISE * noise_std / step)))
 
 
-def _noisy(reference: Array, log: Log) -> bool:
-    """Whether a reference has the noise of measured speeds on any axis."""
-    speed = np.diff(log.position_rad, axis=0) / log.sample_time_s
-    ours, theirs = _upper_rms(reference[1:]), _upper_rms(speed)
-    return bool(np.any(ours > _NOISE_LEFT * theirs))
+def _noisy(reference: Array, log: Log, noise_std: float) -> bool:
+    """Whether a reference has the noise of measured speeds on any axis, or of the stated sensor's if that is more."""
+    noise = white_noise(0, 0, *log.position_rad.shape) * noise_std
+    speeds = [np.diff(x, axis=0) / log.sample_time_s for x in (log.position_rad, noise)]
+    theirs = np.max([_upper_rms(x) for x in speeds], axis=0)
+    return bool(np.any(_upper_rms(reference[1:]) > _NOISE_LEFT * theirs))
 
 
 def _upper_rms(x: Array) -> Array:
