@@ -239,12 +239,12 @@ def test_a_case_is_a_function_of_seed_and_number():
 
 
 def test_some_logs_have_no_references_and_some_torques_steps(tmp_path: Path):
-    drawn = [draw(0, n) for n in range(200)]
+    drawn = [draw(0, n) for n in range(32)]
     bare = [d for d in drawn if not d.referenced]
-    assert 10 < len(bare) < 40
+    assert 0 < len(bare) < 16
     assert not {e.effect for d in bare for e in d.effects} & {"controller_gain", "clock_drift"}
     stepped = [d for d in drawn if d.bits is not None]
-    assert 10 < len(stepped) < 40 and all(12 <= d.bits <= 15 for d in stepped)
+    assert 0 < len(stepped) < 16 and all(12 <= d.bits <= 15 for d in stepped)
     torque = np.random.default_rng(0).uniform(-5, 5, (1000, 1))
     rounded = _in_steps(torque, np.array([5.0]), 12)
     step = 20.0 / 2**12

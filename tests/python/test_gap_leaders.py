@@ -68,6 +68,7 @@ def test_what_is_more_usual_than_a_clear_leader_is_refined():
     field = SimpleNamespace(
         layout=SimpleNamespace(samples=lambda: np.ones(3)),
         least=np.zeros(3),
+        mends=lambda _: False,
         settings=Settings(),
         usual=set(),
         done=set(),
@@ -87,6 +88,7 @@ def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():
         standings=lambda _: [first, third],
         layout=SimpleNamespace(samples=lambda: np.ones(3)),
         least=np.zeros(3),
+        mends=lambda _: False,
         settings=Settings(),
         usual=set(),
         done=set(),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from axisight.blind.machine import Machine
 from axisight.blind.motions import MOTIONS
 from axisight.blind.scene import Drawn, Kind, Scene
-from axisight.blind.withheld import KINDS
+from axisight.blind.withheld import BY_REFERENCES, KINDS
 from axisight.blind.withheld_formulas import KINDS_BY_FORMULA
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
@@ -48,15 +48,6 @@ _CORNER_HZ = (300.0, 800.0)
 # One has logs without references, unless its effect shows by them only or is in the logged torque; and one
 # torques in steps, of a converter of so many bits over twice the largest torque.
 _UNREFERENCED_ONE_IN = 8
-_BY_REFERENCES = {
-    "clock_drift",
-    "controller_gain",
-    "feedforward_missing",
-    "torque_saturation",
-    "torque_sensor_gain",
-    "torque_sensor_offset",
-    "velocity_filter",
-}
 _STEPPED_ONE_IN = 8
 _BITS = (12, 16)
 
@@ -123,7 +114,7 @@ def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Dr
     with_effects, bare = machine_of(machine, effects), machine_of(machine, ())
     corner_hz = float(rng.uniform(*_CORNER_HZ)) if rng.integers(_COLOURED_ONE_IN) == 0 else None
     referenced = bool(rng.integers(_UNREFERENCED_ONE_IN)) or any(
-        e.effect in _BY_REFERENCES for e in effects
+        e.effect in BY_REFERENCES for e in effects
     )
     bits = int(rng.integers(*_BITS)) if rng.integers(_STEPPED_ONE_IN) == 0 else None
     return Draw(

@@ -381,3 +381,16 @@ KINDS: Mapping[str, Kind] = {
     "cubic_damper": Kind(_cubic_damper, in_library=False),
 }
 """By name."""
+
+BY_REFERENCES = frozenset(
+    {
+        "clock_drift",
+        "controller_gain",
+        "feedforward_missing",
+        "torque_saturation",
+        "torque_sensor_gain",
+        "torque_sensor_offset",
+        "velocity_filter",
+    }
+)
+"""What shows by references only, or is in the logged torque from which they would be recovered."""
