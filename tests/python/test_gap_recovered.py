@@ -2,12 +2,12 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from axisight import Effect, Log, diagnose, load_robot, simulate
+from axisight.gap import recovered
 from axisight.gap.recovered import SAYS, _has_every_sample, reference_of, with_references
 from gap_data import HELD, PLAN, bare_axis, log_of, logs_of, reference, scattered
 
@@ -62,25 +62,22 @@ def test_what_another_controller_commanded_has_no_reference():
     assert with_references(other, logs) is not None
 
 
-def test_rigid_robots_and_logs_with_references_stay_as_they_are():
+def test_rigid_robots_and_logs_with_references_stay_as_they_are(monkeypatch):
     logs = logs_of(bare_axis(), [], PLAN, seconds=2.0)
+    assert with_references(bare_axis(), without(logs)) is not None
     assert with_references(bare_axis(), logs) is None
     assert with_references(bare_axis(), [*without(logs[:1]), *logs[1:]]) is None
+    monkeypatch.setattr(recovered, "rigid_below_hz", lambda _: np.inf)
+    assert with_references(bare_axis(), without(logs)) is None
 
 
 def test_a_log_of_every_tenth_sample_has_none():
     robot = bare_axis()
     wave = reference("moves", 0, 6000, robot.sample_time_s)
     data = simulate(robot, wave)
-    every = Log(
-        name="moves",
-        source=Path("moves"),
-        sample_time_s=robot.sample_time_s,
-        time_s=data.time.values,
-        velocity_ref_rad_s=None,
-        torque_nm=data.torque_cmd_nm.values,
-        position_rad=data.position_rad.values,
-    )
+    (bare,) = without([log_of(robot, [], wave, 0)])
+    torque, position = data.torque_cmd_nm.values, data.position_rad.values
+    every = replace(bare, torque_nm=torque, position_rad=position)
     few = replace(
         every,
         sample_time_s=10 * every.sample_time_s,

@@ -56,7 +56,12 @@ def test_a_small_robot_has_sizes_of_its_own(small: Robot):
     assert sizes.of(Effect("payload", None), "mass_kg") == pytest.approx(0.02 * 3.0)
     assert sizes.of(Effect("torque_constant", 2), "relative_error") == 0.05
     still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]
-    assert NaturalSizes(small, still).of(Effect("coulomb_friction", 2), "coulomb_nm") == 0.5
+    at_rest = NaturalSizes(small, still)
+    assert at_rest.of(Effect("coulomb_friction", 2), "coulomb_nm") == 0.5
+    # Nor does an axis without torque divide by it.
+    for name, size in (("nonlinear_stiffness", "cubic_nm_rad3"), ("power_supply_sag", "sag_1_w")):
+        typical = next(p.typical for p in effect_info(name).parameters if p.name == size)
+        assert at_rest.of(Effect(name, 2), size) == typical
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "Nm s^2/rad^2": lambda a: a.torque_nm / a.speed_rad_s**2,
     "Nm (joint side)": lambda a: a.torque_nm / a.ratio,
     "Nm s^2/rad": lambda a: a.motor_inertia,
-    "Nm/rad^3": lambda a: a.torque_nm / a.ratio / a.deflection_rad**3,
+    "Nm/rad^3": lambda a: a.torque_nm / a.ratio / max(a.deflection_rad, 1e-100) ** 3,
     "Nm/rad (joint side)": lambda a: a.torque_nm / a.ratio,
     "kg m^2 (joint side)": lambda a: a.motor_inertia / a.ratio**2,
     "kg": lambda a: a.last_kg,
