@@ -8,6 +8,7 @@ import pytest
 from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.gap import trials
+from axisight.gap.evidence import FreeEffect
 from axisight.gap.trials import Trials
 
 LOAD, MASS = Effect("payload", None), Effect("link_mass", 3)
@@ -72,6 +73,7 @@ def test_what_is_more_usual_than_a_clear_leader_is_refined():
         settings=Settings(),
         usual=set(),
         done=set(),
+        waiting=[],
     )
     for score, refined in ((0.5, ["link_inertia@1"]), (0.2, [])):
         led = standing(0, ranked(mode, 0.995, cost=3), ranked(inertia, score))
@@ -92,6 +94,7 @@ def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():
         settings=Settings(),
         usual=set(),
         done=set(),
+        waiting=[],
     )
     todo = Trials._worth_refining(field, [], set(), even_felt=True)
     assert [t.label for t in todo] == ["link_mass@3", "payload"]
@@ -101,3 +104,55 @@ def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():
     assert [t.label for t in Trials._worth_refining(field, [], set(), even_felt=True)] == [
         "payload"
     ]
+
+
+def test_what_leads_where_candidates_wait_is_not_refined():
+    """It has had no rivals there: a soft base was refined on axes where a spring of axis 3 was felt."""
+    base = ranked(Effect("base_compliance", None), 0.9, cost=3)
+    field = SimpleNamespace(
+        standings=lambda _: [standing(0, base)],
+        layout=SimpleNamespace(samples=lambda: np.ones(3)),
+        least=np.zeros(3),
+        mends=lambda _: False,
+        settings=Settings(),
+        usual=set(),
+        done=set(),
+        waiting=[SimpleNamespace(option=SimpleNamespace(effect=Effect("backlash", 1)))],
+    )
+    assert Trials._worth_refining(field, [], {0}, even_felt=True) == []
+    field.waiting = []
+    assert Trials._worth_refining(field, [], {0}, even_felt=True) == [base.trial]
+
+
+LEFT = {"none": [40.0, 60.0], "leader": [10.0, 2.0], "behind": [30.0, 40.0], "near": [30.0, 20.0]}
+
+
+@pytest.mark.parametrize(("rival", "looked_at"), [("behind", False), ("near", True)])
+def test_a_rival_left_far_behind_on_part_of_the_data_is_not_looked_at_on_all(
+    monkeypatch: pytest.MonkeyPatch, rival: str, looked_at: bool
+):
+    """On its own axis, which is what they are held against one another by."""
+
+    def fit_of(name: str):
+        return SimpleNamespace(
+            loss=np.array(LEFT[name]),
+            axis=np.array([0, 1]),
+            renewed=False,
+            free=[FreeEffect(Effect("joint_damping", 2), ())],
+        )
+
+    looked: list[str] = []
+    monkeypatch.setattr(trials, "settled", lambda *_: fit_of(rival))
+    monkeypatch.setattr(trials, "_has_settled", lambda _: True)
+    monkeypatch.setattr(trials, "replace", lambda found, renewed: found)
+    whole = SimpleNamespace(fit=lambda *_, **__: looked.append(rival) or fit_of(rival))
+    field = SimpleNamespace(
+        rough=object(),
+        model=fit_of("none"),
+        screen=SimpleNamespace(model=fit_of("none")),
+        fitter=whole,
+    )
+    found = Trials._compared(field, fit_of("none"), fit_of("leader"))
+    assert (found is not None) == looked_at == bool(looked)
+    # A leader is looked at, however little it takes away.
+    assert Trials._compared(field, fit_of("none"), None) is not None

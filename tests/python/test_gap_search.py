@@ -29,6 +29,7 @@ class Round(Trials):
         one = np.ones(2, dtype=np.int64)
         self.layout = Layout(np.array([0, 1]), one, one, one)
         self.current, self.floor = np.array([10.0, 2.0]), np.array([1.0, 1.0])
+        self.least, self.settings = np.zeros(2), Settings()
         self.losses, self.waiting, self.asked = losses, [], []
         self.progress = lambda *_: None
 
@@ -37,9 +38,12 @@ class Round(Trials):
         self.asked += labels
         return [SimpleNamespace(label=x, held_out=np.array(self.losses[x])) for x in labels]
 
-    def fit(self, promises: dict[str, float]) -> list[str]:
-        """Fit candidates with these promises; return the labels of those fitted."""
-        starts = [Start(free(label), {}, gain) for label, gain in promises.items()]
+    def fit(self, promises: dict[str, float], falls: tuple[float, float] = (0.5, 0.5)) -> list[str]:
+        """Fit candidates with these promises, one of the arm by axis; return the labels of those fitted."""
+        starts = [
+            Start(free(label), {}, gain, None if "@" in label else np.array(falls))
+            for label, gain in promises.items()
+        ]
         with ThreadPoolExecutor(1) as pool:
             return [t.label for t in self._fitted_by_place(pool, starts, "fitting")]
 
@@ -48,10 +52,14 @@ PROMISES = {"torque_offset@2": 0.8, "backlash@1": 8.0, "payload": 1.0}
 
 
 def test_what_one_elsewhere_explains_waits():
-    # Play on axis 1 takes three fifths of what is left on axis 2.
-    round_ = Round({"backlash@1": (2.0, 1.4), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
-    assert set(round_.fit(PROMISES)) == {"backlash@1", "payload"}
-    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@2"]
+    # Play on axis 1 takes three tenths of what is left on axis 2: more than a fifth of any gain there.
+    losses = {"backlash@1": (2.0, 1.7), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)}
+    round_ = Round(losses)
+    # The load comes near the offset, and nowhere near the play: it is no rival of the play's.
+    assert round_.fit(PROMISES) == ["backlash@1"]
+    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@2", "payload"]
+    # One that does is tried beside it.
+    assert Round(losses).fit(PROMISES, (3.0, 0.1)) == ["backlash@1", "payload"]
 
 
 def test_what_promises_as_much_as_any_does_not_wait():
@@ -66,8 +74,13 @@ def test_what_nothing_elsewhere_explains_is_fitted():
     round_ = Round({"backlash@1": (2.0, 1.9), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
     assert set(round_.fit(PROMISES)) == set(PROMISES)
     assert round_.waiting == []
-    # The most promising place comes first, the arm's own effects with it.
-    assert round_.asked[-1] == "torque_offset@2"
+    # The most promising axis comes first.
+    assert round_.asked[0] == "backlash@1"
+
+
+def test_effects_of_the_arm_alone_are_tried():
+    round_ = Round({"payload": (10.0, 2.0)})
+    assert round_.fit({"payload": 1.0}) == ["payload"]
 
 
 @pytest.mark.parametrize(
@@ -113,6 +126,9 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     class Field(Round):
         def _crooked(self, trials):
             return set()
+
+        def _leader_before(self, one, trials):
+            return None
 
         def _worth_refining(self, trials, crooked, *, even_felt):
             return [t for t in trials if t.label not in self.done]

@@ -119,6 +119,7 @@ def refined_next(monkeypatch, rival, begun: set | None = None, *, mends: bool = 
         settings=Settings(),
         usual=begun or set(),
         done=set(),
+        waiting=[],
     )
     todo = Trials._worth_refining(field, TRIED, set(), even_felt=True)
     return [t.label for t in todo]

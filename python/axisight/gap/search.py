@@ -38,6 +38,8 @@ from axisight.gap.trials import Progress, Trials, fresh, interact, settled
 
 Array = NDArray[np.float64]
 
+# Loss that a step may still promise: half of it is a log-likelihood ratio.
+_OPEN = 1.0
 # Each round takes in a cause on every axis that has one; this many on top of one another are
 # no longer causes but a shape.
 _MOST_ROUNDS = 8
@@ -382,14 +384,15 @@ def _take_in(
     start = taken[0][0].trial.evidence
     # One of a pair that the count of causes has no room for was fitted beside the other.
     if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:
-        state.model = settled(round_.fitter, start.free, start, rough=round_.rough)
+        free = list(start.free)
     else:
         free = list(state.model.free)
         for r, _ in taken:
             new = r.trial.evidence.free[-1]
             free = [*kept_beside(free, new), new]
-        # From the simulator of the first: a gap may have bent the one without it.
-        state.model = settled(round_.fitter, free, start, rough=round_.rough)
+    # From the simulator of the first: a gap may have bent the one without it. As far as the last fit
+    # goes: mostly this is it.
+    state.model = settled(round_.fitter, free, start, rough=round_.rough, worth=_OPEN)
     progress(label, 1, 1)
 
 
@@ -407,8 +410,6 @@ def _straighten(fitter: ModelFitter, state: Search) -> None:
         state.rounds.append(Round((rival[1],), (rival,), state.left()))
 
 
-# Loss that a step may still promise: half of it is a log-likelihood ratio.
-_OPEN = 1.0
 # Steps of the last fit.
 _FINISHING = 12
 

@@ -40,8 +40,6 @@ _HOPELESS = 0.3
 _ROUGHLY = 0.3
 # Candidates fitted where none is worth it.
 _LOOKED_AT = 3
-# Share of what is left on an axis that one fitted elsewhere explains: what is tried there waits.
-_MOST = 0.5
 # Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
 # the one found before its shadow on another axis.
 _AS_MUCH = 0.9
@@ -65,7 +63,8 @@ _RENEWALS = 1
 _SETTLED = 1e-3
 # Steps on all data of a fit that was settled on part of them, where it is to be compared only.
 _LOOKS = 2
-# Share of a gain that another candidate may have on the same axis and not count as felt.
+# Share of a gain that another candidate may have on the same axis and not count as felt. Nothing gains
+# more than what is left: where one fitted elsewhere explains so much of that, what is tried there waits.
 _FELT = 0.2
 
 
@@ -88,10 +87,12 @@ def settled(
     *,
     rough: ModelFitter | None = None,
     max_iterations: int = 6,
+    worth: float | None = None,
 ) -> Evidence:
     """Return a fit with sensitivities of its own, as often renewed as it needs.
 
-    ``rough``: the same for part of the data, which brings what bends the simulator most of the way.
+    ``rough``: the same for part of the data, which brings what bends the simulator most of the way;
+    ``worth``: loss that another step has to bring, where it is not a share of it.
     """
     if start.renewed and len(free) == len(start.free):
         return _renewed(fitter, start, max_iterations)
@@ -100,14 +101,26 @@ def settled(
         with suppress(InputError):
             start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
             free, renewals = start.free, 0
-    return _renewed(fitter, fitter.fit(free, start, refreshes=renewals), max_iterations)
+    found = fitter.fit(free, start, refreshes=renewals, worth=worth)
+    return _renewed(fitter, found, max_iterations)
 
 
 def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evidence:
     """Return a fit, with sensitivities renewed at every step where it has not settled without."""
-    if found.converged or found.stuck or linear_gain(found) < _SETTLED * found.total:
+    if _has_settled(found):
         return found
     return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
+
+
+def _has_settled(found: Evidence) -> bool:
+    """Whether steps of a fit bring no more."""
+    return found.converged or found.stuck or linear_gain(found) < _SETTLED * found.total
+
+
+def _taken_away(found: Evidence, model: Evidence, axis: int) -> float:
+    """Return the share of a model's loss on an axis (from 0) that a fit on top of it takes away."""
+    before, after = (float(e.loss[e.axis == axis].sum()) for e in (model, found))
+    return 1.0 - after / max(before, 1e-300)
 
 
 class Trials:
@@ -236,27 +249,18 @@ class Trials:
     ) -> list[Trial]:
         """Fit the chosen, place after place, the most promising first.
 
-        Where one found before explains most of what is left on an axis, what is tried there would
-        be felt by it and have to wait for the next round: it goes to ``waiting``, unless it promises
-        as much as any.
+        Where one found before explains enough of what is left on an axis, what is tried there is bound
+        to feel it and has to wait for the next round: it goes to ``waiting``, unless it promises as
+        much as any.
         """
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
-        promise: dict[int | None, float] = {}
-        for start in chosen:
-            place = start.option.effect.axis
-            promise[place] = max(promise.get(place, -np.inf), start.gain)
-        most = max(promise.values(), default=0.0)
+        most = max((start.gain for start in chosen), default=0.0)
         found: list[Trial] = []
         done = 0
-        axes = sorted((p for p in promise if p is not None), key=lambda p: -promise[p])
-        # The arm's own effects are felt on every axis.
-        turns: list[tuple[int | None, ...]] = [(None, *axes[:1])]
-        turns += [(axis,) for axis in axes[1:]]
-        for places in turns:
-            here = [s for s in chosen if s.option.effect.axis in places]
+        for axis, here in self._turns(chosen):
             explained = (falls(found, self.current, self.layout) / left).max(axis=0, initial=0.0)
             now = here
-            if all(p is not None and explained[p - 1] > _MOST for p in places):
+            if axis is not None and explained[axis - 1] > _FELT:
                 now = [s for s in here if s.gain > _AS_MUCH * most]
                 self.waiting += [s for s in here if s.gain <= _AS_MUCH * most]
             self.progress(label, done, len(chosen))
@@ -264,6 +268,24 @@ class Trials:
             done += len(here)
         self.progress(label, done, len(chosen))
         return found
+
+    def _turns(self, chosen: Sequence[Start]) -> list[tuple[int | None, list[Start]]]:
+        """Return the axes of the chosen, the most promising first, each with what is tried there.
+
+        An effect of the whole arm is tried at the first axis where it comes near the others.
+        """
+        best = _best(chosen, self.layout.n_axes)
+        axes = {a for s in chosen if (a := s.option.effect.axis) is not None}
+        places: list[int | None] = [*sorted(axes, key=lambda a: -best[a - 1])]
+        turns: dict[int | None, list[Start]] = {place: [] for place in places or [None]}
+        least = self._least_of_the_arm(best)
+        for start in chosen:
+            place = start.option.effect.axis
+            if place is None and start.falls is not None:
+                near = start.falls > least
+                place = next((a for a in places if a is not None and near[a - 1]), None)
+            turns[next(iter(turns)) if place is None else place].append(start)
+        return list(turns.items())
 
     def _fitted(self, pool: ThreadPoolExecutor, starts: Sequence[Start]) -> list[Trial]:
         """Fit candidates, on what the screen has of the data; look at them on all of it."""
@@ -297,7 +319,9 @@ class Trials:
             while todo := self._refined_next(trials, even_felt=even_felt):
                 self.progress(label, len(self.done), len(self.done) + len(todo))
                 self.done.update(t.label for t in todo)
-                better = dict(zip(map(id, todo), pool.map(self._refined, todo), strict=True))
+                leaders = [self._leader_before(t, trials) for t in todo]
+                found = pool.map(self._refined, todo, leaders)
+                better = dict(zip(map(id, todo), found, strict=True))
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
         self.progress(label, 1, 1)
@@ -312,23 +336,41 @@ class Trials:
         todo = self._worth_refining(trials, crooked, even_felt=even_felt)
         return todo[: _AT_ONCE if crooked else 1]
 
-    def _refined(self, one: Trial) -> Trial | None:
-        """Return a trial with sensitivities of its own; None where it cannot be simulated with them."""
+    def _leader_before(self, one: Trial, trials: Sequence[Trial]) -> Trial | None:
+        """Return what leads on the axis of a trial; None for one that leads anywhere, or has no axis."""
+        leaders = {s.axis: s.best.trial for s in self.standings(trials)}
+        if any(leader is one for leader in leaders.values()):
+            return None
+        return leaders.get((one.candidate.effect.axis or 0) - 1)
+
+    def _refined(self, one: Trial, leader: Trial | None) -> Trial | None:
+        """Return a trial with sensitivities of its own; None where it cannot be simulated with them.
+
+        As it was where they leave it far behind its ``leader``.
+        """
         try:
-            evidence = self._compared(one.evidence)
+            evidence = self._compared(one.evidence, None if leader is None else leader.evidence)
         except InputError as error:
             self.skipped[one.label] = str(error)
             return None
-        return trial(one.candidate, evidence, self.model)
+        return one if evidence is None else trial(one.candidate, evidence, self.model)
 
-    def _compared(self, start: Evidence) -> Evidence:
-        """Return a fit good enough to be compared: settled on part of the data, looked at on all."""
+    def _compared(self, start: Evidence, leader: Evidence | None) -> Evidence | None:
+        """Return a fit good enough to be compared: settled on part of the data, looked at on all.
+
+        None where it stays far behind its ``leader`` on that part.
+        """
         if self.rough is None or start.renewed:
             return settled(self.fitter, start.free, start)
         begun = settled(self.rough, start.free, start)
+        axis = start.free[-1].effect.axis
+        if leader is not None and axis is not None:
+            needed = _CLOSE * _taken_away(leader, self.model, axis - 1)
+            if _taken_away(begun, self.screen.model, axis - 1) < needed:
+                return None
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
         # What is taken in is fitted on where it has not settled.
-        return replace(found, renewed=found.renewed and found.converged)
+        return replace(found, renewed=found.renewed and _has_settled(found))
 
     def _crooked(self, trials: Sequence[Trial]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
@@ -347,7 +389,11 @@ class Trials:
         out = []
         standings = self.standings(trials)
         leaders = {s.best.trial.label for s in standings}
+        # Where candidates wait, what leads has had no rivals.
+        wait = {start.option.effect.axis for start in self.waiting}
         for standing in standings if even_felt else self._not_felt(standings, trials):
+            if standing.axis + 1 in wait:
+                continue
             leader = standing.best
             gain = leader.gain * self.layout.samples()[standing.axis]
             if gain < self.least[standing.axis] or self.mends(leader.trial):
@@ -404,22 +450,27 @@ class Trials:
         """Return the candidates to fit: at every place the best, where anything is to be gained."""
         worth = self._worth()
         ranked = sorted(starts, key=lambda s: -s.gain)
+        best = _best(starts, self.layout.n_axes)
         keep: list[Start] = []
-        best = np.zeros(self.layout.n_axes)
         for axis in range(self.layout.n_axes):
             mine = [s for s in ranked if s.option.effect.axis == axis + 1]
-            best[axis] = mine[0].gain if mine else 0.0
             keep += [
                 s
                 for k, s in enumerate(mine)
                 if s.gain > _HOPELESS * worth[axis]
                 and (k < _FITTED or (k < 2 * _FITTED and s.gain > _NEAR * best[axis]))
             ]
-        # An effect of the whole arm has to come near what those of one axis promise there.
-        least = np.maximum(_HOPELESS * worth, _NEAR * best)
+        least = self._least_of_the_arm(best)
         keep += [s for s in ranked if s.falls is not None and np.any(s.falls > least)]
         # Where nothing is worth a cause, the best of all still say what was looked at.
         return keep or ranked[:_LOOKED_AT]
+
+    def _least_of_the_arm(self, best: Array) -> Array:
+        """Return what an effect of the whole arm has to promise on an axis (n_axes,).
+
+        It has to come near the ``best`` of those of one axis.
+        """
+        return np.asarray(np.maximum(_HOPELESS * self._worth(), _NEAR * best))
 
     def _each(
         self, pool: ThreadPoolExecutor, work: Callable[[A], B], items: Sequence[A], label: str
@@ -429,6 +480,15 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
+
+
+def _best(starts: Sequence[Start], n_axes: int) -> Array:
+    """Return the most that a candidate of each axis promises (n_axes,)."""
+    best = np.full(n_axes, -np.inf)
+    for start in starts:
+        if (axis := start.option.effect.axis) is not None:
+            best[axis - 1] = max(best[axis - 1], start.gain)
+    return np.where(np.isfinite(best), best, 0.0)
 
 
 def _clear(standing: Standing) -> bool:
