@@ -124,7 +124,12 @@ $(STAMPS)/study: $(STUDY) | $(STAMPS)/installed
 	touch $@
 
 # The dependencies of an extra change only with pyproject.toml.
-$(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/installed $(STAMPS)/study
+$(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/test-arms $(STAMPS)/installed $(STAMPS)/study
+	touch $@
+
+# MJCF files of arms that tests import; the package itself and what it needs are not used.
+$(STAMPS)/test-arms: | $(STAMPS)/installed
+	$(INSTALL) --no-deps robosuite==1.5.2
 	touch $@
 
 $(STAMPS)/bench-tools: $(STAMPS)/bench-extra $(STAMPS)/installed

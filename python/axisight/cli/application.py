@@ -32,6 +32,10 @@ _COMMANDS = {
         "reproduce:reproduce_command",
         "Reproduce the tables and figures of Wernholt's thesis on the preset robot.",
     ),
+    "robot": (
+        "robot_files:robot_app",
+        "Make robot files of URDF, MJCF and tables of Denavit and Hartenberg.",
+    ),
     "simulate": (
         "simulate:simulate_command",
         "Simulate a robot along the references or torques of a log and write the result as a log.",

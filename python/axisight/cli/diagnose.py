@@ -45,10 +45,14 @@ def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
 
 def diagnose_command(
     case_or_logs: Annotated[
-        list[Path] | None, typer.Argument(help="A case folder, or logs to fit and choose on.")
+        list[Path] | None,
+        typer.Argument(
+            help="A case folder, or logs to fit and choose on; the simulator may stand first."
+        ),
     ] = None,
     model: Annotated[
-        str | None, typer.Option(help="Simulator: robot.toml or a preset. A case brings its own.")
+        str | None,
+        typer.Option(help="Simulator: robot.toml, URDF, MJCF or a preset. A case brings its own."),
     ] = None,
     validation: Annotated[
         list[Path] | None,

@@ -27,12 +27,15 @@ GivenEffects = Annotated[
 ]
 
 
-def load_simulator(source: Path | str, given: Sequence[Effect] = ()) -> Robot:
+def load_simulator(
+    source: Path | str, given: Sequence[Effect] = (), *, sample_time_s: float | None = None
+) -> Robot:
     """Return the robot to simulate with the ``given`` effects, and say which of its own act.
 
+    ``sample_time_s`` as in `axisight.load_robot`.
     Raises InputError as `say_effects`, and for a given effect that the robot cannot have.
     """
-    robot = load_robot(source)
+    robot = load_robot(source, sample_time_s=sample_time_s)
     say_effects(robot, source, given)
     return with_given(robot, given)
 

@@ -12,6 +12,10 @@ from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
 from axisight.robot import Robot, load_robot
+from axisight.robot_import import is_model_file
+
+# How models end that may stand first among logs; tables (.csv) are logs there.
+_MODELS = (".urdf", ".xml", ".mjcf", ".toml")
 
 
 @dataclass(frozen=True)
@@ -30,14 +34,14 @@ def read_inputs(
     model: str | None,
     validation: Sequence[Path],
     columns: Path | None,
-    load: Callable[[Path | str], Robot] = load_robot,
+    load: Callable[..., Robot] = load_robot,
     part: tuple[float, float | None] = (0.0, None),
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
-    Without ``validation`` the last of several logs is held out. ``part``: from and to which time
-    [s] each log is used. Raises InputError when nothing is left to hold out, the model is missing,
-    or the part cannot be used.
+    The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
+    ``part``: from and to which time [s] each log is used. Raises InputError when nothing is left to hold
+    out, the model is missing, or the part cannot be used.
     """
     read = _read(paths, model, validation, columns, load)
     if part == (0.0, None):
@@ -93,8 +97,12 @@ def _read(
     model: str | None,
     validation: Sequence[Path],
     columns: Path | None,
-    load: Callable[[Path | str], Robot],
+    load: Callable[..., Robot],
 ) -> Inputs:
+    if model is None and paths and paths[0].suffix.lower() in _MODELS:
+        model, paths = str(paths[0]), paths[1:]
+        if not paths:
+            raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir():
         case = read_case(paths[0], columns)
         source = model if model is not None else case.robot_path
@@ -103,11 +111,14 @@ def _read(
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         raise InputError(
-            "--model: expected a robot.toml or a preset when logs are given, got nothing"
+            "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
     robot = load(model)
     logs = [read_log(p, columns, n_axes=robot.n_axes) for p in paths]
     held = [read_log(p, columns, n_axes=robot.n_axes) for p in validation]
+    if is_model_file(model):
+        # It has no sample time of its own, unless the drive data beside it say one.
+        robot = load(model, sample_time_s=(*logs, *held)[0].sample_time_s)
     if not held:
         if len(logs) < 2:
             raise InputError("--validation: expected a log to hold out, or at least two logs")

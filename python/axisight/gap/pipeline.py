@@ -91,7 +91,7 @@ def diagnose(
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
-    machine, chosen = _with_robot(source, chosen)
+    machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
     noted = pass_gate(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
@@ -147,11 +147,16 @@ def _inputs(
     return name, source, fit_logs, held_logs
 
 
-def _with_robot(source: Robot | Path | str, settings: Settings) -> tuple[Robot, Settings]:
-    """Return the simulator and settings with the tolerances that stand beside its file."""
+def _with_robot(
+    source: Robot | Path | str, settings: Settings, sample_time_s: float
+) -> tuple[Robot, Settings]:
+    """Return the simulator and settings with the tolerances that stand beside its file.
+
+    ``sample_time_s``: of a model file that states none.
+    """
     if isinstance(source, Robot):
         return source, settings
-    machine = load_robot(source)
+    machine = load_robot(source, sample_time_s=sample_time_s)
     if settings.tolerances is not None:
         return machine, settings
     return machine, with_tolerances(settings, machine, source)

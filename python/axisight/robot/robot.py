@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Literal
 
@@ -18,6 +18,9 @@ from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
 
 Array = NDArray[np.float64]
+MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
+"""How the names of files end that say a robot in another format."""
+
 ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "none"]
 
 
@@ -341,17 +344,24 @@ class Robot:
         return list(range(1, self.n_axes + 1))
 
 
-def load_robot(source: Path | str) -> Robot:
-    """Return the robot in a TOML file, or the preset of that name.
+def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
+    """Return the robot in a TOML file, a model file (URDF, MJCF, DH table), or the preset of that name.
 
     Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
-    model m3, with its cubic spring and Coulomb friction). Raises RobotError
-    naming file, line, key and expectation.
+    model m3, with its cubic spring and Coulomb friction). ``sample_time_s`` is that of a model file
+    whose drive data state none; robot files state theirs. Model files are read as
+    `axisight.robot_import.import_robot` does. Raises RobotError naming file, line, key and expectation.
     """
     if isinstance(source, str) and source in PRESETS:
         text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
         return Robot.from_toml(text)
     path = Path(source)
+    # Stands above robots: only those who have such a file load its readers.
+    if path.suffix.lower() in MODEL_SUFFIXES:
+        found: Robot = import_module("axisight.robot_import").import_robot(
+            path, sample_time_s=sample_time_s
+        )
+        return found
     try:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:

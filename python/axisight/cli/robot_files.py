@@ -1,0 +1,94 @@
+"""The commands ``axisight robot``: robot files from the model files that people have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.cli.common import OUT, errors
+from axisight.errors import InputError
+from axisight.robot import Robot
+from axisight.robot_import import import_robot
+from axisight.robot_import.drives import DriveData, Payload, read_drives
+from axisight.robot_import.load import drives_path
+from axisight.storage import write_whole
+
+robot_app = typer.Typer(no_args_is_help=True, add_completion=False)
+
+
+@robot_app.callback()
+def _robot() -> None:
+    """Make robot files of other model files."""
+
+
+@robot_app.command("import")
+def import_command(
+    model: Annotated[
+        Path, typer.Argument(help="URDF, MJCF, or a table of Denavit and Hartenberg (CSV).")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Robot file to write. Default: the screen.")
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(help="Link that stands still. Default: the root.")
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            help="Last link of the chain; other moving branches are locked at zero. Default: the end "
+            "of the only moving branch."
+        ),
+    ] = None,
+    drives: Annotated[
+        Path | None,
+        typer.Option(
+            help="Gear ratios, rotors, controller, sample time (TOML). Default: MODEL.drives.toml "
+            "beside the model, if there is one."
+        ),
+    ] = None,
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KG[,X,Y,Z]",
+            help="Load mounted by hand: mass, and its centre in the frame of the last link [m].",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace a file that exists.")] = False,
+) -> None:
+    """Write a model file as a robot file, and say what could not be taken along."""
+    with errors():
+        if out is not None and out.exists() and not overwrite:
+            raise InputError(f"{out} exists: choose another name or pass --overwrite")
+        given = drives or (drives_path(model) if drives_path(model).is_file() else None)
+        data = DriveData() if given is None else read_drives(given)
+        if payload is not None:
+            data = data.model_copy(update={"payload": _payload(payload)})
+        robot = import_robot(model, base=base, tip=tip, drives=data)
+        if out is None:
+            typer.echo(robot.toml, nl=False)
+            return
+        write_whole(out, robot.toml)
+        _say(robot, out)
+
+
+def _say(robot: Robot, out: Path) -> None:
+    """Print what was written, and the notes at its head."""
+    said = f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}"
+    OUT.print(said, markup=False, highlight=False, soft_wrap=True)
+    for line in robot.toml.splitlines():
+        if not line.startswith("# "):
+            break
+        OUT.print(line[2:], markup=False, highlight=False, soft_wrap=True)
+
+
+def _payload(text: str) -> Payload:
+    try:
+        mass, *com = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--payload: expected KG or KG,X,Y,Z, got {text!r}") from None
+    if len(com) not in (0, 3) or not mass > 0:
+        raise InputError(f"--payload: expected KG or KG,X,Y,Z with a positive mass, got {text!r}")
+    x, y, z = com or (0.0, 0.0, 0.0)
+    return Payload(mass=mass, com=(x, y, z))

@@ -1,0 +1,141 @@
+"""Rigid bodies of a model file and how they hang together, before a chain is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Motion = Literal["fixed", "revolute", "prismatic", "other"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Rotation (3, 3) and origin (3,) [m] of a frame in another."""
+
+    rotation: Array
+    origin: Array
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """Return the pose of a frame that ``other`` says in this one."""
+        return Pose(self.rotation @ other.rotation, self.origin + self.rotation @ other.origin)
+
+    def inverse(self) -> Pose:
+        """Return the pose of the other frame in this one."""
+        back = self.rotation.T
+        return Pose(back, -back @ self.origin)
+
+
+def still() -> Pose:
+    """Return the pose of a frame in itself."""
+    return Pose(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """Mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in one frame."""
+
+    mass_kg: float
+    com_m: Array
+    inertia_kg_m2: Array
+
+    def at(self, pose: Pose) -> Mass:
+        """Return the same in the frame in which ``pose`` says this one."""
+        rotation = pose.rotation
+        return Mass(
+            self.mass_kg,
+            pose.origin + rotation @ self.com_m,
+            rotation @ self.inertia_kg_m2 @ rotation.T,
+        )
+
+
+def joined(parts: Iterable[Mass]) -> Mass | None:
+    """Return several masses of one frame as one body; None without any mass."""
+    known = [part for part in parts if part.mass_kg > 0 or np.any(part.inertia_kg_m2)]
+    if not known:
+        return None
+    if len(known) == 1:
+        return known[0]
+    mass = sum(part.mass_kg for part in known)
+    com = sum((part.mass_kg * part.com_m for part in known), np.zeros(3)) / max(mass, 1e-300)
+    inertia = np.zeros((3, 3))
+    for part in known:
+        off = part.com_m - com
+        steiner = part.mass_kg * (off @ off * np.eye(3) - np.outer(off, off))
+        inertia += part.inertia_kg_m2 + steiner
+    return Mass(mass, com, inertia)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a file says of the drive of a joint, on the joint side unless said otherwise.
+
+    ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
+    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero.
+    """
+
+    gear_ratio: float = 1.0
+    rotor_inertia: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    spring: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body and the joint that moves it.
+
+    ``pose``: its frame in the parent's with the joint at zero; ``axis`` (3,): of the joint, in its own
+    frame; ``where``: its place in the file; ``refused``: why its joint cannot be one of a chain; ``of``: the
+    body it moves, where that is another one; ``bare``: another joint of that body follows.
+    """
+
+    name: str
+    parent: str | None
+    joint: str
+    motion: Motion
+    pose: Pose
+    axis: Array
+    mass: Mass | None
+    where: str
+    drive: Drive = Drive()
+    limits: tuple[float, float] | None = None
+    refused: str = ""
+    bare: bool = False
+    of: str = ""
+
+
+@dataclass
+class Tree:
+    """All bodies of a file by name, parents before children, and what is to be said of it.
+
+    ``parts``: elements that were found and mean nothing to a serial chain, with what becomes of them.
+    """
+
+    name: str
+    bodies: dict[str, Body]
+    file: str
+    gravity_m_s2: Array | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def children(self, name: str) -> list[Body]:
+        """Return the bodies that hang on one."""
+        return [body for body in self.bodies.values() if body.parent == name]
+
+    def path(self, tip: str) -> list[Body]:
+        """Return the bodies from the root to one, both included."""
+        out = [self.bodies[tip]]
+        while (parent := out[-1].parent) is not None:
+            out.append(self.bodies[parent])
+        return out[::-1]
+
+    def with_mass(self, name: str, more: Mass) -> Tree:
+        """Return the same with a mass, in its frame, added to a body."""
+        body = self.bodies[name]
+        parts = [more] if body.mass is None else [body.mass, more]
+        bodies = {**self.bodies, name: replace(body, mass=joined(parts))}
+        return replace(self, bodies=bodies)

@@ -1,0 +1,177 @@
+"""A serial chain out of a tree of bodies: fixed joints merged, branches refused or carried along."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import RobotError
+from axisight.robot_import.bodies import Body, Mass, Pose, Tree, joined, still
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainJoint:
+    """A joint of the chain, in frames that are parallel to the base's at zero angle.
+
+    ``origin_m`` and ``axis`` (3,) stand in the parent's frame, ``mass`` in its own; ``body`` is what the
+    file has.
+    """
+
+    body: Body
+    origin_m: Array
+    axis: Array
+    mass: Mass | None
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A serial chain from a model file, and what is to be said of how it came about."""
+
+    name: str
+    joints: tuple[ChainJoint, ...]
+    gravity_m_s2: Array
+    notes: tuple[str, ...]
+
+
+STANDARD_GRAVITY_M_S2 = 9.81
+
+
+def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Chain:
+    """Return the serial chain between two bodies of a tree.
+
+    ``base``: the body that stands still, the root unless given; ``tip``: the last body, else the end of
+    the only moving branch. Bodies on fixed joints join what they hang on. With a ``tip`` other moving
+    branches are locked at zero, their masses carried along, and so is what is beyond it.
+
+    Raises RobotError for bodies that are not there, a branch without a ``tip``, joints that a chain cannot
+    have, moving bodies without mass, and inertias that no body has.
+    """
+    for option, name in (("base", base), ("tip", tip)):
+        if name is not None and name not in tree.bodies:
+            near = get_close_matches(name, tree.bodies, n=5) or tree.bodies
+            raise RobotError(
+                f"{tree.file}: --{option}: expected a link, such as {_listed(near)}, got {name!r}"
+            )
+    first = next(iter(tree.bodies)) if base is None else base
+    last = _only_end(tree, first) if tip is None else tip
+    path = tree.path(last)
+    names = [body.name for body in path]
+    if first not in names:
+        raise RobotError(
+            f"{tree.file}: --base: expected a link between {names[0]!r} and the tip {last!r}, got {first!r}"
+        )
+    path = path[names.index(first) :]
+    joints, notes = _joints(tree, path)
+    gravity = tree.gravity_m_s2
+    if gravity is None:
+        gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
+    return Chain(tree.name, tuple(joints), gravity, (*tree.notes, *notes))
+
+
+def _listed(names: Sequence[str] | dict[str, Body]) -> str:
+    shown = list(names)
+    return ", ".join(shown[:30]) + (f" and {len(shown) - 30} more" if len(shown) > 30 else "")
+
+
+def _only_end(tree: Tree, first: str) -> str:
+    """Return the last moving body below ``first``; raises RobotError where there are several."""
+    ends = _ends(tree, first)
+    if len(ends) > 1:
+        shown = [tree.bodies[end].of or end for end in ends]
+        paths = [[body.name for body in tree.path(end)] for end in ends]
+        trunk = [name for name in paths[0] if all(name in path for path in paths)]
+        raise RobotError(
+            f"{tree.file}: expected one serial chain below {first!r}, got {len(ends)} moving branches: give "
+            f"the last link of the one that is meant by --tip, or tip in the drive data (they end at "
+            f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
+        )
+    return ends[0] if ends else first
+
+
+def _ends(tree: Tree, first: str) -> list[str]:
+    """Return the moving bodies below ``first`` that have no moving body below them."""
+    out: list[str] = []
+    for child in tree.children(first):
+        below = _ends(tree, child.name)
+        out += below or ([child.name] if child.motion != "fixed" else [])
+    return out
+
+
+def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], list[str]]:
+    """Return the moving joints along a path, and what was locked."""
+    chosen = {body.name for body in path}
+    # Orientation of the first body in the base of the file: gravity is said there.
+    here = Pose(_from_root(tree, path[0]).rotation, np.zeros(3))
+    joints: list[ChainJoint] = []
+    locked: list[str] = []
+    origin = np.zeros(3)
+    carried = [_carried(tree, path[0], here, chosen, locked)]
+    moving: list[tuple[Body, Array, Array, list[Mass]]] = []
+    for body in path[1:]:
+        here = here @ body.pose
+        masses = _carried(tree, body, here, chosen, locked)
+        if body.motion == "fixed":
+            carried[-1].extend(masses)
+            continue
+        if body.refused or body.motion == "other":
+            raise RobotError(f"{body.where}: {body.refused}")
+        moving.append((body, here.origin - origin, here.rotation @ body.axis, masses))
+        carried.append(masses)
+        origin = here.origin
+    if not moving:
+        raise RobotError(
+            f"{tree.file}: expected at least one revolute, continuous or prismatic joint between "
+            f"{path[0].name!r} and {path[-1].name!r}, got none"
+        )
+    at = np.zeros(3)
+    for body, offset, axis, masses in moving:
+        at = at + offset
+        shifted = [m.at(Pose(np.eye(3), -at)) for m in masses]
+        mass = joined(shifted)
+        _check(body, mass)
+        joints.append(ChainJoint(body, offset, axis, mass))
+    notes = [f"locked at zero, masses carried along: {_listed(locked)}"] if locked else []
+    return joints, notes
+
+
+def _from_root(tree: Tree, body: Body) -> Pose:
+    pose = still()
+    for one in tree.path(body.name):
+        pose = pose @ one.pose
+    return pose
+
+
+def _carried(tree: Tree, body: Body, here: Pose, chosen: set[str], locked: list[str]) -> list[Mass]:
+    """Return the masses of a body and all that hangs on it but the chain, in the frame of the base."""
+    out = [] if body.mass is None else [body.mass.at(here)]
+    for child in tree.children(body.name):
+        if child.name not in chosen:
+            if child.motion != "fixed":
+                locked.append(child.joint)
+            out += _carried(tree, child, here @ child.pose, chosen, locked)
+    return out
+
+
+def _check(body: Body, mass: Mass | None) -> None:
+    """Raise RobotError for a moving body that cannot exist."""
+    if mass is None and body.bare:
+        return
+    what = f"{(body.of or body.name)!r} and all that is fixed to it"
+    if mass is None or mass.mass_kg <= 0:
+        raise RobotError(
+            f"{body.where}: expected a mass on what the joint moves ({what}), got none: without one nothing "
+            f"says which torque it takes"
+        )
+    moments = np.linalg.eigvalsh(mass.inertia_kg_m2)
+    if moments[0] <= 1e-12 * abs(moments[-1]):
+        shown = ", ".join(f"{m:.3g}" for m in moments)
+        raise RobotError(
+            f"{body.where}: expected an inertia with three positive principal moments on {what}, got {shown} "
+            f"kg m^2"
+        )

@@ -1,0 +1,139 @@
+"""A chain and its drives written as a robot file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from axisight.errors import RobotError
+from axisight.robot_import.bodies import Mass, joined
+from axisight.robot_import.chain import Chain, ChainJoint
+from axisight.robot_import.drives import DriveData, JointDrive, Payload
+
+# Of the simulators that read such files; logs say another where they have one.
+DEFAULT_SAMPLE_TIME_S = 1e-3
+# Of dry friction near standstill, on the joint side: files have none.
+_SMOOTHING_RAD_S = 0.01
+
+
+def description(chain: Chain, drives: DriveData, source: str) -> str:
+    """Return the text of a robot file (``axisight.robot/2``); ``source`` is named at its head.
+
+    Raises RobotError for drive data of joints that the chain does not have.
+    """
+    names = [joint.body.joint for joint in chain.joints]
+    for name in drives.joint:
+        if name not in names:
+            raise RobotError(
+                f"drive data: joint.{name}: expected one of {', '.join(names)}, got {name!r}"
+            )
+    joints = list(chain.joints)
+    last = _loaded(joints[-1].mass, drives.payload)
+    tables, effects = [], []
+    for number, joint in enumerate(joints, start=1):
+        drive = drives.joint.get(joint.body.joint, JointDrive())
+        mass = last if joint is joints[-1] else joint.mass
+        table, ratio = _joint(joint, mass, drive)
+        tables.append(table)
+        dry = _dry_friction(joint, drive, ratio)
+        if joint.body.drive.spring > 0:
+            effects.append(
+                {
+                    "name": "cable_stiffness",
+                    "axis": number,
+                    "stiffness_nm_rad": joint.body.drive.spring,
+                }
+            )
+        if dry > 0:
+            effects.append(
+                {
+                    "name": "coulomb_friction",
+                    "axis": number,
+                    "coulomb_nm": dry,
+                    "smoothing_rad_s": _SMOOTHING_RAD_S / abs(ratio),
+                }
+            )
+    document: dict[str, Any] = {
+        "schema": "axisight.robot/2",
+        "name": chain.name,
+        "gravity": _floats(chain.gravity_m_s2),
+        "sample_time": drives.sample_time or DEFAULT_SAMPLE_TIME_S,
+        "joint": tables,
+        "operating_point": {"joint_angle": drives.operating_point or _rest(joints)},
+    }
+    if drives.controller is not None:
+        document["controller"] = drives.controller
+    if drives.position_noise_std is not None:
+        document["sensor"] = {"position_noise_std": drives.position_noise_std}
+    if drives.tolerances is not None:
+        document["tolerances"] = drives.tolerances
+    if effects:
+        document["effect"] = effects
+    head = [f"imported from {source}", *chain.notes]
+    return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dict[str, Any], float]:
+    """Return the table of a joint and its gear ratio."""
+    said = joint.body.drive
+    ratio = said.gear_ratio if drive.gear_ratio is None else drive.gear_ratio
+    rotor = said.rotor_inertia * ratio**2 if drive.motor_inertia is None else drive.motor_inertia
+    viscous = said.damping * ratio**2
+    if drive.viscous_friction is not None:
+        viscous = drive.viscous_friction
+    table: dict[str, Any] = {
+        "name": joint.body.joint,
+        "kind": "driven",
+        "motion": joint.body.motion,
+        "origin": _floats(joint.origin_m),
+        "axis": _floats(joint.axis / np.linalg.norm(joint.axis)),
+    }
+    for key in ("stiffness", "damping"):
+        if (value := getattr(drive, key)) is not None:
+            table[key] = value
+    if mass is not None:
+        inertia = mass.inertia_kg_m2
+        table["link"] = {
+            "mass": float(mass.mass_kg),
+            "com": _floats(mass.com_m),
+            "inertia": _floats(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
+        }
+    table["drive"] = {
+        "gear_ratio": float(ratio),
+        "motor_inertia": float(rotor),
+        "viscous_friction": float(viscous),
+    }
+    return table, ratio
+
+
+def _dry_friction(joint: ChainJoint, drive: JointDrive, ratio: float) -> float:
+    """Return the dry friction of a joint on the motor side [Nm]."""
+    if drive.coulomb_friction is not None:
+        return drive.coulomb_friction
+    return joint.body.drive.friction * abs(ratio)
+
+
+def _loaded(mass: Mass | None, payload: Payload | None) -> Mass | None:
+    if payload is None:
+        return mass
+    load = Mass(payload.mass, np.array(payload.com), np.zeros((3, 3)))
+    return joined([load] if mass is None else [mass, load])
+
+
+def _rest(joints: list[ChainJoint]) -> list[float]:
+    """Return zero, or the middle of the range of joints that cannot be at zero."""
+    out = []
+    for joint in joints:
+        lower, upper = joint.body.limits or (0.0, 0.0)
+        out.append(0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
+    return out
+
+
+def _floats(values: np.ndarray) -> list[float]:
+    return [float(value) for value in values]

@@ -1,0 +1,83 @@
+"""Model files by their kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from axisight.errors import RobotError
+from axisight.robot.robot import MODEL_SUFFIXES, Robot
+from axisight.robot_import.bodies import Tree
+from axisight.robot_import.chain import chain_of
+from axisight.robot_import.description import description
+from axisight.robot_import.dh import read_dh
+from axisight.robot_import.drives import DriveData, read_drives
+from axisight.robot_import.mjcf import read_mjcf
+from axisight.robot_import.pinocchio_model import tree_of
+from axisight.robot_import.urdf import read_urdf
+from axisight.robot_import.xml_tree import read_xml
+
+
+def is_model_file(source: Path | str) -> bool:
+    """Whether a file is one of those that `import_robot` reads, by its name."""
+    return Path(source).suffix.lower() in MODEL_SUFFIXES
+
+
+def drives_path(source: Path | str) -> Path:
+    """Return where drive data of a model file stand: ``arm.drives.toml`` beside ``arm.urdf``."""
+    path = Path(source)
+    return path.with_name(f"{path.stem}.drives.toml")
+
+
+def import_robot(
+    source: Path | str | Any,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    drives: DriveData | Path | str | None = None,
+    sample_time_s: float | None = None,
+) -> Robot:
+    """Return the robot of a model file; ``robot.toml`` is the robot file that says the same.
+
+    Parameters
+    ----------
+    source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
+        and Hartenberg (``.csv``), or a ``pinocchio.Model``.
+    base, tip : links (bodies; joints of a ``pinocchio.Model``) between which the chain runs: the root, and
+        the end of the only moving branch, unless given here or in the drive data.
+    drives : what the file lacks of drives: data or their TOML file; of a file ``arm.urdf`` it is
+        ``arm.drives.toml`` beside it, if there is one. Left out, gears are rigid with the
+        ratio of the file or 1, rotors and friction as the file has them, and there is no controller.
+    sample_time_s : where the drive data state none, instead of 1 ms.
+
+    Links on fixed joints join what they hang on; frames are turned parallel to the base's at zero angle,
+    as robot files have them; angles are those of the file. Raises RobotError, with file, line and element, for
+    what cannot be one serial chain, MissingExtraError for MJCF without MuJoCo.
+
+    """
+    is_file = isinstance(source, str | Path)
+    tree = _tree(Path(source)) if is_file else tree_of(source)
+    if drives is None and is_file and drives_path(source).is_file():
+        drives = drives_path(source)
+    if not isinstance(drives, DriveData):
+        drives = DriveData() if drives is None else read_drives(Path(drives))
+    chain = chain_of(tree, base or drives.base, tip or drives.tip)
+    if drives.sample_time is None:
+        drives = drives.model_copy(update={"sample_time": sample_time_s})
+    text = description(chain, drives, Path(source).name if is_file else "a pinocchio.Model")
+    try:
+        return Robot.from_toml(text)
+    except RobotError as error:
+        raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
+
+
+def _tree(path: Path) -> Tree:
+    """Return the bodies of a file, read as what it says it is."""
+    if path.suffix.lower() == ".csv":
+        return read_dh(path)
+    root = read_xml(path)
+    if root.tag == "robot":
+        return read_urdf(path)
+    if root.tag == "mujoco":
+        return read_mjcf(path)
+    raise RobotError(f"{root.where}: expected <robot> (URDF) or <mujoco> (MJCF) as the root")

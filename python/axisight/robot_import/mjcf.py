@@ -1,0 +1,247 @@
+"""MJCF through MuJoCo's own compiler: bodies, joints, armature, damping, dry friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import MissingExtraError, RobotError
+from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.outside import with_includes
+from axisight.robot_import.xml_tree import Element
+
+Array = NDArray[np.float64]
+
+
+def read_mjcf(path: Path) -> Tree:
+    """Return the bodies of an MJCF file as MuJoCo compiles it.
+
+    Angles are MuJoCo's ``qpos``. What a serial chain cannot have is in the notes. Raises RobotError with file,
+    line and element, also for files outside the folder of the model, and MissingExtraError without MuJoCo.
+    """
+    elements = with_includes(path)
+    if elements[0].tag != "mujoco":
+        raise RobotError(f"{elements[0].where}: expected <mujoco>, the root of an MJCF")
+    return _Compiled(_compiled(path), elements, path).tree()
+
+
+def _compiled(path: Path) -> Any:
+    try:
+        return _mujoco().MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise RobotError(f"{path}: MuJoCo: {' '.join(str(error).split())}") from None
+
+
+def _mujoco() -> Any:
+    """Return MuJoCo: only those who have such a file load it."""
+    try:
+        return import_module("mujoco")
+    except ImportError as error:
+        raise MissingExtraError(
+            "MJCF is compiled by MuJoCo itself: pip install 'axisight[mujoco]'"
+        ) from error
+
+
+class _Compiled:
+    """A compiled model and the lines of its file."""
+
+    def __init__(self, model: Any, elements: Iterable[Element], path: Path) -> None:
+        self.mujoco, self.model, self.path = _mujoco(), model, path
+        self.lines = {
+            (e.tag, e.attributes["name"]): e.where
+            for root in elements
+            for e in root.walk()
+            if "name" in e.attributes
+        }
+        kinds = self.mujoco.mjtJoint
+        self.motions: dict[int, Motion] = {
+            int(kinds.mjJNT_HINGE): "revolute",
+            int(kinds.mjJNT_SLIDE): "prismatic",
+        }
+
+    def tree(self) -> Tree:
+        """Return its bodies, parents first, each joint one of its own."""
+        model = self.model
+        # The world is a body without a joint.
+        bodies = {
+            "world": Body("world", None, "", "fixed", still(), np.zeros(3), None, str(self.path))
+        }
+        names = [self._name("body", i) if i else "world" for i in range(model.nbody)]
+        ratios = self._ratios()
+        for i in range(1, model.nbody):
+            parent = names[model.body_parentid[i]]
+            pose = Pose(_rotation(model.body_quat[i]), model.body_pos[i].copy())
+            first, count = model.body_jntadr[i], model.body_jntnum[i]
+            anchor = np.zeros(3)
+            for j in range(first, first + count):
+                last = j == first + count - 1
+                one = self._joint(j, names[i], parent, pose, anchor, ratios, bare=not last)
+                bodies[one.name] = one
+                anchor = model.jnt_pos[j].copy()
+                parent, pose = one.name, Pose(np.eye(3), np.zeros(3))
+            pose = pose @ Pose(np.eye(3), -anchor)
+            where = self._where("body", names[i])
+            bodies[names[i]] = Body(
+                names[i], parent, "", "fixed", pose, np.zeros(3), self._mass(i), where
+            )
+        tree = Tree(
+            self._model_name(),
+            bodies,
+            str(self.path),
+            np.array(model.opt.gravity),
+            self._notes(ratios),
+        )
+        return tree
+
+    def _model_name(self) -> str:
+        """Return the name of the model, that of the file without one."""
+        name = self.model.names.split(b"\0", 1)[0].decode()
+        return name if name and name != "MuJoCo Model" else self.path.stem
+
+    def _joint(
+        self,
+        j: int,
+        body: str,
+        parent: str,
+        pose: Pose,
+        anchor: Array,
+        ratios: dict[int, float],
+        *,
+        bare: bool,
+    ) -> Body:
+        """Return the joint as a body without mass, at its anchor."""
+        model = self.model
+        name, axis = self._name("joint", j), model.jnt_axis[j].copy()
+        where = self._where("joint", name)
+        motion = self.motions.get(int(model.jnt_type[j]), "other")
+        refused = (
+            ""
+            if motion != "other"
+            else (
+                "expected hinge and slide joints between base and tip, got a ball or free joint: choose "
+                "them beyond it by --base and --tip"
+            )
+        )
+        at = pose @ Pose(np.eye(3), model.jnt_pos[j] - anchor)
+        if motion != "other":
+            dof, zero = model.jnt_dofadr[j], float(model.qpos0[model.jnt_qposadr[j]])
+            at = at @ _moved(motion, axis, -zero)
+            drive = Drive(
+                ratios.get(j, 1.0),
+                float(model.dof_armature[dof]),
+                float(model.dof_damping[dof]),
+                float(model.dof_frictionloss[dof]),
+                float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
+            )
+        else:
+            drive = Drive()
+        limits = tuple(map(float, model.jnt_range[j])) if model.jnt_limited[j] else None
+        # A second body of that name cannot be: MuJoCo's names have no such sign.
+        return Body(
+            f"{body}\N{RIGHTWARDS ARROW}{name}",
+            parent,
+            name,
+            motion,
+            at,
+            axis,
+            None,
+            where,
+            drive,
+            limits,  # type: ignore[arg-type]
+            refused,
+            bare=bare,
+            of=body,
+        )
+
+    def _springs_to_zero(self, j: int) -> bool:
+        return float(self.model.qpos_spring[self.model.jnt_qposadr[j]]) == 0.0
+
+    def _mass(self, i: int) -> Mass | None:
+        model = self.model
+        if model.body_mass[i] == 0:
+            return None
+        rotation = _rotation(model.body_iquat[i])
+        inertia = rotation @ np.diag(model.body_inertia[i]) @ rotation.T
+        return Mass(float(model.body_mass[i]), model.body_ipos[i].copy(), inertia)
+
+    def _ratios(self) -> dict[int, float]:
+        """Return the gear ratio of joints that one motor drives: one over its gear."""
+        model, kinds = self.model, self.mujoco.mjtTrn
+        found: dict[int, list[float]] = {}
+        for i in range(model.nu):
+            if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT) and _is_motor(model, i):
+                found.setdefault(int(model.actuator_trnid[i, 0]), []).append(
+                    float(model.actuator_gear[i, 0])
+                )
+        return {j: 1.0 / g[0] for j, g in found.items() if len(g) == 1 and g[0] != 0}
+
+    def _notes(self, ratios: dict[int, float]) -> list[str]:
+        """Return what of the file a serial chain with drives does not say."""
+        model = self.model
+        out = []
+        for i in range(model.nu):
+            if not _is_motor(model, i):
+                out.append(
+                    f"actuator {self._name('actuator', i)!r} is no plain motor: its gain and bias are the "
+                    f"controller's, to be said in the drive data"
+                )
+        for j in range(model.njnt):
+            if model.jnt_stiffness[j] != 0 and not self._springs_to_zero(j):
+                out.append(
+                    f"joint {self._name('joint', j)!r}: spring of {model.jnt_stiffness[j]:g} left out: it pulls "
+                    f"to another place than zero"
+                )
+        counts = {
+            "equality constraints": model.neq,
+            "tendons": model.ntendon,
+            "mocap bodies": model.nmocap,
+            "plugins": model.nplugin,
+            "flexes": model.nflex,
+        }
+        out += [f"{count} {what} left out" for what, count in counts.items() if count]
+        if model.opt.density > 0 or model.opt.viscosity > 0:
+            out.append("drag of the medium left out")
+        return out
+
+    def _name(self, kind: str, i: int) -> str:
+        """Return the name of an element, ``<kind> <number>`` without one."""
+        known = {
+            "body": self.mujoco.mjtObj.mjOBJ_BODY,
+            "joint": self.mujoco.mjtObj.mjOBJ_JOINT,
+            "actuator": self.mujoco.mjtObj.mjOBJ_ACTUATOR,
+        }
+        name = self.mujoco.mj_id2name(self.model, known[kind], i)
+        return name or f"{kind} {i}"
+
+    def _where(self, tag: str, name: str) -> str:
+        return self.lines.get((tag, name), f"{self.path}, <{tag} {name!r}>")
+
+
+def _is_motor(model: Any, i: int) -> bool:
+    """Whether an actuator is a source of torque: gain one, no bias, no state of its own."""
+    plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
+    return bool(plain and model.actuator_dyntype[i] == 0 and model.actuator_gainprm[i, 0] == 1)
+
+
+def _rotation(quaternion: Array) -> Array:
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _moved(motion: Motion, axis: Array, by: float) -> Pose:
+    """Return the pose after a joint has moved by an angle [rad] or way [m]."""
+    if motion == "prismatic":
+        return Pose(np.eye(3), by * axis)
+    half = by / 2
+    return Pose(_rotation(np.array([np.cos(half), *(np.sin(half) * axis)])), np.zeros(3))

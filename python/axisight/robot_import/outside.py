@@ -1,0 +1,65 @@
+"""Files that an MJCF file names: all have to lie in its folder, or they are not read."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from axisight.errors import RobotError
+from axisight.robot_import.xml_tree import Element, read_xml
+
+# Attributes of <compiler> that say where other files are.
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+# Attributes that name files: of sides of a cube the last six.
+_FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
+_DEEPEST = 20
+
+
+def with_includes(path: Path) -> list[Element]:
+    """Return the root of a model file and of all that it includes.
+
+    Raises RobotError, with the line, for a file outside its folder, one that includes itself, and as
+    `read_xml`.
+    """
+    folder = path.resolve().parent
+    return _read(path, folder, [])
+
+
+def _read(path: Path, folder: Path, above: list[Path]) -> list[Element]:
+    root = read_xml(path)
+    here = [*above, path.resolve()]
+    if len(here) > _DEEPEST:
+        raise RobotError(f"{root.where}: expected at most {_DEEPEST} files in one another")
+    found = [root]
+    folders = [e for e in root.walk() if e.tag == "compiler"]
+    prefixes = [""] + [e.attributes[k] for e in folders for k in _FOLDERS if k in e.attributes]
+    for element in folders:
+        for key in _FOLDERS:
+            if key in element.attributes:
+                _inside(element, key, element.attributes[key], folder)
+    for element in root.walk():
+        for key in _FILES:
+            name = element.attributes.get(key, "")
+            if name:
+                for prefix in prefixes:
+                    _inside(element, key, os.path.join(prefix, name), folder)  # noqa: PTH118
+        if element.tag == "include":
+            included = folder / element.require("file", "a file to include")
+            if included.resolve() in here:
+                raise RobotError(
+                    f"{element.where}: expected another file, got one that includes itself"
+                )
+            if not included.is_file():
+                raise RobotError(f"{element.where}: file: expected a file, got {included.name!r}")
+            found += _read(included, folder, here)
+    return found
+
+
+def _inside(element: Element, key: str, name: str, folder: Path) -> None:
+    """Raise RobotError unless a name means a file in a folder, links followed."""
+    target = (folder / name).resolve()
+    if Path(name).is_absolute() or not target.is_relative_to(folder):
+        raise RobotError(
+            f"{element.where}: {key}: expected a path inside the folder of the model, got {name!r}: "
+            f"nothing outside is read; copy it beside the model"
+        )

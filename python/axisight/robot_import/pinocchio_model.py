@@ -1,0 +1,80 @@
+"""A ``pinocchio.Model``, whatever it was made from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+
+Array = NDArray[np.float64]
+
+
+def tree_of(model: Any) -> Tree:
+    """Return the bodies of a ``pinocchio.Model``; angles are those of its configuration vector.
+
+    Rotors (``rotorInertia`` on the motor side, ``rotorGearRatio`` motor angle per joint angle), damping and
+    dry friction are taken along.
+    """
+    name = model.names[0]
+    bodies = {name: Body(name, None, "", "fixed", still(), np.zeros(3), None, model.name)}
+    for i in range(1, model.njoints):
+        bodies[model.names[i]] = _body(model, i)
+    return Tree(model.name or "pinocchio", bodies, model.name, np.array(model.gravity.linear))
+
+
+def _body(model: Any, i: int) -> Body:
+    joint, placement = model.joints[i], model.jointPlacements[i]
+    motion, axis = _motion(joint)
+    return Body(
+        model.names[i],
+        model.names[model.parents[i]],
+        model.names[i],
+        motion,
+        Pose(np.array(placement.rotation), np.array(placement.translation)),
+        axis,
+        _mass(model.inertias[i]),
+        f"{model.name}, joint {model.names[i]!r}",
+        _drive(model, joint.idx_v) if motion != "other" else Drive(),
+        _limits(model, joint) if motion != "other" else None,
+        ""
+        if motion != "other"
+        else f"expected joints of one degree of freedom between base and tip, got {joint.shortname()}: "
+        f"choose them beyond it by base and tip",
+    )
+
+
+def _motion(joint: Any) -> tuple[Motion, Array]:
+    """Return how a joint moves, and its axis, by its motion subspace: linear above angular velocity."""
+    if joint.nv != 1 or joint.nq > 2:
+        return "other", np.zeros(3)
+    data = joint.createData()
+    # The zero of a continuous joint is written as a cosine and a sine.
+    joint.calc(data, np.array([1.0, 0.0]) if joint.nq == 2 else np.zeros(1))
+    along, about = np.split(np.asarray(data.S, dtype=np.float64).reshape(6), 2)
+    turns, slides = bool(np.any(about)), bool(np.any(along))
+    if turns == slides:
+        return "other", np.zeros(3)
+    return ("revolute", about) if turns else ("prismatic", along)
+
+
+def _mass(inertia: Any) -> Mass | None:
+    if inertia.mass <= 0:
+        return None
+    return Mass(float(inertia.mass), np.array(inertia.lever), np.array(inertia.inertia))
+
+
+def _drive(model: Any, v: int) -> Drive:
+    gear = float(model.rotorGearRatio[v]) or 1.0
+    rotor = float(model.rotorInertia[v]) * gear**2 + float(model.armature[v])
+    dry = float(model.upperDryFrictionLimit[v])
+    return Drive(1.0 / gear, rotor, float(model.damping[v]), dry)
+
+
+def _limits(model: Any, joint: Any) -> tuple[float, float] | None:
+    lower, upper = (
+        float(x[joint.idx_q]) for x in (model.lowerPositionLimit, model.upperPositionLimit)
+    )
+    return (lower, upper) if joint.nq == 1 and np.isfinite([lower, upper]).all() else None

@@ -1,0 +1,252 @@
+"""URDF: links, joints, what they say of drives. Meshes are never opened."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import RobotError
+from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.xml_tree import Element, read_xml
+
+Array = NDArray[np.float64]
+
+_MOTIONS: dict[str, Motion] = {
+    "fixed": "fixed",
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "floating": "other",
+    "planar": "other",
+}
+_XACRO = "xacro:"
+
+
+def read_urdf(path: Path) -> Tree:
+    """Return the bodies of a URDF file; raises RobotError naming file, line and element."""
+    root = read_xml(path)
+    if root.tag != "robot":
+        raise RobotError(f"{root.where}: expected <robot>, the root of a URDF")
+    unrun = next((e for e in root.walk() if e.tag.startswith(_XACRO)), None)
+    if unrun is not None:
+        raise RobotError(
+            f"{unrun.where}: expected URDF, got xacro: run `xacro {path.name} > robot.urdf` first"
+        )
+    links = _named(root, "link")
+    if not links:
+        raise RobotError(f"{root.where}: expected at least one <link>, got none")
+    joints = _named(root, "joint")
+    ratios = _ratios(root)
+    above = {_end(j, "child", links): j for j in _once_above(joints, links)}
+    order = _from_the_root(root, links, above)
+    bodies = {name: _body(name, links[name], above.get(name), ratios, links) for name in order}
+    return Tree(root.attributes.get("name", path.stem), bodies, str(path))
+
+
+def _named(root: Element, tag: str) -> dict[str, Element]:
+    """Return the elements of a tag by name; raises RobotError where two share one."""
+    out: dict[str, Element] = {}
+    for element in root.all(tag):
+        name = element.require("name", f"the name of the {tag}")
+        if name in out:
+            raise RobotError(
+                f"{element.where}: expected a name no other {tag} has, got that of line {out[name].line}"
+            )
+        out[name] = element
+    return out
+
+
+def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
+    """Return the link that a joint names as its parent or child."""
+    end = joint.find(tag)
+    if end is None:
+        raise RobotError(f"{joint.where}: expected <{tag} link=...>, got none")
+    name = end.require("link", f"the {tag} of joint {joint.attributes['name']!r}")
+    if name not in links:
+        raise RobotError(f"{end.where}: expected the name of a link, got {name!r}")
+    return name
+
+
+def _once_above(joints: dict[str, Element], links: dict[str, Element]) -> list[Element]:
+    """Return the joints; raises RobotError where two move one link: a closed loop."""
+    seen: dict[str, Element] = {}
+    for joint in joints.values():
+        child = _end(joint, "child", links)
+        if child in seen:
+            other = seen[child].attributes["name"]
+            raise RobotError(
+                f"{joint.where}: expected a tree, got a closed loop: {child!r} is the child of {other!r} too"
+            )
+        seen[child] = joint
+    return list(joints.values())
+
+
+def _from_the_root(
+    root: Element, links: dict[str, Element], above: dict[str, Element]
+) -> list[str]:
+    """Return the links, parents before children; raises RobotError unless they are one tree."""
+    free = [name for name in links if name not in above]
+    if len(free) != 1:
+        got = "none, a closed loop" if not free else f"{len(free)}: {', '.join(free[:10])}"
+        raise RobotError(f"{root.where}: expected one link that no joint moves, got {got}")
+    below: dict[str, list[str]] = {}
+    for child, joint in above.items():
+        below.setdefault(_end(joint, "parent", links), []).append(child)
+    order: list[str] = []
+    todo = free
+    while todo:
+        name = todo.pop()
+        order.append(name)
+        todo += reversed(below.get(name, []))
+    lost = [name for name in links if name not in set(order)]
+    if lost:
+        raise RobotError(
+            f"{above[lost[0]].where}: expected a tree, got a closed loop of {', '.join(lost[:10])}"
+        )
+    return order
+
+
+def _body(
+    name: str,
+    link: Element,
+    joint: Element | None,
+    ratios: dict[str, float],
+    links: dict[str, Element],
+) -> Body:
+    mass = _mass(link)
+    if joint is None:
+        return Body(name, None, "", "fixed", still(), np.zeros(3), mass, link.where)
+    kind = joint.require("type", f"one of {', '.join(_MOTIONS)}")
+    if kind not in _MOTIONS:
+        raise RobotError(
+            f"{joint.where}: type: expected one of {', '.join(_MOTIONS)}, got {kind!r}"
+        )
+    motion = _MOTIONS[kind]
+    refused = ""
+    if motion == "other":
+        refused = (
+            f"expected revolute, continuous, prismatic or fixed joints between base and tip, got "
+            f"type {kind!r}: choose them beyond it by --base and --tip"
+        )
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        refused = (
+            f"expected joints with drives of their own between base and tip, got one that mimics "
+            f"{mimic.attributes.get('joint', '?')!r}: cut it by --tip, it is then locked at zero"
+        )
+    return Body(
+        name,
+        _end(joint, "parent", links),
+        joint.attributes["name"],
+        motion,
+        _pose(joint.find("origin")),
+        _axis(joint) if motion in ("revolute", "prismatic") else np.zeros(3),
+        mass,
+        joint.where,
+        _drive(joint, ratios.get(joint.attributes["name"], 1.0)),
+        _limits(joint, kind),
+        refused,
+    )
+
+
+def _pose(origin: Element | None) -> Pose:
+    """Return the pose that <origin> says: roll, pitch and yaw about fixed axes."""
+    if origin is None:
+        return still()
+    roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
+    position = origin.numbers("xyz", 3, (0.0, 0.0, 0.0))
+    return Pose(rotation_rpy(roll, pitch, yaw), np.array(position))
+
+
+def rotation_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation (3, 3) by roll, pitch and yaw [rad] about the fixed axes x, y, z in turn."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _axis(joint: Element) -> Array:
+    element = joint.find("axis")
+    if element is None:
+        return np.array([1.0, 0.0, 0.0])
+    axis = np.array(element.numbers("xyz", 3))
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise RobotError(f"{element.where}: xyz: expected a direction, got {axis.tolist()}")
+    return axis / length
+
+
+def _mass(link: Element) -> Mass | None:
+    """Return what <inertial> says, None without it; raises RobotError for what no body has."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return None
+    masses, inertias = inertial.find("mass"), inertial.find("inertia")
+    if masses is None or inertias is None:
+        missing = "mass" if masses is None else "inertia"
+        raise RobotError(f"{inertial.where}: expected <{missing}>, got none")
+    mass = masses.number("value")
+    xx, yy, zz = (inertias.number(name) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (inertias.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass < 0:
+        raise RobotError(f"{masses.where}: value: expected a mass of zero or more, got {mass:g} kg")
+    for name, value in zip(("ixx", "iyy", "izz"), (xx, yy, zz), strict=True):
+        if value < 0:
+            raise RobotError(
+                f"{inertias.where}: {name}: expected zero or more, got {value:g} kg m^2"
+            )
+    pose = _pose(inertial.find("origin"))
+    return Mass(mass, np.zeros(3), matrix).at(pose)
+
+
+def _drive(joint: Element, ratio: float) -> Drive:
+    dynamics = joint.find("dynamics")
+    if dynamics is None:
+        return Drive(gear_ratio=ratio)
+    found = {name: dynamics.number(name, 0.0) for name in ("damping", "friction")}
+    for name, value in found.items():
+        if value < 0:
+            raise RobotError(f"{dynamics.where}: {name}: expected zero or more, got {value:g}")
+    return Drive(ratio, damping=found["damping"], friction=found["friction"])
+
+
+def _limits(joint: Element, kind: str) -> tuple[float, float] | None:
+    limit = joint.find("limit")
+    if limit is None or kind == "continuous":
+        return None
+    lower, upper = limit.number("lower", 0.0), limit.number("upper", 0.0)
+    if lower > upper:
+        raise RobotError(f"{limit.where}: expected lower <= upper, got {lower:g} and {upper:g}")
+    return None if lower == upper else (lower, upper)
+
+
+def _ratios(root: Element) -> dict[str, float]:
+    """Return the gear ratio r of joints with a <transmission>: one over its reduction."""
+    out: dict[str, float] = {}
+    for transmission in root.all("transmission"):
+        names = [joint.require("name", "a joint") for joint in transmission.all("joint")]
+        holders = [*transmission.all("actuator"), *transmission.all("joint")]
+        reductions = [x for holder in holders for x in holder.all("mechanicalReduction")]
+        # Several joints on one: a differential, which is no ratio of one axis.
+        if len(names) == 1 and reductions:
+            out[names[0]] = 1.0 / _reduction(reductions[0])
+    return out
+
+
+def _reduction(element: Element) -> float:
+    text = element.text.strip()
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if value == 0 or not np.isfinite(value):
+        raise RobotError(f"{element.where}: expected a reduction other than zero, got {text!r}")
+    return value

@@ -1,0 +1,140 @@
+"""XML as plain elements that know their line. Nothing is expanded, and nothing else is read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from axisight.errors import RobotError
+
+# Robots of the largest public collections stay below a tenth of these.
+_MOST_BYTES = 50_000_000
+_DEEPEST = 200
+
+
+@dataclass
+class Element:
+    """An element of a file, with the ``line`` it starts at and the ``text`` it holds."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: str
+    line: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    @property
+    def where(self) -> str:
+        """File, line and element, for messages."""
+        name = self.attributes.get("name")
+        return f"{self.file}, line {self.line}, <{self.tag}{'' if name is None else f' {name!r}'}>"
+
+    def all(self, tag: str) -> list[Element]:
+        """Return the children of that tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def find(self, tag: str) -> Element | None:
+        """Return the child of that tag, None without one; raises RobotError for several."""
+        found = self.all(tag)
+        if len(found) > 1:
+            raise RobotError(
+                f"{found[1].where}: expected at most one <{tag}> in <{self.tag}>, got {len(found)}"
+            )
+        return found[0] if found else None
+
+    def walk(self) -> Iterator[Element]:
+        """Yield the element and all below it."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def require(self, attribute: str, expected: str) -> str:
+        """Return the text of an attribute; raises RobotError where it is missing or empty."""
+        text = self.attributes.get(attribute, "").strip()
+        if not text:
+            raise RobotError(f"{self.where}: expected {attribute}, {expected}, got none")
+        return text
+
+    def numbers(
+        self, attribute: str, count: int, default: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        """Return the finite numbers of an attribute; raises RobotError where it has others.
+
+        ``default`` where it is missing; without one it has to be there.
+        """
+        expected = "a number" if count == 1 else f"{count} numbers"
+        if default is not None and attribute not in self.attributes:
+            return default
+        text = self.require(attribute, expected)
+        try:
+            found = tuple(float(part) for part in text.split())
+        except ValueError:
+            found = ()
+        if len(found) != count or not all(map(math.isfinite, found)):
+            raise RobotError(f"{self.where}: {attribute}: expected {expected}, got {text!r}")
+        return found
+
+    def number(self, attribute: str, default: float | None = None) -> float:
+        """Return the finite number of an attribute; raises RobotError where it has none."""
+        return self.numbers(attribute, 1, None if default is None else (default,))[0]
+
+
+def read_xml(path: Path) -> Element:
+    """Return the root of an XML file.
+
+    Raises RobotError, with the line, for a file that cannot be read or is no XML, and for one with a document
+    type: entities are never expanded and nothing outside is read, so it says what it means itself.
+    """
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise RobotError(f"{path}: expected at most {_MOST_BYTES // 1_000_000} MB")
+        text = path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: expected a readable file: {error}") from error
+    return parse_xml(text, str(path))
+
+
+def parse_xml(text: bytes, name: str) -> Element:
+    """Return the root of an XML text; ``name`` is the file in messages. Raises as `read_xml`."""
+    builder = _Builder(name)
+    try:
+        builder.parser.Parse(text, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise RobotError(f"{name}, line {error.lineno}: expected XML, got {reason}") from None
+    assert builder.root is not None  # expat refuses a text without a root
+    return builder.root
+
+
+class _Builder:
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.root: Element | None = None
+        self._open: list[Element] = []
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = lambda _: self._open.pop()
+        self.parser.CharacterDataHandler = self._text
+        self.parser.StartDoctypeDeclHandler = self._document_type
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        one = Element(tag, attributes, self.name, self.parser.CurrentLineNumber)
+        if len(self._open) >= _DEEPEST:
+            raise RobotError(f"{one.where}: expected at most {_DEEPEST} elements in one another")
+        if self._open:
+            self._open[-1].children.append(one)
+        else:
+            self.root = one
+        self._open.append(one)
+
+    def _text(self, piece: str) -> None:
+        self._open[-1].text += piece
+
+    def _document_type(self, *_: object) -> None:
+        raise RobotError(
+            f"{self.name}, line {self.parser.CurrentLineNumber}: expected no document type (<!DOCTYPE ...>): "
+            f"its entities are not expanded; write out what they stand for"
+        )

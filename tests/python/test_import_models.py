@@ -1,0 +1,241 @@
+"""Robots out of URDF, MJCF, tables and Pinocchio models, against the libraries that own these formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+from axisight import Robot, load_robot
+from axisight.errors import MissingExtraError, RobotError
+from axisight.robot_import import import_robot
+from axisight.robot_import.drives import DriveData
+from import_data import DH, MJCF, URDF, changed, written
+from imported_arms import difference_to_mujoco, difference_to_pinocchio, states
+
+
+def test_a_urdf_moves_as_in_pinocchio(tmp_path: Path):
+    path = written(tmp_path, URDF)
+    robot = load_robot(path)
+    assert robot.joint_names == ["shoulder", "elbow"]
+    assert difference_to_pinocchio(robot, pinocchio.buildModelFromUrdf(str(path))) < 1e-12
+    # What is written is a robot file like any other.
+    again = Robot.from_toml(robot.toml)
+    q, v, a = states(robot, 5)
+    assert np.array_equal(again.inverse_dynamics(q, v, a), robot.inverse_dynamics(q, v, a))
+
+
+def test_a_urdf_says_drives(tmp_path: Path):
+    """Damping and friction act on the joint, and stand on the motor side in a robot file."""
+    robot = import_robot(written(tmp_path, URDF))
+    shoulder, elbow = robot.joints
+    assert shoulder.drive is not None
+    assert elbow.drive is not None
+    assert shoulder.drive.gear_ratio == pytest.approx(1 / 50)
+    assert shoulder.drive.viscous_friction == pytest.approx(0.7 / 50**2)
+    assert shoulder.drive.motor_inertia == 0.0
+    assert elbow.drive.gear_ratio == 1.0
+    (dry,) = robot.effects
+    assert dry.label == "coulomb_friction@1"
+    assert dry.values()[0] == pytest.approx(1.5 / 50)
+    # Of a reversal that takes 0.01 rad/s of the joint.
+    assert (dry.parameters or {})["smoothing_rad_s"] == pytest.approx(0.01 * 50)
+
+
+def test_branches_are_cut_by_the_tip(tmp_path: Path):
+    """A camera that nods beside the elbow: locked at zero, its mass stays where it is."""
+    camera = """<link name="camera"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+    <joint name="nod" type="prismatic"><parent link="upper"/><child link="camera"/>
+    <origin xyz="0 0.2 0.1" rpy="0 0 0.5"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    path = written(tmp_path, changed(URDF, "</robot>", camera))
+    with pytest.raises(RobotError, match=r"2 moving branches.*lower, camera and part at upper"):
+        import_robot(path)
+    whole = pinocchio.buildModelFromUrdf(str(path))
+    robot = import_robot(path, tip="flange")
+    assert robot.joint_names == ["shoulder", "elbow"]
+    assert "locked at zero, masses carried along: nod" in robot.toml
+    assert difference_to_pinocchio(robot, whole) < 1e-12
+    other = import_robot(path, tip="camera")
+    assert other.joint_names == ["shoulder", "nod"]
+    assert other.axis_is_prismatic == [False, True]
+    assert difference_to_pinocchio(other, whole) < 1e-12
+    # Said in the drive data beside it, the file alone is enough.
+    (tmp_path / "arm.drives.toml").write_text(
+        'tip = "flange"\n[joint.elbow]\nmotor_inertia = 0.1\n'
+    )
+    beside = load_robot(path)
+    assert beside.parameters()["elbow.motor_inertia"] == 0.1
+    assert beside.joint_names == robot.joint_names
+
+
+def test_the_base_may_be_a_link_on_the_way(tmp_path: Path):
+    """What is before it stands still; gravity stays that of the file."""
+    path = written(tmp_path, URDF)
+    whole = import_robot(path)
+    part = import_robot(path, base="upper")
+    assert part.joint_names == ["elbow"]
+    q, v, a = states(part, 20)
+    still = np.zeros((20, 1))
+    wanted = whole.inverse_dynamics(*(np.hstack([still, x]) for x in (q, v, a)))[:, 1:]
+    np.testing.assert_allclose(part.inverse_dynamics(q, v, a), wanted, atol=1e-13)
+
+
+def test_an_mjcf_moves_as_in_mujoco(tmp_path: Path):
+    """Anchors beside the body, angles with a reference, two joints of one body."""
+    path = written(tmp_path, MJCF, "arm.xml")
+    robot = load_robot(path)
+    assert robot.joint_names == ["shoulder", "elbow", "slide"]
+    assert difference_to_mujoco(robot, mujoco.MjModel.from_xml_path(str(path))) < 1e-12
+
+
+def test_an_mjcf_says_drives(tmp_path: Path):
+    robot = import_robot(written(tmp_path, MJCF, "arm.xml"))
+    drive = robot.joints[0].drive
+    assert drive is not None
+    assert (drive.gear_ratio, drive.motor_inertia) == pytest.approx((1 / 50, 0.2 / 50**2))
+    assert drive.viscous_friction == pytest.approx(0.7 / 50**2)
+    assert [e.label for e in robot.effects] == ["cable_stiffness@1", "coulomb_friction@1"]
+    assert robot.effects[0].values() == [3.0]
+    elsewhere = changed(MJCF, 'stiffness="3"', 'stiffness="3" springref="0.2"')
+    robot = import_robot(written(tmp_path, elsewhere, "elsewhere.xml"))
+    assert [e.label for e in robot.effects] == ["coulomb_friction@1"]
+    assert "spring of 3 left out: it pulls to another place than zero" in robot.toml
+
+
+def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
+    more = """</actuator><equality><joint joint1="elbow"/></equality></mujoco>"""
+    text = changed(MJCF, "</actuator>\n</mujoco>", more)
+    text = changed(text, "<actuator>", '<actuator><position name="servo" joint="elbow" kp="9"/>')
+    robot = import_robot(written(tmp_path, text, "arm.xml"))
+    assert "1 equality constraints left out" in robot.toml
+    assert "actuator 'servo' is no plain motor" in robot.toml
+
+
+def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def no(name: str):
+        raise ImportError(name)
+
+    monkeypatch.setattr("axisight.robot_import.mjcf.import_module", no)
+    with pytest.raises(MissingExtraError, match=r"axisight\[mujoco\]"):
+        import_robot(written(tmp_path, MJCF, "arm.xml"))
+
+
+def placed(axis: str, angle: float, offset: tuple[float, float, float]) -> pinocchio.SE3:
+    turned = {
+        "x": pinocchio.utils.rpyToMatrix(angle, 0, 0),
+        "z": pinocchio.utils.rpyToMatrix(0, 0, angle),
+    }
+    return pinocchio.SE3(turned[axis], np.array(offset))
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_a_table_moves_as_pinocchio_with_its_transforms(tmp_path: Path, convention: str):
+    """Rz(theta) Tz(d) Tx(a) Rx(alpha) behind the joint, or Rx(alpha) Tx(a) Rz(theta) Tz(d) before it."""
+    text = DH.replace("standard", convention)
+    robot = load_robot(written(tmp_path, text, "arm.csv"))
+    model = pinocchio.Model()
+    parent, before = 0, pinocchio.SE3.Identity()
+    for line in text.splitlines()[1:]:
+        name, _, *numbers = line.split(",")
+        theta, d, a, alpha, mass, x, y, z, xx, yy, zz, xy = map(float, numbers)
+        along_z, along_x = placed("z", theta, (0, 0, d)), placed("x", alpha, (a, 0, 0))
+        modified = convention == "modified"
+        placement = before * along_x * along_z if modified else before
+        parent = model.addJoint(parent, pinocchio.JointModelRZ(), placement, name)
+        before = pinocchio.SE3.Identity() if modified else along_z * along_x
+        inertia = np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]])
+        body = pinocchio.Inertia(mass, np.array([x, y, z]), inertia)
+        model.appendBodyToJoint(parent, body, before)
+    assert difference_to_pinocchio(robot, model) < 1e-12
+
+
+def test_a_pinocchio_model_is_taken_as_it_is(tmp_path: Path):
+    path = written(tmp_path, URDF)
+    model = pinocchio.buildModelFromUrdf(str(path))
+    model.armature[:] = [0.2, 0.0]
+    robot, same = import_robot(model), import_robot(path)
+    q, v, a = states(robot, 20)
+    np.testing.assert_allclose(
+        robot.inverse_dynamics(q, v, a), same.inverse_dynamics(q, v, a), atol=1e-12
+    )
+    assert robot.parameters()["shoulder.motor_inertia"] == pytest.approx(0.2)
+    # Damping and friction of the joint; Pinocchio does not read transmissions.
+    assert robot.parameters()["shoulder.viscous_friction"] == pytest.approx(0.7)
+    assert [e.label for e in robot.effects] == ["coulomb_friction@1"]
+    floating = pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
+    with pytest.raises(RobotError, match=r"one degree of freedom.*FreeFlyer"):
+        import_robot(floating)
+    assert import_robot(floating, base="root_joint").joint_names == robot.joint_names
+
+
+def test_drive_data_stand_before_the_file(tmp_path: Path):
+    drives = written(
+        tmp_path,
+        """sample_time = 0.004
+position_noise_std = 1e-5
+operating_point = [0.1, 0.2]
+[joint.shoulder]
+gear_ratio = 0.01
+motor_inertia = 1e-4
+viscous_friction = 2e-3
+coulomb_friction = 0.3
+stiffness = 1e4
+damping = 20.0
+[controller]
+kind = "pi_velocity"
+kp = [1.0, 2.0]
+ki = [3.0, 4.0]
+[tolerances]
+mass = 0.2
+[payload]
+mass = 3.0
+com = [0.0, 0.0, 0.2]
+""",
+        "my.toml",
+    )
+    path = written(tmp_path, URDF)
+    robot = import_robot(path, drives=drives)
+    shoulder = robot.joints[0]
+    assert shoulder.spring is not None
+    assert shoulder.drive is not None
+    assert (shoulder.spring.stiffness, shoulder.spring.damping) == (1e4, 20.0)
+    assert (shoulder.drive.gear_ratio, shoulder.drive.motor_inertia) == (0.01, 1e-4)
+    assert shoulder.drive.viscous_friction == 2e-3
+    assert robot.effects[0].values()[0] == 0.3
+    assert robot.sample_time_s == 0.004
+    assert robot.position_noise_std == 1e-5
+    assert robot.operating_point.tolist() == [0.1, 0.2]
+    assert robot.controller_kind == "pi_velocity"
+    assert robot.tolerances == {"mass": 0.2}
+    last = robot.joints[-1].link
+    assert last is not None
+    assert last.mass_kg == pytest.approx(2 + 0.5 + 3)
+
+
+def test_a_payload_hangs_on_the_last_link(tmp_path: Path):
+    """Three kilogrammes in its frame, whose axes are those of the file at zero angle."""
+    plain = import_robot(written(tmp_path, URDF))
+    loaded = import_robot(
+        written(tmp_path, URDF),
+        drives=DriveData.model_validate({"payload": {"mass": 3.0, "com": (0.1, 0.2, 0.3)}}),
+    )
+    q = np.array([0.4, -0.7])
+    jacobian = plain.jacobian(q, "elbow", (0.1, 0.2, 0.3))[:3]
+    weight = jacobian.T @ (3.0 * -plain.gravity_m_s2)
+    np.testing.assert_allclose(loaded.gravity(q), plain.gravity(q) + weight, atol=1e-12)
+
+
+def test_the_sample_time_may_come_from_elsewhere(tmp_path: Path):
+    path = written(tmp_path, URDF)
+    assert import_robot(path).sample_time_s == 1e-3
+    assert load_robot(path, sample_time_s=0.02).sample_time_s == 0.02
+
+
+def test_joints_that_cannot_be_at_zero_rest_in_the_middle(tmp_path: Path):
+    text = changed(URDF, 'lower="-2" upper="2"', 'lower="1" upper="2"')
+    assert import_robot(written(tmp_path, text)).operating_point.tolist() == [1.5, 0.0]
