@@ -70,7 +70,7 @@ def read_logs(
     said: set[tuple[str, str]] = set()
     for path in paths:
         said |= _checked(path, columns, unchecked=unchecked)
-        log = read_log(path, columns, n_axes=None if robot is None else robot.n_axes)
+        log = read_log(path, columns, robot=robot)
         slides = [kind == "prismatic" for kind in log.axis_kinds]
         if robot is not None and slides != list(robot.axis_is_prismatic):
             raise InputError(

@@ -68,7 +68,7 @@ def simulate_command(
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
         machine = load_simulator(robot, parse_effects(effect))
-        used = part_of(read_log(log, columns, n_axes=machine.n_axes), start_s, stop_s)
+        used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
         inputs = _inputs(used, machine, torque=torque)
         result = simulate(
             machine,

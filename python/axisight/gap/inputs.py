@@ -11,6 +11,7 @@ import numpy as np
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
+from axisight.logs.sources_bag import is_bag
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
 
@@ -103,19 +104,19 @@ def _read(
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
-    if len(paths) == 1 and paths[0].is_dir():
+    if len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0]):
         case = read_case(paths[0], columns)
         source = model if model is not None else case.robot_path
         robot = load(source)
-        extra = tuple(read_log(p, columns, n_axes=robot.n_axes) for p in validation)
+        extra = tuple(read_log(p, columns, robot=robot) for p in validation)
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
     robot = load(model)
-    logs = [read_log(p, columns, n_axes=robot.n_axes) for p in paths]
-    held = [read_log(p, columns, n_axes=robot.n_axes) for p in validation]
+    logs = [read_log(p, columns, robot=robot) for p in paths]
+    held = [read_log(p, columns, robot=robot) for p in validation]
     if is_model_file(model):
         # It has no sample time of its own, unless the drive data beside it say one.
         robot = load(model, sample_time_s=(*logs, *held)[0].sample_time_s)

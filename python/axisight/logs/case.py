@@ -11,10 +11,12 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.errors import CaseError
-from axisight.logs.columns import ColumnMap, describe_validation
+from axisight.logs.columns import ColumnMap, describe_validation, load_column_map
 from axisight.logs.log import Log
 from axisight.logs.reading import read_log
+from axisight.logs.sources_bag import is_bag
 from axisight.logs.validate import check_same_rate
+from axisight.robot import Robot, load_robot
 
 Role = Literal["estimation", "validation"]
 Text = Annotated[str, Field(min_length=1)]
@@ -89,8 +91,13 @@ def read_case(folder: Path | str, columns: ColumnMap | Path | str | None = None)
                 f"{path}: log.{number}.file: expected a new file, got {entry.file!r} again"
             )
         seen.add(file)
+    given = load_column_map(columns) if isinstance(columns, str | Path) else columns
+    # Logs of motors are read without the robot, which may be a file that only later is looked at.
+    joints = given is not None and given.side == "joint"
+    recorded = any(is_bag(folder / entry.file) for entry in content.log)
+    robot = load_robot(robot_path) if joints or recorded else None
     logs = tuple(
-        _read_entry(path, number, entry, columns) for number, entry in enumerate(content.log)
+        _read_entry(path, number, entry, given, robot) for number, entry in enumerate(content.log)
     )
     for number, log in enumerate(logs):
         if log.n_axes != logs[0].n_axes:
@@ -115,12 +122,12 @@ def _parse(path: Path) -> _CaseFile:
 
 
 def _read_entry(
-    path: Path, number: int, entry: _LogEntry, columns: ColumnMap | Path | str | None
+    path: Path, number: int, entry: _LogEntry, columns: ColumnMap | None, robot: Robot | None
 ) -> Log:
     file = path.parent / entry.file
-    if not file.is_file():
+    if not file.is_file() and not is_bag(file):
         raise CaseError(f"{path}: log.{number}.file: expected an existing file, got {entry.file!r}")
-    log = read_log(file, columns)
+    log = read_log(file, columns, robot=robot)
     if entry.period_s is not None:
         samples = entry.period_s / log.sample_time_s
         if round(samples) < 1 or abs(samples - round(samples)) > 0.01:

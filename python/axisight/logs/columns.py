@@ -142,10 +142,15 @@ class CsvOptions(_Strict):
 
 
 class ColumnMap(_Strict):
-    """A whole map. `sample_rate_hz` is a number, or the name of a scalar in the file."""
+    """A whole map. `sample_rate_hz` is a number, or the name of a scalar in the file.
+
+    `side` says whether positions, velocities and torques are those of motors or of joints; those of joints
+    become the motors' by the gear ratios of the robot that the log is read for.
+    """
 
     schema_: Literal["axisight.columns/1"] = Field(default="axisight.columns/1", alias="schema")
     sample_rate_hz: Positive | Text | None = None
+    side: Literal["motor", "joint"] = "motor"
     time: TimeColumn | None = None
     axis: Annotated[tuple[AxisColumns, ...], Field(min_length=1)]
     csv: CsvOptions = CsvOptions()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 from axisight.errors import LogError
 from axisight.logs.columns import Address, ColumnMap, load_column_map
 from axisight.logs.findings import Finding
+from axisight.logs.joint_states import joint_state_map
 from axisight.logs.log import Floats
 from axisight.logs.native import native_map
 from axisight.logs.sources import Arrays, load_arrays
+from axisight.logs.sources_bag import is_bag
 from axisight.logs.units import si_factor, si_offset
+
+if TYPE_CHECKING:
+    from axisight.robot import Robot
 
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
@@ -36,10 +41,15 @@ class Gathered:
     unused: tuple[str, ...] = ()
 
 
-def gather(path: Path | str, columns: ColumnMap | Path | str | None = None) -> Gathered:
+def gather(
+    path: Path | str,
+    columns: ColumnMap | Path | str | None = None,
+    robot: Robot | None = None,
+) -> Gathered:
     """Open a log and take out every mapped signal; problems of single columns become findings.
 
-    Raises LogError when the file or the map itself cannot be used.
+    ``robot``: whose log it is; without one signals of joints stay as they are. Raises LogError when the file or
+    the map itself cannot be used.
     """
     path = Path(path)
     given = columns if columns is None or isinstance(columns, ColumnMap) else None
@@ -47,17 +57,35 @@ def gather(path: Path | str, columns: ColumnMap | Path | str | None = None) -> G
         assert not isinstance(columns, ColumnMap)
         given = load_column_map(columns)
     files = _Files(path, given)
-    result = Gathered(path, given if given is not None else native_map(files.main, str(path)))
+    result = Gathered(path, _usual_map(files.main, robot, path) if given is None else given)
     _take_time(files, result)
     for number, axis in enumerate(result.columns.axis):
         for name in type(axis).model_fields:
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
+    if result.columns.side == "joint" and robot is not None:
+        _to_motors(result, robot)
     used = {label.split("[")[0] for label in result.labels.values()}
     if given is None:
         result.unused = tuple(sorted(set(files.main) - used - {"time_s"}))
     return result
+
+
+def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> ColumnMap:
+    """Return the map of a file that comes without one: of a recording of ROS, or of native columns."""
+    return joint_state_map(arrays, robot, path) if is_bag(path) else native_map(arrays, str(path))
+
+
+# How a motor's signal follows from the joint's, by the power of the gear ratio r (joint per motor angle).
+_POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "torque": 1}
+
+
+def _to_motors(result: Gathered, robot: Robot) -> None:
+    """Turn signals of joints into those of their motors."""
+    for (name, axis), values in result.signals.items():
+        if name in _POWERS and axis < robot.n_axes:
+            result.signals[name, axis] = values * robot.gear_ratio[axis] ** _POWERS[name]
 
 
 class _Files:

@@ -28,6 +28,9 @@ _USUAL = 20.0
 # Steps of a coarse encoder, or of numbers written with few digits, make the speed of a slow axis jump
 # by one or two of themselves.
 _RESOLUTIONS = 3.0
+# A step next to it that is off the same way by this share: a short motion of few samples, which a wrist
+# makes near a singular pose. What was lost, reset or glitched is off by one step alone.
+_SHARE_OF_JUMP = 0.4
 # Jumps this near to one another are one event; this many in it are rows out of order.
 _EVENT_SAMPLES = 15
 _OUT_OF_ORDER = 4
@@ -97,7 +100,17 @@ def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Ju
         near = np.abs(found[:, None] - np.array(known)[None]).min(axis=1) <= 2
         found = found[~near]
     found = found[np.abs(off[found]) > _RESOLUTIONS * steps_around(values, found)]
+    found = found[~_in_a_motion(off, found)]
     return [Jump(axis, int(k), float(off[k]), float(usual[k])) for k in found], top
+
+
+def _in_a_motion(off: Floats, found: Ints) -> NDArray[np.bool_]:
+    """Return which jumps are part of a speed that rises and falls over several samples."""
+    padded = np.pad(off, 1)
+    beside = np.stack([padded[found], padded[found + 2]])
+    return np.asarray(
+        np.any(beside * np.sign(off[found]) > _SHARE_OF_JUMP * np.abs(off[found]), axis=0)
+    )
 
 
 def _explained(

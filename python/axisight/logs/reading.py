@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap
 from axisight.logs.findings import raise_errors
 from axisight.logs.gather import Gathered, gather
@@ -13,25 +15,38 @@ from axisight.logs.grid import Grid, make_grid
 from axisight.logs.log import Floats, Log
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
+if TYPE_CHECKING:
+    from axisight.robot import Robot
+
 
 def read_log(
     path: Path | str,
     columns: ColumnMap | Path | str | None = None,
     *,
     n_axes: int | None = None,
+    robot: Robot | None = None,
 ) -> Log:
-    """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5 or .npz.
+    """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or .db3.
 
     `columns` is a column map, the path of one, or None for a file with the native column names
-    of `axisight.case/1`. `n_axes` is the number of driven axes the caller expects. The result is
-    in SI units on a uniform grid that starts at 0.
+    of `axisight.case/1` or a recording of ROS (a rosbag2 may be its folder). `robot` is the one it is a log of:
+    its axes are found by the names of its joints in recordings, and its gear ratios turn signals
+    of joints into those of motors. `n_axes` is the number of driven axes the caller expects, those of the
+    robot unless given. The result is in SI units on a uniform grid that starts at 0.
 
     Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
     column or axis missing; NaN or inf; unequal lengths; time that does not increase; gaps or
     jitter beyond 1 % of a sample; a declared rate that the stamps contradict; less than one
     second; another number of axes than `n_axes`.
     """
-    found = gather(path, columns)
+    found = gather(path, columns, robot)
+    if found.columns.side == "joint" and robot is None:
+        raise LogError(
+            f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "
+            f"motors, got none"
+        )
+    if n_axes is None and robot is not None:
+        n_axes = robot.n_axes
     problems = [*found.findings, *check_axes(found, n_axes), *check_lengths(found)]
     raise_errors(found.path, problems)
     grid = grid_of(found)

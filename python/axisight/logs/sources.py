@@ -11,8 +11,9 @@ import pandas as pd
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from axisight.errors import LogError
+from axisight.errors import LogError, MissingExtraError
 from axisight.logs.columns import CsvOptions
+from axisight.logs.sources_bag import BAG_SUFFIXES, is_bag, load_bag
 from axisight.logs.sources_hdf5 import load_hdf5
 from axisight.logs.sources_mat import load_mat
 
@@ -22,8 +23,9 @@ Arrays = dict[str, NDArray[Any]]
 def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
     """Return every array of the file by (dotted) name; scalars are 0-dimensional.
 
-    The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5 or .npz. Raises
-    LogError for a missing file, an unknown suffix, and a truncated or corrupt file.
+    The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording of
+    ROS (.mcap, .bag, .db3, or the folder of a rosbag2). Raises MissingExtraError for one without the
+    library that reads it, LogError for a missing file, an unknown suffix, and a truncated or corrupt file.
     """
     loaders: dict[str, Callable[[Path], Arrays]] = {
         ".parquet": _load_parquet,
@@ -32,14 +34,18 @@ def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
         ".h5": load_hdf5,
         ".hdf5": load_hdf5,
         ".npz": _load_npz,
+        **dict.fromkeys(BAG_SUFFIXES, load_bag),
     }
-    suffix = path.suffix.lower()
+    folder_of_bag = path.is_dir() and is_bag(path)
+    suffix = ".db3" if folder_of_bag else path.suffix.lower()
     if suffix not in loaders:
         raise LogError(f"{path}: suffix: expected one of {', '.join(loaders)}, got {suffix!r}")
-    if not path.is_file():
+    if not path.is_file() and not folder_of_bag:
         raise LogError(f"{path}: expected a file, got {'a folder' if path.is_dir() else 'nothing'}")
     try:
         return loaders[suffix](path)
+    except MissingExtraError:
+        raise
     except MemoryError:
         raise LogError(f"{path}: truncated, corrupt or too large for memory") from None
     except Exception as error:  # corrupt files make the readers raise nearly anything

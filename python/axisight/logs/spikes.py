@@ -20,6 +20,8 @@ _WHOLE = 5.0
 _LARGEST = 0.0005
 _TOUCHED = 10
 _NEIGHBOURS = 101
+# Of the largest steps: what is smaller tells nothing of the motion, and machines do it too.
+_SHARE_OF_STEP = 0.02
 # More than that is how the signal is (a coarse encoder toggles), not an accident.
 _MOST = 20
 
@@ -32,7 +34,8 @@ def isolated_spikes(values: Floats) -> NDArray[np.int64]:
     off = np.zeros_like(values)
     off[2:-2] = values[2:-2] - (4 * (values[1:-3] + values[3:-1]) - values[:-4] - values[4:]) / 6
     size = np.abs(off)
-    top = np.flatnonzero(size > _WHOLE * _large(size))
+    step = _SHARE_OF_STEP * _large(np.abs(np.diff(values)))
+    top = np.flatnonzero(size > max(_WHOLE * _large(size), step))
     # The neighbours of a spike are large too; the largest of five is the spike.
     top = top[size[top] >= scipy.ndimage.maximum_filter1d(size, 5)[top]]
     if not 0 < len(top) <= _MOST:

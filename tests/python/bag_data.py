@@ -1,0 +1,66 @@
+"""Recordings of ROS that tests write: joint states of a log, as rosbag2, MCAP or ROS 1 bag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+Array = NDArray[np.float64]
+ROS2, ROS1 = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
+STATE = "sensor_msgs/msg/JointState"
+START_NS = 1_700_000_000_000_000_000
+
+
+def joint_state(
+    types: Any, stamp_ns: int, names: Sequence[str], fields: Sequence[Array], sequence: int
+) -> Any:
+    """Return a message; ``fields`` are position, velocity and effort."""
+    known = types.types
+    seconds, rest = divmod(stamp_ns, 1_000_000_000)
+    stamp = known["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
+    header = {"stamp": stamp, "frame_id": ""}
+    if types is ROS1:
+        header["seq"] = sequence
+    return known[STATE](
+        known["std_msgs/msg/Header"](**header),
+        list(names),
+        *(np.asarray(field, dtype=np.float64) for field in fields),
+    )
+
+
+def written_states(
+    path: Path,
+    kind: str,
+    time_s: Array,
+    names: Sequence[str],
+    fields: Sequence[Array],
+    *,
+    topic: str = "/joint_states",
+    more: Callable[[Any, Any], None] | None = None,
+) -> Path:
+    """Write joint states and return what to read: a folder, or a file of ``kind`` mcap or bag.
+
+    ``fields``: position, velocity, effort (n, n_joints), each may be empty. ``more`` writes more, given
+    writer and types.
+    """
+    types = ROS1 if kind == "bag" else ROS2
+    plugin = StoragePlugin.SQLITE3 if kind == "rosbag2" else StoragePlugin.MCAP
+    made = Writer1(path) if kind == "bag" else Writer2(path, version=9, storage_plugin=plugin)
+    with made as writer:
+        connection = writer.add_connection(topic, STATE, typestore=types)
+        for k, time in enumerate(time_s):
+            stamp = START_NS + round(time * 1e9)
+            message = joint_state(types, stamp, names, [f[k] if len(f) else [] for f in fields], k)
+            serialize = types.serialize_ros1 if kind == "bag" else types.serialize_cdr
+            writer.write(connection, stamp + 300_000, serialize(message, STATE))
+        if more is not None:
+            more(writer, types)
+    return next(path.glob("*.mcap")) if kind == "mcap file" else path
