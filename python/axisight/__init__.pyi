@@ -12,6 +12,7 @@ from . import (
     records,
     rigid_body,
     robot_file,
+    robot_import,
 )
 from .effects import (
     Effect,
@@ -120,6 +121,7 @@ __all__ = [
     "records",
     "rigid_body",
     "robot_file",
+    "robot_import",
     "robot_parameter",
     "robot_parameters",
     "simulate",

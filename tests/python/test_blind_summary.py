@@ -7,11 +7,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from axisight.blind import markdown
+from axisight.blind import judged_cases, markdown
 from axisight.blind.calibration import calibration_bins, carried_over
 from axisight.blind.page import render_score
 from axisight.blind.score import Judged
 from axisight.blind.summary import summary
+from axisight.errors import InputError
 
 
 def judged(
@@ -180,3 +181,16 @@ def test_without_another_engine_or_with_few_causes_none_is_fitted():
     assert carried_over(CASES) is None
     assert carried_over([CASES[0]] * 30) is None
     assert "temperature" not in markdown(summary(CASES))
+
+
+def test_a_verdict_without_its_truth_or_seal_is_named(tmp_path):
+    """A benchmark whose making was stopped has a case too many."""
+    for name in ("cases/one", "truths", "verdicts"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "verdicts" / "one.json").write_text("{}")
+    folders = [tmp_path / name for name in ("cases", "truths", "verdicts")]
+    with pytest.raises(InputError, match=r"one\.json: expected the truth of a verdict"):
+        judged_cases(*folders)
+    (tmp_path / "truths" / "one.json").write_text("{}")
+    with pytest.raises(InputError, match="expected the seal of a case"):
+        judged_cases(*folders)

@@ -105,19 +105,26 @@ class Share:
 def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
     """Return every verdict beside its truth.
 
-    Raises InputError for a truth that is not the one its case was sealed with, and where there is
-    no verdict at all.
+    Raises InputError for a truth that is not the one its case was sealed with, or that is not there, and
+    where there is no verdict at all.
     """
     out = []
     for path in sorted(verdicts.glob("*.json")):
-        text = (truths / path.name).read_text("utf-8")
-        seal = (cases / path.stem / SEAL).read_text("utf-8").strip()
+        text = _read(truths / path.name, "the truth of a verdict")
+        seal = _read(cases / path.stem / SEAL, "the seal of a case").strip()
         if seal_of(text) != seal:
             raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
         out.append(_judged(path.stem, json.loads(text), json.loads(path.read_text("utf-8"))))
     if not out:
         raise InputError(f"{verdicts}: expected verdicts (*.json), got none")
     return out
+
+
+def _read(path: Path, what: str) -> str:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected {what}: {error}") from error
 
 
 def _label(entry: dict[str, Any]) -> str:

@@ -14,6 +14,7 @@ from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import refuse_effects_beside
+from axisight.robot_import import is_model_file
 
 GivenEffects = Annotated[
     list[str] | None,
@@ -36,8 +37,18 @@ def load_simulator(
     Raises InputError as `say_effects`, and for a given effect that the robot cannot have.
     """
     robot = load_robot(source, sample_time_s=sample_time_s)
+    if is_model_file(source):
+        say_import(robot)
     say_effects(robot, source, given)
     return with_given(robot, given)
+
+
+def say_import(robot: Robot) -> None:
+    """Print what is to be said of a robot out of a model file: the notes at the head of its text."""
+    for line in robot.toml.splitlines():
+        if not line.startswith("# "):
+            break
+        OUT.print(line.removeprefix("# "), markup=False, highlight=False, soft_wrap=True)
 
 
 def with_given(robot: Robot, given: Sequence[Effect]) -> Robot:

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from axisight.cli.common import OUT, errors
+from axisight.cli.robot import say_import
 from axisight.errors import InputError
-from axisight.robot import Robot
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import DriveData, Payload, read_drives
 from axisight.robot_import.load import drives_path
@@ -20,7 +20,7 @@ robot_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 @robot_app.callback()
 def _robot() -> None:
-    """Make robot files of other model files."""
+    """Make robot files of URDF, MJCF and tables of Denavit and Hartenberg."""
 
 
 @robot_app.command("import")
@@ -70,17 +70,9 @@ def import_command(
             typer.echo(robot.toml, nl=False)
             return
         write_whole(out, robot.toml)
-        _say(robot, out)
-
-
-def _say(robot: Robot, out: Path) -> None:
-    """Print what was written, and the notes at its head."""
-    said = f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}"
-    OUT.print(said, markup=False, highlight=False, soft_wrap=True)
-    for line in robot.toml.splitlines():
-        if not line.startswith("# "):
-            break
-        OUT.print(line[2:], markup=False, highlight=False, soft_wrap=True)
+        said = f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}"
+        OUT.print(said, markup=False, highlight=False, soft_wrap=True)
+        say_import(robot)
 
 
 def _payload(text: str) -> Payload:

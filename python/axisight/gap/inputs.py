@@ -114,11 +114,11 @@ def _read(
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
-    robot = load(model)
+    # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
+    robot = load_robot(model) if is_model_file(model) else load(model)
     logs = [read_log(p, columns, robot=robot) for p in paths]
     held = [read_log(p, columns, robot=robot) for p in validation]
     if is_model_file(model):
-        # It has no sample time of its own, unless the drive data beside it say one.
         robot = load(model, sample_time_s=(*logs, *held)[0].sample_time_s)
     if not held:
         if len(logs) < 2:

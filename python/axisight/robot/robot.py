@@ -345,7 +345,7 @@ class Robot:
 
 
 def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-    """Return the robot in a TOML file, a model file (URDF, MJCF, DH table), or the preset of that name.
+    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, DH table), or a preset's name.
 
     Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
     model m3, with its cubic spring and Coulomb friction). ``sample_time_s`` is that of a model file

@@ -71,8 +71,20 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         document["tolerances"] = drives.tolerances
     if effects:
         document["effect"] = effects
-    head = [f"imported from {source}", *chain.notes]
+    head = [f"imported from {source}", *chain.notes, *_defaults(tables, drives)]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
+
+
+def _defaults(tables: list[dict[str, Any]], drives: DriveData) -> list[str]:
+    """Return what was taken where neither the model file nor the drive data say anything."""
+    out = []
+    if all(table["drive"]["gear_ratio"] == 1.0 for table in tables):
+        out.append("no gear ratios: angles and torques of motors are those of the joints")
+    if all(table["drive"]["motor_inertia"] == 0.0 for table in tables):
+        out.append("no rotors: motors have no inertia")
+    if drives.controller is None:
+        out.append("no controller: logs are compared by inverse dynamics")
+    return out
 
 
 def _line(text: str) -> str:
