@@ -11,6 +11,7 @@ from . import (
     montecarlo,
     records,
     rigid_body,
+    robot_export,
     robot_file,
     robot_import,
 )
@@ -68,6 +69,10 @@ from .robot import (
     Robot,
     load_robot,
 )
+from .robot_export import (
+    to_mujoco,
+    to_pinocchio,
+)
 from .simulation import (
     simulate,
     simulate_batch,
@@ -120,12 +125,15 @@ __all__ = [
     "read_log",
     "records",
     "rigid_body",
+    "robot_export",
     "robot_file",
     "robot_import",
     "robot_parameter",
     "robot_parameters",
     "simulate",
     "simulate_batch",
+    "to_mujoco",
+    "to_pinocchio",
 ]
 
 __version__: str

@@ -26,6 +26,7 @@ MODULES = (
     axisight.records,
     axisight.rigid_body,
     axisight.robot_file,
+    axisight.robot_export,
     axisight.robot_import,
 )
 PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}

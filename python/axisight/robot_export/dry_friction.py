@@ -1,0 +1,16 @@
+"""Coulomb friction of a robot as other libraries have it: of joints."""
+
+from __future__ import annotations
+
+from axisight.robot import Robot
+
+
+def joint_friction_nm(robot: Robot) -> dict[str, float]:
+    """Return the Coulomb friction [Nm or N] of joints by name, of those that have the effect."""
+    out = {}
+    for effect in robot.effects:
+        if effect.name == "coulomb_friction" and effect.axis is not None:
+            place = effect.axis - 1
+            moment = (effect.parameters or {}).get("coulomb_nm", 0.0)
+            out[robot.axis_names[place]] = moment / abs(float(robot.gear_ratio[place]))
+    return out

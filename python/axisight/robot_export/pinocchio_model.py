@@ -1,0 +1,53 @@
+"""A robot as a ``pinocchio.Model``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from axisight.errors import MissingExtraError
+from axisight.robot import Robot
+from axisight.robot_export.dry_friction import joint_friction_nm
+
+
+def to_pinocchio(robot: Robot) -> Any:
+    """Return a ``pinocchio.Model`` of the arm: all joints, driven and elastic, by their names.
+
+    Its ``rnea`` is `Robot.inverse_dynamics`. Rotors stand in ``rotorInertia`` [kg m^2, motor side] and
+    ``rotorGearRatio`` (motor per joint angle), viscous friction in ``damping`` and Coulomb friction
+    in the limits of dry friction, both on the joint. Springs of gears and of elastic joints, the
+    controller and all other effects of the robot have no place there. Raises MissingExtraError without Pinocchio.
+    """
+    try:
+        pinocchio = import_module("pinocchio")
+    except ImportError as error:
+        raise MissingExtraError("to_pinocchio needs Pinocchio: pip install 'pin>=3'") from error
+    model = pinocchio.Model()
+    model.name = robot.name
+    model.gravity.linear = robot.gravity_m_s2
+    friction = joint_friction_nm(robot)
+    parent = 0
+    for joint in robot.joints:
+        kind = (
+            pinocchio.JointModelPrismaticUnaligned
+            if joint.prismatic
+            else pinocchio.JointModelRevoluteUnaligned
+        )
+        placement = pinocchio.SE3(np.eye(3), joint.origin_m)
+        parent = model.addJoint(parent, kind(joint.axis), placement, joint.name)
+        if joint.link is not None:
+            xx, yy, zz, xy, xz, yz = joint.link.inertia_kg_m2
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            body = pinocchio.Inertia(joint.link.mass_kg, joint.link.com_m, inertia)
+            model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
+        v = model.joints[parent].idx_v
+        if joint.drive is not None:
+            ratio = joint.drive.gear_ratio
+            model.rotorInertia[v] = joint.drive.motor_inertia
+            model.rotorGearRatio[v] = 1.0 / ratio
+            model.damping[v] = joint.drive.viscous_friction / ratio**2
+        dry = friction.get(joint.name, 0.0)
+        model.lowerDryFrictionLimit[v], model.upperDryFrictionLimit[v] = -dry, dry
+    return model
