@@ -14,6 +14,7 @@ from . import (
     robot_export,
     robot_file,
     robot_import,
+    write_back,
 )
 from .effects import (
     Effect,
@@ -134,6 +135,7 @@ __all__ = [
     "simulate_batch",
     "to_mujoco",
     "to_pinocchio",
+    "write_back",
 ]
 
 __version__: str

@@ -65,6 +65,16 @@ def test_a_model_needs_logs_beside_it(tmp_path: Path):
     assert "expected logs beside the model, got none" in said
 
 
+def test_a_model_that_cannot_be_written_is_said_before_anything(tmp_path: Path):
+    time = 0.01 * np.arange(300)
+    motion = np.column_stack([np.sin(time), np.cos(time)])
+    log = table(tmp_path / "run.parquet", motion, motion, 0.01)
+    path = written(tmp_path, URDF)
+    status, said = run("diagnose", path, log, "--validation", log, "--write-model", path)
+    assert status == 2
+    assert "exists: choose another name" in said
+
+
 def table(path: Path, position: np.ndarray, torque: np.ndarray, step_s: float) -> Path:
     columns = {"time_s": step_s * np.arange(len(position))}
     for i in range(position.shape[1]):
@@ -101,8 +111,12 @@ def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
         logs.append(
             table(tmp_path / f"run{k}.parquet", q + 1e-6 * noise.normal(size=q.shape), torque, 0.01)
         )
-    status, said = run("diagnose", path, *logs[:2], "--validation", logs[2])
+    new = tmp_path / "new.urdf"
+    status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
     assert status == 0, said
+    assert f"model: {new}, with coulomb_friction@1" in said
+    (found,) = load_robot(new).effects
+    assert found.values()[0] == pytest.approx(1.5, rel=0.02)
     assert "no gear ratios: angles and torques of motors are those of the joints" in said
     assert "explained" in said
     assert "coulomb_friction@1" in said or "Coulomb friction" in said

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from axisight import report as pages
+from axisight import write_back
 from axisight.cli.common import OUT, Columns, From, To, bars, errors
 from axisight.cli.fleet import run_fleet
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
@@ -89,6 +90,13 @@ def diagnose_command(
             "references into this folder.",
         ),
     ] = None,
+    write_model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the simulator with its causes here: a robot file (.toml), or a URDF or MJCF as the "
+            "one that was diagnosed."
+        ),
+    ] = None,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -118,6 +126,7 @@ def diagnose_command(
             "--threads": threads,
             "--effect": effect,
             "--next-experiment": next_experiment,
+            "--write-model": write_model,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -132,6 +141,8 @@ def diagnose_command(
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
+        if write_model is not None:
+            write_back.check_target(inputs.robot_source, write_model)
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -153,6 +164,19 @@ def diagnose_command(
         write_diagnosis(found, json, report)
         if next_experiment is not None:
             _write_experiment(found, next_experiment)
+        if write_model is not None:
+            _write_model(found, inputs.robot_source, inputs.robot, write_model)
+
+
+def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Path) -> None:
+    """Write the simulator with its causes, and say which of them it has no place for."""
+    if not found.causes:
+        OUT.print("no model was written: no cause was named")
+        return
+    made = write_back.write_model(source, robot, found.causes, target)
+    OUT.print(f"model: {made.path}, with {', '.join(made.placed) or 'none'}", soft_wrap=True)
+    if made.left_out:
+        OUT.print(f"no place in it for {', '.join(made.left_out)}", soft_wrap=True)
 
 
 def _write_experiment(found: Diagnosis, folder: Path) -> None:

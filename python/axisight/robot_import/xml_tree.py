@@ -17,7 +17,7 @@ _DEEPEST = 200
 
 @dataclass
 class Element:
-    """An element of a file, with the ``line`` it starts at and the ``text`` it holds."""
+    """An element of a file, with the ``line`` and byte (``offset``) it starts at and the ``text`` it holds."""
 
     tag: str
     attributes: dict[str, str]
@@ -25,6 +25,7 @@ class Element:
     line: int
     children: list[Element] = field(default_factory=list)
     text: str = ""
+    offset: int = 0
 
     @property
     def where(self) -> str:
@@ -122,6 +123,7 @@ class _Builder:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         one = Element(tag, attributes, self.name, self.parser.CurrentLineNumber)
+        one.offset = self.parser.CurrentByteIndex
         if len(self._open) >= _DEEPEST:
             raise RobotError(f"{one.where}: expected at most {_DEEPEST} elements in one another")
         if self._open:

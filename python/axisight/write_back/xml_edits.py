@@ -1,0 +1,87 @@
+"""Attributes set and elements added in an XML text; every other byte stays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from axisight.errors import RobotError
+from axisight.robot_import.xml_tree import Element
+
+# A start tag, or an element without content.
+_TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
+
+
+@dataclass
+class Edits:
+    """Changes of one text, made together: places are those of the text as it was read."""
+
+    text: bytes
+    name: str
+    _changes: list[tuple[int, int, bytes]] = field(default_factory=list)
+
+    def set(self, element: Element, attributes: Mapping[str, float], comment: str) -> None:
+        """Set attributes of an element, with a comment on a line above it."""
+        start, tag = self._tag(element)
+        for name, value in attributes.items():
+            tag = _with(tag, name, value)
+        lead = self._indent(start)
+        self._replace(start, start + len(self._tag(element)[1]), _comment(comment) + lead + tag)
+
+    def add(
+        self, element: Element, child: str, attributes: Mapping[str, float], comment: str
+    ) -> None:
+        """Put a child with attributes first in an element, with a comment above it."""
+        start, tag = self._tag(element)
+        inner = self._indent(start) + b"  "
+        made = f"<{child}/>".encode()
+        for name, value in attributes.items():
+            made = _with(made, name, value)
+        more = inner + _comment(comment) + inner + made
+        end = start + len(tag)
+        if not tag.endswith(b"/>"):
+            self._replace(end, end, more)
+            return
+        closed = b"</" + element.tag.encode() + b">"
+        self._replace(start, end, tag[:-2].rstrip() + b">" + more + self._indent(start) + closed)
+
+    def result(self) -> bytes:
+        """Return the text with all changes."""
+        out, at = [], 0
+        for start, end, new in sorted(self._changes):
+            if start < at:
+                raise RobotError(f"{self.name}: expected one change of each element, got two")
+            out += [self.text[at:start], new]
+            at = end
+        return b"".join([*out, self.text[at:]])
+
+    def _replace(self, start: int, end: int, new: bytes) -> None:
+        self._changes.append((start, end, new))
+
+    def _tag(self, element: Element) -> tuple[int, bytes]:
+        found = _TAG.match(self.text, element.offset)
+        if found is None:
+            raise RobotError(f"{element.where}: its text cannot be edited")
+        return found.start(), found.group()
+
+    def _indent(self, start: int) -> bytes:
+        """Return the line break and the blanks before an element; nothing where it follows another."""
+        line = self.text.rfind(b"\n", 0, start) + 1
+        lead = self.text[line:start]
+        return b"\n" + lead if line and not lead.strip() else b"\n"
+
+
+def _with(tag: bytes, name: str, value: float) -> bytes:
+    """Return a start tag with an attribute set."""
+    said = f'"{value:.10g}"'.encode()
+    known = re.compile(rb"(\s" + re.escape(name.encode()) + rb"\s*=\s*)(?:\"[^\"]*\"|'[^']*')")
+    if known.search(tag):
+        return known.sub(lambda m: m.group(1) + said, tag, count=1)
+    end = b"/>" if tag.endswith(b"/>") else b">"
+    return tag[: -len(end)].rstrip() + b" " + name.encode() + b"=" + said + end
+
+
+def _comment(text: str) -> bytes:
+    # Two hyphens would end it.
+    return f"<!-- {text.replace('--', '- -')} -->".encode()
