@@ -82,6 +82,18 @@ RIGID_BODY_QUANTITIES = {
 }
 """Terms of a torque model by what they take up of effects that the robot has."""
 
+DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
+"""What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
+
+VISCOUS_FRICTION = "viscous_friction"
+"""What friction in proportion to speed is, beyond the simulator's."""
+
+ROTOR = "rotor_inertia"
+"""What the inertia of a motor is that a model file leaves out."""
+
+JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
+"""What a spring that pulls a joint to zero is, and its parameter."""
+
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 """What flat tops of a logged torque are, and its parameter."""
 

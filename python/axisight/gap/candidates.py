@@ -99,13 +99,17 @@ def _places(robot: Robot, info: EffectInfo) -> list[Place]:
 
 
 def _has_what_changes(robot: Robot, info: EffectInfo, axis: int) -> bool:
-    """Whether an axis has the link that an effect acts on, and a relative change something to change."""
+    """Whether an axis has the link that an effect acts on, and what it changes by a share or adds."""
     if info.acts == "arm" and robot.axis_parameter(axis, "mass") is None:
         return False
-    if info.stands_for is None or info.stands_for[1] == "absolute":
+    if info.stands_for is None:
         return True
-    name = robot.axis_parameter(axis, info.stands_for[0])
-    return name is not None and robot.parameters()[name] != 0
+    quantity, change = info.stands_for
+    name = robot.axis_parameter(axis, quantity)
+    there = name is not None and robot.parameters()[name] != 0
+    # What is there is changed by a share of itself, where an effect does that.
+    shares = any(other.stands_for == (quantity, "relative") for other in effect_table().values())
+    return there if change == "relative" else not (there and shares)
 
 
 def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:

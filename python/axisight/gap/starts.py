@@ -503,5 +503,6 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "axis_coupling": _coupled,
     "clock_drift": _shown_by_logs,
     "position_quantization": _shown_by_logs,
+    "rotor_inertia": _neutral,
 }
 """By effect."""

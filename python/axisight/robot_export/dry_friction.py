@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from axisight.effects.stated import DRY_FRICTION
 from axisight.robot import Robot
 
 
@@ -9,8 +10,8 @@ def joint_friction_nm(robot: Robot) -> dict[str, float]:
     """Return the Coulomb friction [Nm or N] of joints by name, of those that have the effect."""
     out = {}
     for effect in robot.effects:
-        if effect.name == "coulomb_friction" and effect.axis is not None:
+        if effect.name == DRY_FRICTION[0] and effect.axis is not None:
             place = effect.axis - 1
-            moment = (effect.parameters or {}).get("coulomb_nm", 0.0)
+            moment = (effect.parameters or {}).get(DRY_FRICTION[1], 0.0)
             out[robot.axis_names[place]] = moment / abs(float(robot.gear_ratio[place]))
     return out

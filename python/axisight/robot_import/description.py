@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Mass, joined
 from axisight.robot_import.chain import Chain, ChainJoint
@@ -32,6 +33,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
     joints = list(chain.joints)
     last = _loaded(joints[-1].mass, drives.payload)
     tables, effects = [], []
+    friction, moment, corner = DRY_FRICTION
     for number, joint in enumerate(joints, start=1):
         drive = drives.joint.get(joint.body.joint, JointDrive())
         mass = last if joint is joints[-1] else joint.mass
@@ -41,18 +43,18 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         if joint.body.drive.spring > 0:
             effects.append(
                 {
-                    "name": "cable_stiffness",
+                    "name": JOINT_SPRING[0],
                     "axis": number,
-                    "stiffness_nm_rad": joint.body.drive.spring,
+                    JOINT_SPRING[1]: joint.body.drive.spring,
                 }
             )
         if dry > 0:
             effects.append(
                 {
-                    "name": "coulomb_friction",
+                    "name": friction,
                     "axis": number,
-                    "coulomb_nm": dry,
-                    "smoothing_rad_s": _SMOOTHING_RAD_S / abs(ratio),
+                    moment: dry,
+                    corner: _SMOOTHING_RAD_S / abs(ratio),
                 }
             )
     document: dict[str, Any] = {

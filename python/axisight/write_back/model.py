@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
+from axisight.effects.stated import DRY_FRICTION, ROTOR, VISCOUS_FRICTION
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, write_identified
@@ -19,11 +20,10 @@ from axisight.write_back.xml_edits import Edits
 if TYPE_CHECKING:
     from axisight.gap.result import Cause
 
-# What of friction another model has a number for: of the joint.
-_DRY, _VISCOUS = "dry", "viscous"
+# What another model has a number for, by effect: of the joint.
 _NUMBERS = {
-    "robot": {_DRY: "friction", _VISCOUS: "damping"},
-    "mujoco": {_DRY: "frictionloss", _VISCOUS: "damping"},
+    "robot": {DRY_FRICTION[0]: "friction", VISCOUS_FRICTION: "damping"},
+    "mujoco": {DRY_FRICTION[0]: "frictionloss", VISCOUS_FRICTION: "damping", ROTOR: "armature"},
 }
 
 
@@ -51,9 +51,8 @@ def write_model(
         with all causes as effects; a URDF or MJCF, which is written as its own kind, or as a robot file.
     target
         File to write. Of a URDF or MJCF all bytes stay but the numbers that change, each with a comment that says
-        cause, value, interval and probability: dry and viscous friction of joints, in what the
-        file calls damping and friction. What was re-fitted within its tolerance stays as it is.
-
+        cause, value, interval and probability: dry and viscous friction of joints, of an MJCF rotors too
+        (armature). What was re-fitted within its tolerance stays as it is.
     overwrite
         Replace a file that exists.
 
@@ -112,13 +111,13 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     by_joint: dict[str, list[Cause]] = {}
     for cause in causes:
         name = robot.axis_names[cause.axis - 1] if cause.axis and not cause.axes else None
-        if cause.effect in _FRICTION and name in joints:
+        if cause.effect in _NUMBERS[root.tag] and name in joints:
             by_joint.setdefault(str(name), []).append(cause)
             placed.append(cause.label)
         else:
             left_out.append(cause.label)
     for name, mine in by_joint.items():
-        _edit(edits, root.tag, joints[name], _friction(robot, name, mine), _said(mine))
+        _edit(edits, root.tag, joints[name], _of_joint(robot, name, mine), _said(mine))
     try:
         write_whole(path, edits.result().decode("utf-8"))
     except UnicodeDecodeError:
@@ -126,22 +125,23 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     return Written(path, tuple(placed), tuple(left_out))
 
 
-_FRICTION = ("coulomb_friction", "viscous_friction")
+def _of_joint(robot: Robot, name: str, causes: Sequence[Cause]) -> dict[str, float]:
+    """Return what causes on its axis make of a joint, by effect.
 
-
-def _friction(robot: Robot, name: str, causes: Sequence[Cause]) -> dict[str, float]:
-    """Return dry [Nm] and viscous [Nm s/rad] friction of a joint that causes on its axis make of it."""
+    Dry friction [Nm], viscous friction [Nm s/rad], inertia of the rotor [kg m^2].
+    """
     axis = robot.axis_names.index(name)
     ratio = abs(float(robot.gear_ratio[axis]))
     out = {}
     for cause in causes:
         value = next(iter(cause.parameters.values())).value
-        if cause.effect == "coulomb_friction":
+        if cause.effect == DRY_FRICTION[0]:
             # It has taken the place of what the simulator had.
-            out[_DRY] = value / ratio
+            out[cause.effect] = value / ratio
         else:
-            own = robot.parameters().get(f"{name}.viscous_friction", 0.0)
-            out[_VISCOUS] = (own + value) / ratio**2
+            quantity = (effect_info(cause.effect).stands_for or ("", ""))[0]
+            own = robot.parameters().get(f"{name}.{quantity}", 0.0)
+            out[cause.effect] = (own + value) / ratio**2
     return out
 
 

@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
-    usual: &["payload"],
+    usual: &["payload", "rotor_inertia"],
     twins: &[],
     stands_for: Some(StandsFor { quantity: "inertia_scale", change: Change::Relative }),
     linear: Linear::Parameters,

@@ -129,6 +129,7 @@ effect_table!(
     axis_coupling,
     clock_drift,
     position_quantization,
+    rotor_inertia,
 );
 
 /// Description of effect `name`.

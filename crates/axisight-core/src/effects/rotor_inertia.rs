@@ -1,0 +1,47 @@
+//! Motors whose inertia the simulator leaves out.
+
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use axisight_scalar::Scalar;
+
+pub(super) static INFO: EffectInfo = EffectInfo {
+    name: "rotor_inertia",
+    summary: "inertia of motor and gear that the simulator leaves out, as model files of arms mostly do",
+    equation: "J_m + dJ",
+    source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.1 (rotors in the kinetic energy)",
+    scope: Scope::Axis,
+    acts: Acts::Motor,
+    family: Family::Load,
+    contains: &[],
+    parts: &[],
+    usual: &[],
+    twins: &[],
+    stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Absolute }),
+    linear: Linear::Parameters,
+    inverse_dynamics: true,
+    stiff: false,
+    absorbed_by: &[Absorber::MotorInertia],
+    shown_by: &[Experiment::Poses],
+    parameters: &[ParameterInfo {
+        name: "inertia_kg_m2",
+        unit: "kg m^2",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 1e5,
+        typical: 0.01,
+    }],
+};
+
+struct Inertia<S>(S);
+
+pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
+    Box::new(Inertia(p[0]))
+}
+
+impl<S: Scalar> Kernel<S> for Inertia<S> {
+    fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
+        if let Some(inertia) = plant.motor_inertia.as_deref_mut() {
+            *inertia = *inertia + self.0;
+        }
+    }
+}
