@@ -115,6 +115,22 @@ def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
     status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
     assert status == 0, said
     assert f"model: {new}, with coulomb_friction@1" in said
+    # The same as a case, whose robot is the URDF.
+    case = tmp_path / "case"
+    case.mkdir()
+    roles = ("estimation", "estimation", "validation")
+    entries = [
+        f'[[log]]\nfile = "run{k}.parquet"\nrole = "{role}"\nexcitation = "sines"\n'
+        for k, role in enumerate(roles)
+    ]
+    for file in (path, *logs):
+        (case / file.name).write_bytes(file.read_bytes())
+    (case / "case.toml").write_text(
+        'schema = "axisight.case/1"\nname = "arm"\nrobot = "arm.urdf"\n' + "".join(entries)
+    )
+    status, said = run("diagnose", case)
+    assert status == 0, said
+    assert "explained" in said
     (found,) = load_robot(new).effects
     assert found.values()[0] == pytest.approx(1.5, rel=0.02)
     assert "no gear ratios: angles and torques of motors are those of the joints" in said

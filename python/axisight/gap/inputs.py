@@ -93,6 +93,13 @@ def _check_at_rest(log: Log, start_s: float) -> None:
         )
 
 
+def _loaded(load: Callable[..., Robot], source: Path | str, logs: Sequence[Log]) -> Robot:
+    """Return a robot; one of a model file has the sample time of its logs, unless its drive data say one."""
+    if not is_model_file(source):
+        return load(source)
+    return load(source, sample_time_s=logs[0].sample_time_s)
+
+
 def _read(
     paths: Sequence[Path],
     model: str | None,
@@ -107,7 +114,7 @@ def _read(
     if len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0]):
         case = read_case(paths[0], columns)
         source = model if model is not None else case.robot_path
-        robot = load(source)
+        robot = _loaded(load, source, case.logs)
         extra = tuple(read_log(p, columns, robot=robot) for p in validation)
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
@@ -119,7 +126,7 @@ def _read(
     logs = [read_log(p, columns, robot=robot) for p in paths]
     held = [read_log(p, columns, robot=robot) for p in validation]
     if is_model_file(model):
-        robot = load(model, sample_time_s=(*logs, *held)[0].sample_time_s)
+        robot = _loaded(load, model, [*logs, *held])
     if not held:
         if len(logs) < 2:
             raise InputError("--validation: expected a log to hold out, or at least two logs")

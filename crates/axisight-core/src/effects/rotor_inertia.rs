@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     contains: &[],
     parts: &[],
-    usual: &[],
+    usual: &["link_mass"],
     twins: &[],
     stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Absolute }),
     linear: Linear::Parameters,
