@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -111,10 +111,7 @@ class Body:
 
 @dataclass
 class Tree:
-    """All bodies of a file by name, parents before children, and what is to be said of it.
-
-    ``parts``: elements that were found and mean nothing to a serial chain, with what becomes of them.
-    """
+    """All bodies of a file by name, parents before children; ``notes``: what a chain cannot say of it."""
 
     name: str
     bodies: dict[str, Body]
@@ -132,10 +129,3 @@ class Tree:
         while (parent := out[-1].parent) is not None:
             out.append(self.bodies[parent])
         return out[::-1]
-
-    def with_mass(self, name: str, more: Mass) -> Tree:
-        """Return the same with a mass, in its frame, added to a body."""
-        body = self.bodies[name]
-        parts = [more] if body.mass is None else [body.mass, more]
-        bodies = {**self.bodies, name: replace(body, mass=joined(parts))}
-        return replace(self, bodies=bodies)

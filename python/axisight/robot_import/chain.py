@@ -31,10 +31,14 @@ class ChainJoint:
 
 @dataclass(frozen=True)
 class Chain:
-    """A serial chain from a model file, and what is to be said of how it came about."""
+    """A serial chain from a model file, and what is to be said of how it came about.
+
+    ``end``: the frame of the last link, as the file has it, in that of the last joint.
+    """
 
     name: str
     joints: tuple[ChainJoint, ...]
+    end: Pose
     gravity_m_s2: Array
     notes: tuple[str, ...]
 
@@ -67,11 +71,11 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
             f"{tree.file}: --base: expected a link between {names[0]!r} and the tip {last!r}, got {first!r}"
         )
     path = path[names.index(first) :]
-    joints, notes = _joints(tree, path)
+    joints, end, notes = _joints(tree, path)
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-    return Chain(tree.name, tuple(joints), gravity, (*tree.notes, *notes))
+    return Chain(tree.name, tuple(joints), end, gravity, (*tree.notes, *notes))
 
 
 def _listed(names: Sequence[str] | dict[str, Body]) -> str:
@@ -91,7 +95,7 @@ def _only_end(tree: Tree, first: str) -> str:
             f"the last link of the one that is meant by --tip, or tip in the drive data (they end at "
             f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
         )
-    return ends[0] if ends else first
+    return (tree.bodies[ends[0]].of or ends[0]) if ends else first
 
 
 def _ends(tree: Tree, first: str) -> list[str]:
@@ -103,41 +107,39 @@ def _ends(tree: Tree, first: str) -> list[str]:
     return out
 
 
-def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], list[str]]:
-    """Return the moving joints along a path, and what was locked."""
+def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, list[str]]:
+    """Return the moving joints along a path, the last body in the frame of the last, and what was locked."""
     chosen = {body.name for body in path}
     # Orientation of the first body in the base of the file: gravity is said there.
     here = Pose(_from_root(tree, path[0]).rotation, np.zeros(3))
-    joints: list[ChainJoint] = []
     locked: list[str] = []
-    origin = np.zeros(3)
-    carried = [_carried(tree, path[0], here, chosen, locked)]
-    moving: list[tuple[Body, Array, Array, list[Mass]]] = []
+    # What moves with the joint before; of the base, nobody needs it.
+    with_last: list[Mass] = []
+    moving: list[tuple[Body, Pose, list[Mass]]] = []
     for body in path[1:]:
         here = here @ body.pose
         masses = _carried(tree, body, here, chosen, locked)
         if body.motion == "fixed":
-            carried[-1].extend(masses)
+            with_last += masses
             continue
         if body.refused or body.motion == "other":
             raise RobotError(f"{body.where}: {body.refused}")
-        moving.append((body, here.origin - origin, here.rotation @ body.axis, masses))
-        carried.append(masses)
-        origin = here.origin
+        with_last = masses
+        moving.append((body, here, with_last))
     if not moving:
         raise RobotError(
             f"{tree.file}: expected at least one revolute, continuous or prismatic joint between "
             f"{path[0].name!r} and {path[-1].name!r}, got none"
         )
-    at = np.zeros(3)
-    for body, offset, axis, masses in moving:
-        at = at + offset
-        shifted = [m.at(Pose(np.eye(3), -at)) for m in masses]
-        mass = joined(shifted)
+    joints: list[ChainJoint] = []
+    before = np.zeros(3)
+    for body, at, masses in moving:
+        mass = joined(m.at(Pose(np.eye(3), -at.origin)) for m in masses)
         _check(body, mass)
-        joints.append(ChainJoint(body, offset, axis, mass))
+        joints.append(ChainJoint(body, at.origin - before, at.rotation @ body.axis, mass))
+        before = at.origin
     notes = [f"locked at zero, masses carried along: {_listed(locked)}"] if locked else []
-    return joints, notes
+    return joints, Pose(here.rotation, here.origin - before), notes
 
 
 def _from_root(tree: Tree, body: Body) -> Pose:

@@ -9,7 +9,7 @@ import tomlkit
 
 from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING
 from axisight.errors import RobotError
-from axisight.robot_import.bodies import Mass, joined
+from axisight.robot_import.bodies import Mass, Pose, joined
 from axisight.robot_import.chain import Chain, ChainJoint
 from axisight.robot_import.drives import DriveData, JointDrive, Payload
 
@@ -31,7 +31,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
                 f"drive data: joint.{name}: expected one of {', '.join(names)}, got {name!r}"
             )
     joints = list(chain.joints)
-    last = _loaded(joints[-1].mass, drives.payload)
+    last = _loaded(joints[-1].mass, drives.payload, chain.end)
     tables, effects = [], []
     friction, moment, corner = DRY_FRICTION
     for number, joint in enumerate(joints, start=1):
@@ -133,10 +133,10 @@ def _dry_friction(joint: ChainJoint, drive: JointDrive, ratio: float) -> float:
     return joint.body.drive.friction * abs(ratio)
 
 
-def _loaded(mass: Mass | None, payload: Payload | None) -> Mass | None:
+def _loaded(mass: Mass | None, payload: Payload | None, end: Pose) -> Mass | None:
     if payload is None:
         return mass
-    load = Mass(payload.mass, np.array(payload.com), np.zeros((3, 3)))
+    load = Mass(payload.mass, np.array(payload.com), np.zeros((3, 3))).at(end)
     return joined([load] if mass is None else [mass, load])
 
 

@@ -83,7 +83,7 @@ def _bodies(row: dict[str, str], parent: str, where: str) -> list[Body]:
     kind = motions[motion]
     if convention == "modified":
         return [Body(name, parent, name, kind, along_x @ along_z, axis, mass, where)]  # type: ignore[arg-type]
-    joint = Body(f"{name} joint", parent, name, kind, still(), axis, None, where)  # type: ignore[arg-type]
+    joint = Body(f"{name} joint", parent, name, kind, still(), axis, None, where, of=name)  # type: ignore[arg-type]
     link = Body(name, joint.name, "", "fixed", along_z @ along_x, np.zeros(3), mass, where)
     return [joint, link]
 
