@@ -51,10 +51,12 @@ class InverseNoise:
         """Return the error (n, n_axes) [Nm] that noise causes in a predicted torque of run ``run``."""
         step, cutoff = log.sample_time_s, self.filtering.cutoff_hz
         white = white_noise(self.seed, 2 * run, log.n_samples, log.n_axes)
-        _, acceleration = differentiate(white * self.position_std_rad, step, cutoff)
+        _, acceleration = differentiate(white * self.position_std_rad, step, cutoff, curved=True)
         axes = np.flatnonzero(self.filtering.measured)
         if axes.size and log.velocity_rad_s is not None:
-            speed = lowpass((white * _top_std(log, log.velocity_rad_s))[:, axes], step, cutoff)
+            speed = lowpass(
+                (white * _top_std(log, log.velocity_rad_s))[:, axes], step, cutoff, curved=True
+            )
             acceleration[:, axes] = np.gradient(speed, step, axis=0)
         torque = white_noise(self.seed, 2 * run + 1, log.n_samples, log.n_axes)
         left = acceleration * self.inertia - lowpass(

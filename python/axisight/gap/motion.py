@@ -35,18 +35,22 @@ class Filtering:
 def motion(log: Log, cutoff_hz: float, measured: Sequence[bool] = ()) -> Motion:
     """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike.
 
+    Logs may begin and end in motion: beyond their ends it goes on as curved as it is. Torque does not:
+    friction breaks it, and a curvature across a break is none.
     ``measured``: the axes whose velocity is the measured one, low-passed, and whose acceleration
     is its derivative. Raises InputError where the log has none.
     """
-    velocity, acceleration = differentiate(log.position_rad, log.sample_time_s, cutoff_hz)
+    velocity, acceleration = differentiate(
+        log.position_rad, log.sample_time_s, cutoff_hz, curved=True
+    )
     axes = np.flatnonzero(measured)
     if axes.size:
         if log.velocity_rad_s is None:
             raise InputError(f"{log.name}: expected a measured velocity, got none")
-        speed = lowpass(log.velocity_rad_s[:, axes], log.sample_time_s, cutoff_hz)
+        speed = lowpass(log.velocity_rad_s[:, axes], log.sample_time_s, cutoff_hz, curved=True)
         velocity[:, axes] = speed
         acceleration[:, axes] = np.gradient(speed, log.sample_time_s, axis=0, edge_order=2)
-    smooth = lowpass(log.position_rad, log.sample_time_s, cutoff_hz)
+    smooth = lowpass(log.position_rad, log.sample_time_s, cutoff_hz, curved=True)
     torque = lowpass(log.torque_nm, log.sample_time_s, cutoff_hz)
     out = tuple(np.ascontiguousarray(x) for x in (smooth, velocity, acceleration, torque))
     return out[0], out[1], out[2], out[3]

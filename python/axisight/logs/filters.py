@@ -17,12 +17,15 @@ _PADDING_PERIODS = 10.0
 """Padding in cutoff periods: the start-up transient of order 4 falls to 1e-10 over them."""
 
 
-def lowpass(x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4) -> Floats:
+def lowpass(
+    x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4, *, curved: bool = False
+) -> Floats:
     """Filter `x` (n,) or (n, k) along its first dimension with a zero-phase Butterworth low-pass.
 
     The filter of `order` runs forward and backward: the gain is 1 / (1 + (f / cutoff_hz)^(2 order))
     up to the bilinear frequency warping, so -6 dB at `cutoff_hz`. Ends are padded oddly over ten
-    periods of the cutoff, or as far as the signal reaches.
+    periods of the cutoff, or as far as the signal reaches; ``curved``: with the curvature that it has
+    there, which the accelerations of a signal that begins or ends in motion need.
 
     Raises InputError when the cutoff (Hz) is not between 0 and Nyquist, when samples are too few
     for the padding, not finite, or not of shape (n,) or (n, k).
@@ -41,7 +44,28 @@ def lowpass(x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4) -
         )
     pad = min(x.shape[0] - 1, max(least, math.ceil(_PADDING_PERIODS / (cutoff_hz * sample_time_s))))
     sections = _butterworth(order, cutoff_hz * sample_time_s * 2.0).copy()  # scipy wants to write
+    if curved:
+        extended = _extended(x, pad, max(least, math.ceil(1.0 / (cutoff_hz * sample_time_s))))
+        smooth = scipy.signal.sosfiltfilt(sections, extended, axis=0, padtype=None)
+        return np.asarray(smooth[pad:-pad], dtype=np.float64)
     return np.asarray(scipy.signal.sosfiltfilt(sections, x, axis=0, padlen=pad), dtype=np.float64)
+
+
+def _extended(x: Floats, pad: int, window: int) -> Floats:
+    """Return a signal with its odd reflection at both ends, plus the curvature that it has there.
+
+    Of a parabola the reflection about an end is the parabola itself. The curvature is that of a cubic
+    through ``window`` samples.
+    """
+    window = min(window, x.shape[0])
+    # Second derivative of the cubic at the first of its samples, per sample squared.
+    powers = np.vander(np.arange(window, dtype=np.float64), 4, increasing=True)
+    weights = 2.0 * np.linalg.pinv(powers)[2]
+    k = np.arange(1.0, pad + 1.0).reshape(-1, *[1] * (x.ndim - 1))
+    first = 2.0 * x[0] - x[1 : pad + 1] + np.tensordot(weights, x[:window], 1) * k**2
+    back = x[::-1]
+    last = 2.0 * back[0] - back[1 : pad + 1] + np.tensordot(weights, back[:window], 1) * k**2
+    return np.concatenate([first[::-1], x, last])
 
 
 @lru_cache(maxsize=64)
@@ -53,15 +77,20 @@ def _butterworth(order: int, cutoff: float) -> Floats:
 
 
 def differentiate(
-    position: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4
+    position: Floats,
+    sample_time_s: float,
+    cutoff_hz: float,
+    order: int = 4,
+    *,
+    curved: bool = False,
 ) -> tuple[Floats, Floats]:
     """Return velocity and acceleration of `position` (n,) or (n, k), in its unit per s and s^2.
 
     The position is filtered by `lowpass`, then differenced centrally over one sample on either
-    side; both results are second-order accurate in the sample time, one-sided at the ends. Raises
-    InputError like `lowpass`.
+    side; both results are second-order accurate in the sample time, one-sided at the ends. ``curved`` and
+    InputError as of `lowpass`.
     """
-    smooth = lowpass(position, sample_time_s, cutoff_hz, order)
+    smooth = lowpass(position, sample_time_s, cutoff_hz, order, curved=curved)
     velocity = np.gradient(smooth, sample_time_s, axis=0, edge_order=2)
     acceleration = np.empty_like(smooth)
     acceleration[1:-1] = smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]

@@ -41,7 +41,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 impl<S: Scalar> Kernel<S> for Inertia<S> {
     fn prepare(&self, plant: &mut PlantParameters<'_, S>) {
         if let Some(inertia) = plant.motor_inertia.as_deref_mut() {
-            *inertia = *inertia + self.0;
+            *inertia += self.0;
         }
     }
 }
