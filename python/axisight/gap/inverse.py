@@ -39,10 +39,10 @@ class InverseView(View):
         self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
     ) -> None:
         cutoff = settings.cutoff_hz
-        if cutoff is not None and not 0 < cutoff < 0.5 / robot.sample_time_s:
+        nyquist_hz = 0.5 / logs[0].sample_time_s
+        if cutoff is not None and not 0 < cutoff < nyquist_hz:
             raise InputError(
-                f"cutoff_hz: expected between 0 and the Nyquist frequency "
-                f"{0.5 / robot.sample_time_s:g} Hz, got {cutoff:g} Hz"
+                f"cutoff_hz: expected between 0 and the Nyquist frequency {nyquist_hz:g} Hz, got {cutoff:g} Hz"
             )
         self.filtering = chosen_filtering(
             logs,

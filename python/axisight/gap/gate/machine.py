@@ -13,6 +13,7 @@ from axisight.robot import Robot
 # is the ratio as catalogues print it (50:1 to 300:1).
 _SUSPICIOUS_RATIO = 1.0 + 1e-9
 _IMPOSSIBLE_RATIO = 5.0
+_DIFFERS = "sample_time_differs"
 
 
 def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
@@ -24,12 +25,20 @@ def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
             out.append(Finding("axes_differ", "refuse", message, log.name, None, "axis"))
         factor = log.sample_time_s / robot.sample_time_s
         if abs(factor - 1.0) > RATE_TOLERANCE:
-            out.append(_another_rate(robot, log, factor))
+            found = _another_rate(robot, log, factor)
+            if found.name != _DIFFERS or not _at_its_own_rate(robot, log, logs[0]):
+                out.append(found)
     return out
 
 
+def _at_its_own_rate(robot: Robot, log: Log, first: Log) -> bool:
+    """Whether torque is predicted at the rate of a log: no controller samples it, and all logs have it."""
+    same = abs(log.sample_time_s / first.sample_time_s - 1.0) <= RATE_TOLERANCE
+    return same and robot.controller_kind == "none"
+
+
 def _another_rate(robot: Robot, log: Log, factor: float) -> Finding:
-    name, unit = "sample_time_differs", ""
+    name, unit = _DIFFERS, ""
     for known, known_name, words in ((1e3, "time_in_ms", "ms"), (1e6, "time_in_us", "us")):
         if abs(factor / known - 1.0) < 0.01:
             name, unit = known_name, f": time in {words}? It has to be in s"
