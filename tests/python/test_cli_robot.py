@@ -1,141 +1,474 @@
-"""The command ``axisight robot``, and model files where commands take a robot."""
+"""Effects that a robot file states: which commands use them, and what they say."""
 
-from __future__ import annotations
-
+import json
+import os
+import shutil
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
-from axisight import load_robot
+from axisight import Effect, Log, load_robot, montecarlo, simulate
 from axisight.cli import app
-from axisight.robot_import import import_robot
-from axisight.robot_import.drives import DriveData
-from import_data import DH, URDF, written
+from axisight.errors import InputError
+from axisight.gap import verdict_schema
+from axisight.gap.candidates import all_candidates
+from axisight.gap.orders import Turning
+from axisight.gap.settings import DEFAULT_TOLERANCES
+from axisight.gap.starts import Situation
+from axisight.logs import read_log
+from axisight.robot_file import Provenance, hash_file, identified, load_identified, write_identified
+from axisight.robot_file.effect_tables import stated
+from montecarlo_data import small_study
+from test_diagnose import bare_axis, logs_of
+
+COULOMB = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.05})
+SPRING = Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": 3.7e10})
+# One that does nothing.
+NEUTRAL = Effect("stribeck_friction", 1, {})
+LINE = "with the effects of {}: nonlinear_stiffness@1, coulomb_friction@1"
+CHIRP = ("--kind", "chirp", "--period-s", 0.5, "--band-hz", "4,20", "--peak-rad-s", 8)
+CASE = """
+schema = "axisight.case/1"
+name = "axis"
+robot = "axis.toml"
+
+[[log]]
+file = "log.parquet"
+role = "estimation"
+
+[[log]]
+file = "log2.parquet"
+role = "validation"
+"""
+PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
+HELD = {"fresh": ("multisine", 9)}
 
 
-def run(*arguments: str) -> tuple[int, str]:
+def run(*arguments: object, code: int = 0) -> str:
     result = CliRunner().invoke(app, [*map(str, arguments)])
-    return result.exit_code, " ".join(result.output.split())
+    assert result.exit_code == code, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    return " ".join(result.output.split())
 
 
-def test_a_model_becomes_a_robot_file(tmp_path: Path):
-    path, out = written(tmp_path, URDF), tmp_path / "robot.toml"
-    status, said = run("robot", "import", path, "-o", out, "--payload", "3,0.1,0.2,0.3")
-    assert status == 0, said
-    assert "2 axes, shoulder, elbow" in said
-    assert "no rotors: motors have no inertia" in said
-    assert "no gear ratios" not in said
-    plain, q = load_robot(path), np.array([0.4, -0.7])
-    load = DriveData.model_validate({"payload": {"mass": 3.0, "com": (0.1, 0.2, 0.3)}})
-    loaded = import_robot(path, drives=load)
-    np.testing.assert_array_equal(load_robot(out).gravity(q), loaded.gravity(q))
-    assert not np.allclose(loaded.gravity(q), plain.gravity(q))
-    # Nothing is written over unasked.
-    status, said = run("robot", "import", path, "-o", out)
-    assert (status, "--overwrite" in said) == (2, True)
-    assert run("robot", "import", path, "-o", out, "--overwrite")[0] == 0
-    assert load_robot(out).gravity(q) == pytest.approx(plain.gravity(q))
-
-
-def test_without_a_file_it_is_printed(tmp_path: Path):
-    status, said = run("robot", "import", written(tmp_path, DH, "arm.csv"))
-    assert status == 0
-    assert 'schema = "axisight.robot/2"' in said
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--tip", "hand"], "--tip: expected a link"),
-        (["--payload", "heavy"], "--payload: expected KG or KG,X,Y,Z"),
-        (["--payload", "1,2"], "--payload: expected KG or KG,X,Y,Z"),
-        (["--payload", "-1"], "--payload: expected KG or KG,X,Y,Z with a positive mass"),
-        (["--drives", "none.toml"], "none.toml: expected a readable file"),
-    ],
-)
-def test_misuse_is_named(tmp_path: Path, arguments: list[str], message: str):
-    status, said = run("robot", "import", written(tmp_path, URDF), *arguments)
-    assert status == 2
-    assert message in said
-
-
-def test_a_model_needs_logs_beside_it(tmp_path: Path):
-    status, said = run("diagnose", written(tmp_path, URDF))
-    assert status == 2
-    assert "expected logs beside the model, got none" in said
-
-
-def test_a_model_that_cannot_be_written_is_said_before_anything(tmp_path: Path):
-    time = 0.01 * np.arange(300)
-    motion = np.column_stack([np.sin(time), np.cos(time)])
-    log = table(tmp_path / "run.parquet", motion, motion, 0.01)
-    path = written(tmp_path, URDF)
-    status, said = run("diagnose", path, log, "--validation", log, "--write-model", path)
-    assert status == 2
-    assert "exists: choose another name" in said
-
-
-def table(path: Path, position: np.ndarray, torque: np.ndarray, step_s: float) -> Path:
-    columns = {"time_s": step_s * np.arange(len(position))}
-    for i in range(position.shape[1]):
-        columns |= {f"position_{i + 1}": position[:, i], f"torque_cmd_{i + 1}": torque[:, i]}
-    pd.DataFrame(columns).to_parquet(path)
+def write_robot(path: Path, *effects: Effect) -> Path:
+    stiffness = 1.46e6
+    found = identified({"axis1.stiffness": stiffness}, Provenance("test"), effects=effects)
+    write_identified(bare_axis(), path, found)
     return path
 
 
-def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
-    """Joint-side logs at 100 Hz beside a URDF without friction: nothing else is said of the machine."""
-    bare = URDF.replace('<dynamics damping="0.7" friction="1.5"/>', "")
-    bare = bare[: bare.index("  <transmission")] + "</robot>"
-    path = written(tmp_path, bare)
-    robot = load_robot(path)
-    noise = np.random.default_rng(0)
-    logs = []
-    for k in range(3):
-        time = 0.01 * np.arange(1500)
-        waves = [(0.6, 1.1 + 0.2 * k, 0.3), (0.4, 2.3, 1.0 + k)]
-        shape = [
-            np.sum([a * np.sin(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
-        ]
-        q = np.column_stack(shape)
-        rate = [
-            np.sum([a * w * np.cos(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
-        ]
-        turn = [
-            -np.sum([a * w**2 * np.sin(w * time + p + i) for a, w, p in waves], axis=0)
-            for i in (0, 1)
-        ]
-        v, a = np.column_stack(rate), np.column_stack(turn)
-        torque = robot.inverse_dynamics(q, v, a) + np.array([1.5, 0.0]) * np.tanh(v / 0.01)
-        torque += 0.02 * noise.normal(size=q.shape)
-        logs.append(
-            table(tmp_path / f"run{k}.parquet", q + 1e-6 * noise.normal(size=q.shape), torque, 0.01)
-        )
-    new = tmp_path / "new.urdf"
-    status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
-    assert status == 0, said
-    assert f"model: {new}, with coulomb_friction@1" in said
-    # The same as a case, whose robot is the URDF.
-    case = tmp_path / "case"
-    case.mkdir()
-    roles = ("estimation", "estimation", "validation")
-    entries = [
-        f'[[log]]\nfile = "run{k}.parquet"\nrole = "{role}"\nexcitation = "sines"\n'
-        for k, role in enumerate(roles)
+def earlier_files(axis: Path) -> Path:
+    """The robot without its effects, as a file of version 1, and they in a sidecar of version 1."""
+    old = axis.with_name("old.toml")
+    robot = load_robot(axis)
+    old.write_text(stated(robot.toml, []).replace("axisight.robot/2", "axisight.robot/1"))
+    content = json.loads(axis.with_name("axis.identified.json").read_text())
+    content |= {"schema": "axisight.identified/1", "robot": old.name}
+    content["robot_sha256"] = hash_file(old)
+    content["effects"] = [
+        {"name": e.name, "axis": e.axis, "parameters": e.parameters} for e in robot.effects
     ]
-    for file in (path, *logs):
-        (case / file.name).write_bytes(file.read_bytes())
-    (case / "case.toml").write_text(
-        'schema = "axisight.case/1"\nname = "arm"\nrobot = "arm.urdf"\n' + "".join(entries)
+    old.with_name("old.identified.json").write_text(json.dumps(content))
+    return old
+
+
+def write_log(path: Path, log: Log) -> Path:
+    columns = {"time_s": log.time_s, "velocity_ref_1": log.velocity_ref_rad_s[:, 0]}
+    columns |= {"torque_cmd_1": log.torque_nm[:, 0], "position_1": log.position_rad[:, 0]}
+    pd.DataFrame(columns).to_parquet(path, index=False)
+    return path
+
+
+@pytest.fixture
+def axis(tmp_path: Path) -> Path:
+    return write_robot(tmp_path / "axis.toml", SPRING, COULOMB, NEUTRAL)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    (made,) = logs_of(bare_axis(), [], {"moves": ("moves", 0)})
+    return write_log(tmp_path / "log.parquet", made)
+
+
+def simulated(axis: Path, log: Path, *more: object) -> tuple[np.ndarray, str]:
+    out = axis.with_name("out.parquet")
+    text = run("simulate", axis, log, "--out", out, *more)
+    return pd.read_parquet(out)["torque_cmd_1"].to_numpy(), text
+
+
+def truth(log: Path, *effects: Effect) -> np.ndarray:
+    reference = pd.read_parquet(log)[["velocity_ref_1"]].to_numpy()
+    return simulate(bare_axis(), reference, effects=effects)["torque_cmd_nm"].values[:, 0]
+
+
+def test_simulate_takes_them_and_says_so(axis: Path, log: Path) -> None:
+    torque, text = simulated(axis, log)
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
+    assert LINE.format(axis) in text
+    assert "stribeck" not in text
+
+
+def test_a_given_effect_replaces_one_of_the_file(axis: Path, log: Path) -> None:
+    torque, text = simulated(axis, log, "--effect", "coulomb_friction@1:coulomb_nm=0.2")
+    other = Effect("coulomb_friction", 1, {"coulomb_nm": 0.2})
+    np.testing.assert_array_equal(torque, truth(log, SPRING, other))
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in text
+
+
+def test_a_robot_edited_since_keeps_its_effects(axis: Path, log: Path) -> None:
+    axis.write_text(axis.read_text() + "# looked at\n")
+    axis.with_name("axis.identified.json").write_text("spoilt")
+    torque, _ = simulated(axis, log)
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
+
+
+def test_nothing_is_said_where_there_is_nothing(log: Path, tmp_path: Path) -> None:
+    _, text = simulated(write_robot(tmp_path / "bare.toml", NEUTRAL), log)
+    assert "with the effects" not in text
+    _, text = simulated(write_robot(tmp_path / "bare2.toml"), log)
+    assert "with the effects" not in text
+
+
+def test_effects_beside_a_robot_file_are_refused_until_written_again(
+    axis: Path, log: Path, tmp_path: Path
+) -> None:
+    """As earlier versions left them: a robot of version 1, effects in its sidecar."""
+    old = earlier_files(axis)
+    for command in (
+        ("simulate", old, log, "--out", tmp_path / "x.parquet"),
+        ("diagnose", log, log, "--model", old),
+        ("montecarlo", study_file(tmp_path, old, "nonlinear"), "--out", tmp_path / "x"),
+        ("identify", "axis", log, log, "--robot", old),
+        ("excite", "--robot", old, *CHIRP, "--torque-limit", 0.1),
+    ):
+        text = run(*command, code=2)
+        assert "old.identified.json: expected effects in the robot file" in text
+        assert "got nonlinear_stiffness@1, coulomb_friction@1 beside it" in text
+    # Stated in the robot file by hand.
+    by_hand = old.with_name("by_hand.toml")
+    by_hand.write_text(axis.read_text())
+    shutil.copy(old.with_name("old.identified.json"), by_hand.with_name("by_hand.identified.json"))
+    torque, _ = simulated(by_hand, log)
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
+    # As the message says.
+    found = load_identified(old)
+    assert found.robot.effects == found.effects == (SPRING, COULOMB, NEUTRAL)
+    write_identified(found.robot, old, found, overwrite=True)
+    assert load_robot(old).effects == load_identified(old).effects == found.effects
+    torque, _ = simulated(old, log)
+    np.testing.assert_array_equal(torque, truth(log, SPRING, COULOMB))
+
+
+# The diagnosis.
+
+
+def diagnosed(axis: Path, friction_nm: float, *more: object) -> tuple[dict, str]:
+    """Diagnose a machine with so much friction, its cubic spring left away."""
+    effect = Effect("coulomb_friction", 1, {"coulomb_nm": friction_nm, "smoothing_rad_s": 0.05})
+    folder = axis.parent
+    paths = [
+        write_log(folder / f"{made.name}.parquet", made)
+        for made in logs_of(bare_axis(), [effect, SPRING], PLAN | HELD)
+    ]
+    held = ["--validation", paths.pop()]
+    verdict = folder / "verdict.json"
+    text = run("diagnose", *paths, *held, "--model", axis, "--json", verdict, *more)
+    found = json.loads(verdict.read_text())
+    jsonschema.validate(found, verdict_schema())
+    return found, text
+
+
+def test_diagnose_knows_what_was_identified(axis: Path) -> None:
+    found, text = diagnosed(axis, 0.5)
+    assert LINE.format(axis) in text
+    assert found["verdict"] == "none"
+    assert found["provenance"]["robot_effects"] == ["nonlinear_stiffness@1", "coulomb_friction@1"]
+
+
+def test_the_robot_of_a_case_has_its_effects_too(axis: Path, log: Path, monkeypatch) -> None:
+    seen = []
+
+    def stop(**inputs) -> None:
+        seen.append(inputs["robot"].effects)
+        raise InputError("seen")
+
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
+    command = ["diagnose", log, log, "--model", axis]
+    assert "with the effects of" in run(*command, code=2)
+    case = axis.parent / "case.toml"
+    case.write_text(CASE)
+    shutil.copy(log, log.with_name("log2.parquet"))
+    assert "with the effects of" in run("diagnose", axis.parent, code=2)
+    assert seen == [(SPRING, COULOMB, NEUTRAL), (SPRING, COULOMB, NEUTRAL)]
+
+
+GIVEN = "coulomb_friction@1 coulomb_nm=0.2"
+
+
+def stopped(monkeypatch, attribute: str = "robot") -> list:
+    """What `diagnose` is called with, and nothing more."""
+    seen: list = []
+
+    def stop(**inputs) -> None:
+        seen.append(inputs if attribute == "all" else inputs[attribute])
+        raise InputError("seen")
+
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
+    return seen
+
+
+def test_diagnose_takes_effects_of_the_command_line(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch)
+    more = ("--effect", GIVEN, "--effect", "payload mass_kg=2")
+    text = run("diagnose", log, log, "--model", axis, *more, code=2)
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in text
+    labels = {e.label: e for e in seen[0].effects}
+    assert set(labels) == {SPRING.label, COULOMB.label, NEUTRAL.label, "payload"}
+    assert labels["coulomb_friction@1"].parameters["coulomb_nm"] == 0.2
+    assert labels["payload"].parameters["mass_kg"] == 2.0
+    refused = run("diagnose", log, log, "--model", axis, "--effect", "backlash@7", code=2)
+    assert "--effect" in refused and "expected an axis from 1 to 1, got axis 7" in refused
+
+
+def test_a_given_effect_is_no_longer_missing(axis: Path) -> None:
+    bare = write_robot(axis.with_name("bare.toml"))
+    effects = "coulomb_friction@1 coulomb_nm=0.5 smoothing_rad_s=0.05"
+    more = ("--effect", effects, "--effect", "nonlinear_stiffness@1 cubic_nm_rad3=3.7e10")
+    found, _ = diagnosed(bare, 0.5, *more)
+    assert found["verdict"] == "none"
+    assert found["provenance"]["robot_effects"] == ["coulomb_friction@1", "nonlinear_stiffness@1"]
+
+
+def open_loop(path: Path) -> Path:
+    frame = pd.read_parquet(path).drop(columns="velocity_ref_1")
+    out = path.with_name(f"open_{path.name}")
+    frame.to_parquet(out, index=False)
+    return out
+
+
+def test_diagnose_uses_the_part_asked_for(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    free = open_loop(log)
+    run("diagnose", free, free, "--model", axis, "--from", 2, "--to", 4.5, code=2)
+    (inputs,) = seen
+    whole = read_log(free)
+    for used in (*inputs["estimation"], *inputs["validation"]):
+        np.testing.assert_array_equal(used.position_rad, whole.position_rad[4000:9000])
+        assert used.notes == ("from 2 s to 4.5 s",)
+    # An end alone leaves the start at rest, where a closed loop begins.
+    run("diagnose", log, log, "--model", axis, "--to", 4.5, code=2)
+    assert seen[1]["estimation"][0].n_samples == 9000
+    assert "--from" in run("diagnose", free, free, "--model", axis, "--from", 7, code=2)
+    assert len(seen) == 2
+
+
+def test_options_of_the_search_arrive(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "settings")
+    options = ("--cutoff-hz", 12.5, "--max-causes", 2, "--threads", 1, "--seed", 3)
+    run("diagnose", log, log, "--model", axis, *options, code=2)
+    run("diagnose", log, log, "--model", axis, code=2)
+    given, default = seen
+    assert (given.cutoff_hz, given.max_causes, given.threads, given.seed) == (12.5, 2, 1, 3)
+    assert (default.cutoff_hz, default.threads) == (None, os.cpu_count())
+
+
+@pytest.mark.parametrize("cutoff_hz", [0, -3, 1000])
+def test_a_cutoff_that_is_none_is_refused(axis: Path, log: Path, cutoff_hz: float) -> None:
+    rows = pd.read_parquet(open_loop(log))
+    halves = [log.with_name("first.parquet"), log.with_name("second.parquet")]
+    for half, part in zip(halves, np.array_split(np.arange(len(rows)), 2), strict=True):
+        rows.iloc[part].assign(time_s=rows["time_s"].iloc[: len(part)].values).to_parquet(half)
+    text = run("diagnose", *halves, "--model", axis, "--cutoff-hz", cutoff_hz, code=2)
+    wanted = "cutoff_hz: expected between 0 and the Nyquist frequency 1000 Hz"
+    assert f"{wanted}, got {cutoff_hz} Hz" in text
+
+
+def test_a_closed_loop_cannot_begin_in_motion(axis: Path, log: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    text = run("diagnose", log, log, "--model", axis, "--from", 2, code=2)
+    assert "--from: expected a time at which every axis stands as at the start" in text
+    assert "got 2 s, where axis 1 moves" in text
+    assert not seen
+    # A second at rest in front may go; at another place it may not.
+    made = pd.read_parquet(log)
+    n = 2000
+    still = pd.concat([made.iloc[[0] * n], made], ignore_index=True)
+    still["time_s"] = np.arange(len(still)) * 5e-4
+    later = log.with_name("later.parquet")
+    still.to_parquet(later, index=False)
+    run("diagnose", later, later, "--model", axis, "--from", 1, code=2)
+    np.testing.assert_array_equal(seen[0]["estimation"][0].torque_nm, made[["torque_cmd_1"]])
+    still.loc[n // 2 :, "position_1"] += 5.0
+    still.to_parquet(later, index=False)
+    assert "stands 5 rad off" in run("diagnose", later, later, "--model", axis, "--from", 1, code=2)
+
+
+def test_candidates_begin_where_the_simulator_is(axis: Path, log: Path) -> None:
+    ripple = Effect("torque_ripple", 1, {"order_2": 6.0, "cosine_2_nm": 0.3, "sine_2_nm": 0.1})
+    robot = load_robot(axis).with_effects([COULOMB, NEUTRAL, ripple])
+    data = read_log(log)
+    rng = np.random.default_rng(0)
+    speed = np.gradient(data.position_rad[:, 0], data.sample_time_s)
+    angle, time = data.position_rad[:, 0], data.sample_time_s
+    # A ripple at another order than the simulator's stands out of noise.
+    residual = rng.normal(size=data.n_samples) + 2 * np.cos(9 * angle)
+    turned = Turning(residual, angle, speed, time)
+    at = Situation([[turned]], lambda _effect, _axis, f: np.ones(len(f), complex), np.ones(1))
+    found = {c.effect.label: c for c in all_candidates(robot, [data], at)}
+    friction = found["coulomb_friction@1"]
+    assert friction.effect.values() == COULOMB.values()
+    low, high = friction.bounds["smoothing_rad_s"]
+    assert low <= 0.05 <= high
+    waves = found["torque_ripple@1"]
+    assert waves.effect.parameters["order_2"] == 6.0
+    assert waves.effect.parameters["cosine_2_nm"] == 0.3
+    # The other places are for orders that stand out of what is left.
+    assert {"cosine_1_nm", "cosine_2_nm", "sine_2_nm"} <= set(waves.free)
+    bare = {c.effect.label: c for c in all_candidates(bare_axis(), [data], at)}
+    expected = bare["torque_ripple@1"].effect.parameters["order_1"]
+    assert expected not in (0.0, 1.0, 6.0)
+    assert waves.effect.parameters["order_1"] == expected
+    assert found.keys() == bare.keys()
+    assert found["stribeck_friction@1"] == bare["stribeck_friction@1"]
+
+
+@pytest.mark.parametrize("friction_nm", [0.3, 0.8])
+def test_diagnose_names_other_values_of_an_identified_effect(axis, friction_nm: float) -> None:
+    found, text = diagnosed(axis, friction_nm)
+    assert found["verdict"] == "explained", text
+    (cause,) = found["causes"]
+    assert (cause["effect"], cause["axis"]) == ("coulomb_friction", 1)
+    # The value the machine has, not what comes on top; its own parameters trade with it.
+    assert cause["parameters"]["coulomb_nm"]["value"] == pytest.approx(friction_nm, rel=0.05)
+    # With its own friction besides, the simulator would be further off than before.
+    assert found["gap"]["after"] < 1.2 * found["gap"]["floor"]
+    assert "lacks the machine's values of Coulomb friction on axis 1" in text
+
+
+# Studies and excitations.
+
+
+def study_file(folder: Path, robot: Path, model: str) -> Path:
+    study = small_study(
+        robot=str(robot),
+        runs=2,
+        effect=[],
+        plant=montecarlo.Plant(model=model),
     )
-    status, said = run("diagnose", case)
-    assert status == 0, said
-    assert "explained" in said
-    (found,) = load_robot(new).effects
-    assert found.values()[0] == pytest.approx(1.5, rel=0.02)
-    assert "no gear ratios: angles and torques of motors are those of the joints" in said
-    assert "explained" in said
-    assert "coulomb_friction@1" in said or "Coulomb friction" in said
+    path = folder / "study.toml"
+    path.write_text(study.to_toml())
+    return path
+
+
+def test_montecarlo_takes_them(axis: Path, tmp_path: Path) -> None:
+    study = study_file(tmp_path, axis, "nonlinear")
+    text = run("montecarlo", study, "--out", tmp_path / "with", "--threads", 1)
+    assert LINE.format(axis) in text
+    bare = write_robot(tmp_path / "bare.toml")
+    given = montecarlo.read_study(study).model_copy(update={"robot": str(bare)})
+    entries = [
+        montecarlo.EffectEntry(name=e.name, axis=e.axis, parameters=e.parameters)
+        for e in (SPRING, COULOMB, NEUTRAL)
+    ]
+    wanted = montecarlo.run(given.model_copy(update={"effect": entries}), threads=1)
+    without = montecarlo.run(given, threads=1)
+    stored = mean_of(tmp_path / "with")
+    np.testing.assert_array_equal(stored, wanted["arithmetic_mean"].values)
+    off = np.abs(stored - without["arithmetic_mean"].values).max()
+    assert off > 0.01 * np.abs(stored).max()
+    # In Python too, without the command line.
+    python = montecarlo.run(study, threads=1)
+    np.testing.assert_array_equal(stored, python["arithmetic_mean"].values)
+
+
+def test_montecarlo_takes_effects_of_the_command_line(axis: Path, tmp_path: Path) -> None:
+    study = study_file(tmp_path, axis, "nonlinear")
+    common = ("montecarlo", study, "--threads", 1)
+    run(*common, "--out", tmp_path / "with", "--effect", GIVEN)
+    given = montecarlo.read_study(study)
+    entry = montecarlo.EffectEntry(name="coulomb_friction", axis=1, parameters={"coulomb_nm": 0.2})
+    wanted = montecarlo.run(given.model_copy(update={"effect": [entry]}), threads=1)
+    np.testing.assert_array_equal(mean_of(tmp_path / "with"), wanted["arithmetic_mean"].values)
+    refused = run(*common, "--out", tmp_path / "not", "--effect", "wobble@1", code=2)
+    assert "--effect 'wobble@1'" in refused
+    # The study's own of that name and axis gives way.
+    own = study.with_name("own.toml")
+    own.write_text(given.model_copy(update={"effect": [entry]}).to_toml())
+    run(
+        "montecarlo", own, "--threads", 1, "--out", tmp_path / "own",
+        "--effect", "coulomb_friction@1 coulomb_nm=0.3",
+    )  # fmt: skip
+    stored = (tmp_path / "own" / "study.toml").read_text()
+    assert stored.count("coulomb_friction") == 1 and "coulomb_nm = 0.3" in stored
+
+
+def mean_of(folder: Path) -> np.ndarray:
+    store = xr.open_zarr(folder / "study.zarr", group="result", consolidated=False)
+    return store["arithmetic_mean"].values
+
+
+def test_a_study_may_replace_and_spread_them(axis: Path, tmp_path: Path) -> None:
+    study = montecarlo.read_study(study_file(tmp_path, axis, "nonlinear"))
+    half = montecarlo.EffectEntry(
+        name="coulomb_friction", axis=1, parameters={**COULOMB.parameters, "coulomb_nm": 0.25}
+    )
+    other = write_robot(tmp_path / "half.toml", Effect(half.name, 1, half.parameters), SPRING)
+    one = montecarlo.run(study.model_copy(update={"effect": [half]}), threads=1)
+    two = montecarlo.run(study.model_copy(update={"robot": str(other)}), threads=1)
+    # The effects add up in another order: equal to rounding.
+    np.testing.assert_allclose(one["arithmetic_mean"], two["arithmetic_mean"], rtol=1e-6)
+    spread = montecarlo.Spread(parameter="coulomb_friction@1.coulomb_nm", relative=0.5)
+    varied = montecarlo.run(study.model_copy(update={"spread": [spread]}), threads=1)
+    plain = montecarlo.run(study, threads=1)
+    assert np.abs(varied["arithmetic_mean"] - plain["arithmetic_mean"]).max() > 0
+
+
+def test_a_linear_study_refuses_friction(axis: Path, tmp_path: Path) -> None:
+    study = study_file(tmp_path, axis, "linear")
+    text = run("montecarlo", study, "--out", tmp_path / "results", "--threads", 1, code=2)
+    assert "coulomb_friction" in text
+
+
+def test_excite_checks_limits_with_them(axis: Path, tmp_path: Path) -> None:
+    options = ["--robot", axis, *CHIRP, "--out", tmp_path / "refs.parquet", "--force"]
+    assert "with the effects" not in run("excite", *options)
+    assert LINE.format(axis) in run("excite", *options, "--torque-limit", 0.1)
+
+
+def test_excite_checks_limits_with_effects_of_the_command_line(axis: Path, tmp_path: Path) -> None:
+    options = ["--robot", axis, *CHIRP, "--out", tmp_path / "refs.parquet", "--force"]
+    plain = run("excite", *options, "--torque-limit", 0.1)
+    loaded = run(
+        "excite", *options, "--torque-limit", 0.1, "--effect", "coulomb_friction@1 coulomb_nm=5"
+    )
+    assert f"with the effects of {axis}: nonlinear_stiffness@1 " in loaded
+    assert loaded.split("experiments")[1] != plain.split("experiments")[1]
+
+
+# Tolerances of the file.
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ((), {"stiffness": 0.2, "damping": 0.5}),
+        (("--tolerance", "stiffness=0.07"), {"stiffness": 0.07, "damping": 0.5}),
+    ],
+)
+def test_diagnose_takes_tolerances_of_the_file(axis, log, monkeypatch, options, wanted) -> None:
+    seen = []
+
+    def stop(**inputs) -> None:
+        seen.append(inputs["settings"].tolerances)
+        raise InputError("seen")
+
+    monkeypatch.setattr("axisight.cli.diagnose.diagnose", stop)
+    axis.write_text(axis.read_text() + "[tolerances]\nstiffness = 0.2\ndamping = 0.5\n")
+    run("diagnose", log, log, "--model", axis, *options, code=2)
+    assert seen == [{**DEFAULT_TOLERANCES, **wanted}]

@@ -1,0 +1,141 @@
+"""The command ``axisight robot``, and model files where commands take a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from axisight import load_robot
+from axisight.cli import app
+from axisight.robot_import import import_robot
+from axisight.robot_import.drives import DriveData
+from import_data import DH, URDF, written
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [*map(str, arguments)])
+    return result.exit_code, " ".join(result.output.split())
+
+
+def test_a_model_becomes_a_robot_file(tmp_path: Path):
+    path, out = written(tmp_path, URDF), tmp_path / "robot.toml"
+    status, said = run("robot", "import", path, "-o", out, "--payload", "3,0.1,0.2,0.3")
+    assert status == 0, said
+    assert "2 axes, shoulder, elbow" in said
+    assert "no rotors: motors have no inertia" in said
+    assert "no gear ratios" not in said
+    plain, q = load_robot(path), np.array([0.4, -0.7])
+    load = DriveData.model_validate({"payload": {"mass": 3.0, "com": (0.1, 0.2, 0.3)}})
+    loaded = import_robot(path, drives=load)
+    np.testing.assert_array_equal(load_robot(out).gravity(q), loaded.gravity(q))
+    assert not np.allclose(loaded.gravity(q), plain.gravity(q))
+    # Nothing is written over unasked.
+    status, said = run("robot", "import", path, "-o", out)
+    assert (status, "--overwrite" in said) == (2, True)
+    assert run("robot", "import", path, "-o", out, "--overwrite")[0] == 0
+    assert load_robot(out).gravity(q) == pytest.approx(plain.gravity(q))
+
+
+def test_without_a_file_it_is_printed(tmp_path: Path):
+    status, said = run("robot", "import", written(tmp_path, DH, "arm.csv"))
+    assert status == 0
+    assert 'schema = "axisight.robot/2"' in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--tip", "hand"], "--tip: expected a link"),
+        (["--payload", "heavy"], "--payload: expected KG or KG,X,Y,Z"),
+        (["--payload", "1,2"], "--payload: expected KG or KG,X,Y,Z"),
+        (["--payload", "-1"], "--payload: expected KG or KG,X,Y,Z with a positive mass"),
+        (["--drives", "none.toml"], "none.toml: expected a readable file"),
+    ],
+)
+def test_misuse_is_named(tmp_path: Path, arguments: list[str], message: str):
+    status, said = run("robot", "import", written(tmp_path, URDF), *arguments)
+    assert status == 2
+    assert message in said
+
+
+def test_a_model_needs_logs_beside_it(tmp_path: Path):
+    status, said = run("diagnose", written(tmp_path, URDF))
+    assert status == 2
+    assert "expected logs beside the model, got none" in said
+
+
+def test_a_model_that_cannot_be_written_is_said_before_anything(tmp_path: Path):
+    time = 0.01 * np.arange(300)
+    motion = np.column_stack([np.sin(time), np.cos(time)])
+    log = table(tmp_path / "run.parquet", motion, motion, 0.01)
+    path = written(tmp_path, URDF)
+    status, said = run("diagnose", path, log, "--validation", log, "--write-model", path)
+    assert status == 2
+    assert "exists: choose another name" in said
+
+
+def table(path: Path, position: np.ndarray, torque: np.ndarray, step_s: float) -> Path:
+    columns = {"time_s": step_s * np.arange(len(position))}
+    for i in range(position.shape[1]):
+        columns |= {f"position_{i + 1}": position[:, i], f"torque_cmd_{i + 1}": torque[:, i]}
+    pd.DataFrame(columns).to_parquet(path)
+    return path
+
+
+def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
+    """Joint-side logs at 100 Hz beside a URDF without friction: nothing else is said of the machine."""
+    bare = URDF.replace('<dynamics damping="0.7" friction="1.5"/>', "")
+    bare = bare[: bare.index("  <transmission")] + "</robot>"
+    path = written(tmp_path, bare)
+    robot = load_robot(path)
+    noise = np.random.default_rng(0)
+    logs = []
+    for k in range(3):
+        time = 0.01 * np.arange(1500)
+        waves = [(0.6, 1.1 + 0.2 * k, 0.3), (0.4, 2.3, 1.0 + k)]
+        shape = [
+            np.sum([a * np.sin(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
+        ]
+        q = np.column_stack(shape)
+        rate = [
+            np.sum([a * w * np.cos(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
+        ]
+        turn = [
+            -np.sum([a * w**2 * np.sin(w * time + p + i) for a, w, p in waves], axis=0)
+            for i in (0, 1)
+        ]
+        v, a = np.column_stack(rate), np.column_stack(turn)
+        torque = robot.inverse_dynamics(q, v, a) + np.array([1.5, 0.0]) * np.tanh(v / 0.01)
+        torque += 0.02 * noise.normal(size=q.shape)
+        logs.append(
+            table(tmp_path / f"run{k}.parquet", q + 1e-6 * noise.normal(size=q.shape), torque, 0.01)
+        )
+    new = tmp_path / "new.urdf"
+    status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
+    assert status == 0, said
+    assert f"model: {new}, with coulomb_friction@1" in said
+    # The same as a case, whose robot is the URDF.
+    case = tmp_path / "case"
+    case.mkdir()
+    roles = ("estimation", "estimation", "validation")
+    entries = [
+        f'[[log]]\nfile = "run{k}.parquet"\nrole = "{role}"\nexcitation = "sines"\n'
+        for k, role in enumerate(roles)
+    ]
+    for file in (path, *logs):
+        (case / file.name).write_bytes(file.read_bytes())
+    (case / "case.toml").write_text(
+        'schema = "axisight.case/1"\nname = "arm"\nrobot = "arm.urdf"\n' + "".join(entries)
+    )
+    status, said = run("diagnose", case)
+    assert status == 0, said
+    assert "explained" in said
+    (found,) = load_robot(new).effects
+    assert found.values()[0] == pytest.approx(1.5, rel=0.02)
+    assert "no gear ratios: angles and torques of motors are those of the joints" in said
+    assert "explained" in said
+    assert "coulomb_friction@1" in said or "Coulomb friction" in said
