@@ -70,7 +70,7 @@ def chosen_filtering(
     if best is None:
         # Relative changes count: an axis that nothing predicts does not choose for the others.
         errors = [
-            np.log(np.maximum(held_out_error(logs, Filtering(float(f)), predict), 1e-300)).sum()
+            np.log(np.maximum(held_out_error(logs, _tried(float(f)), predict), 1e-300)).sum()
             for f in grid
         ]
         best = float(grid[int(np.argmin(errors))])
@@ -78,11 +78,16 @@ def chosen_filtering(
     if not available.any():
         return Filtering(best)
     position, velocity = (
-        held_out_error(logs, Filtering(best, tuple(axes)), predict)
+        held_out_error(logs, _tried(best, tuple(axes)), predict)
         for axes in (np.zeros_like(available), available)
     )
     better = available & (velocity < (1 - _CLEARLY) * position)
     return Filtering(best, tuple(bool(x) for x in better))
+
+
+def _tried(cutoff_hz: float, measured: tuple[bool, ...] = ()) -> Filtering:
+    """Return a filtering on trial: with plain ends, which speak against cutoffs that smear far."""
+    return Filtering(cutoff_hz, measured, curved=False)
 
 
 def held_out_error(
