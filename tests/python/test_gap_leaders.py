@@ -36,6 +36,20 @@ def standing(axis: int, *rivals):
     )
 
 
+def field_of(*standings, waiting=()):
+    """A round in which candidates stand so, nothing is refined yet, and some wait."""
+    return SimpleNamespace(
+        standings=lambda _: list(standings),
+        layout=SimpleNamespace(samples=lambda: np.ones(3)),
+        least=np.zeros(3),
+        mends=lambda _: False,
+        settings=Settings(),
+        usual=set(),
+        done=set(),
+        waiting=list(waiting),
+    )
+
+
 @pytest.fixture(autouse=True)
 def promised(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(trials, "linear_gain", lambda evidence: evidence.promise)
@@ -66,15 +80,7 @@ def test_a_lag_is_clear_of_no_other_that_has_not_settled(promise: float, clear: 
 def test_what_is_more_usual_than_a_clear_leader_is_refined():
     """An inertia with sensitivities of another simulator left half; a mode beyond the band led."""
     mode, inertia = Effect("extra_mode", 1), Effect("link_inertia", 1)
-    field = SimpleNamespace(
-        layout=SimpleNamespace(samples=lambda: np.ones(3)),
-        least=np.zeros(3),
-        mends=lambda _: False,
-        settings=Settings(),
-        usual=set(),
-        done=set(),
-        waiting=[],
-    )
+    field = field_of()
     for score, refined in ((0.5, ["link_inertia@1"]), (0.2, [])):
         led = standing(0, ranked(mode, 0.995, cost=3), ranked(inertia, score))
         field.standings = lambda _, led=led: [led]
@@ -86,16 +92,7 @@ def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():
     """A load was refined on the first axis, the heavier link that it imitates on no axis: the load won."""
     mass, load = ranked(MASS, 0.92, promise=0.15), ranked(LOAD, 0.91, cost=4)
     first, third = standing(0, mass, load), standing(2, mass)
-    field = SimpleNamespace(
-        standings=lambda _: [first, third],
-        layout=SimpleNamespace(samples=lambda: np.ones(3)),
-        least=np.zeros(3),
-        mends=lambda _: False,
-        settings=Settings(),
-        usual=set(),
-        done=set(),
-        waiting=[],
-    )
+    field = field_of(first, third)
     todo = Trials._worth_refining(field, [], set(), even_felt=True)
     assert [t.label for t in todo] == ["link_mass@3", "payload"]
     # One that leads nowhere on its own axis says little on another.
@@ -109,14 +106,8 @@ def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():
 def test_what_leads_where_candidates_wait_is_not_refined():
     """It has had no rivals there: a soft base was refined on axes where a spring of axis 3 was felt."""
     base = ranked(Effect("base_compliance", None), 0.9, cost=3)
-    field = SimpleNamespace(
-        standings=lambda _: [standing(0, base)],
-        layout=SimpleNamespace(samples=lambda: np.ones(3)),
-        least=np.zeros(3),
-        mends=lambda _: False,
-        settings=Settings(),
-        usual=set(),
-        done=set(),
+    field = field_of(
+        standing(0, base),
         waiting=[SimpleNamespace(option=SimpleNamespace(effect=Effect("backlash", 1)))],
     )
     assert Trials._worth_refining(field, [], {0}, even_felt=True) == []

@@ -107,3 +107,5 @@ def test_misuse_is_named(tmp_path: Path):
         write_model(source, robot, [DRY], source)
     with pytest.raises(InputError, match=r"expected \.toml as the model"):
         write_model("irb6600_like", robot, [DRY], tmp_path / "new.urdf")
+    with pytest.raises(InputError, match=r"got '\.csv'"):
+        write_model("arm.csv", robot, [DRY], tmp_path / "new.csv")

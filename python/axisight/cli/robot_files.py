@@ -11,8 +11,8 @@ from axisight.cli.common import OUT, errors
 from axisight.cli.robot import say_import
 from axisight.errors import InputError
 from axisight.robot_import import import_robot
-from axisight.robot_import.drives import DriveData, Payload, read_drives
-from axisight.robot_import.load import drives_path
+from axisight.robot_import.drives import Payload
+from axisight.robot_import.load import drive_data
 from axisight.storage import write_whole
 
 robot_app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -61,8 +61,7 @@ def import_command(
     with errors():
         if out is not None and out.exists() and not overwrite:
             raise InputError(f"{out} exists: choose another name or pass --overwrite")
-        given = drives or (drives_path(model) if drives_path(model).is_file() else None)
-        data = DriveData() if given is None else read_drives(given)
+        data = drive_data(model, drives)
         if payload is not None:
             data = data.model_copy(update={"payload": _payload(payload)})
         robot = import_robot(model, base=base, tip=tip, drives=data)

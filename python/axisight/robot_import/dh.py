@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from axisight.errors import RobotError
-from axisight.robot_import.bodies import Body, Mass, Pose, Tree, still
+from axisight.robot_import.bodies import Body, Mass, Motion, Pose, Tree, still
 
 Array = NDArray[np.float64]
 
@@ -79,11 +80,10 @@ def _bodies(row: dict[str, str], parent: str, where: str) -> list[Body]:
     along_z = _turned("z", theta) @ Pose(np.eye(3), np.array([0.0, 0.0, d]))
     along_x = _turned("x", alpha) @ Pose(np.eye(3), np.array([a, 0.0, 0.0]))
     axis, name = np.array([0.0, 0.0, 1.0]), row["joint"]
-    motions = {"revolute": "revolute", "prismatic": "prismatic"}
-    kind = motions[motion]
+    kind: Motion = "prismatic" if motion == "prismatic" else "revolute"
     if convention == "modified":
-        return [Body(name, parent, name, kind, along_x @ along_z, axis, mass, where)]  # type: ignore[arg-type]
-    joint = Body(f"{name} joint", parent, name, kind, still(), axis, None, where, of=name)  # type: ignore[arg-type]
+        return [Body(name, parent, name, kind, along_x @ along_z, axis, mass, where)]
+    joint = Body(f"{name} joint", parent, name, kind, still(), axis, None, where, of=name)
     link = Body(name, joint.name, "", "fixed", along_z @ along_x, np.zeros(3), mass, where)
     return [joint, link]
 
@@ -109,7 +109,4 @@ def _number(row: dict[str, str], name: str, where: str) -> float:
 
 
 def _turned(about: str, angle: float) -> Pose:
-    c, s = math.cos(angle), math.sin(angle)
-    if about == "z":
-        return Pose(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
-    return Pose(np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]), np.zeros(3))
+    return Pose(Rotation.from_euler(about, angle).as_matrix(), np.zeros(3))

@@ -29,6 +29,15 @@ def drives_path(source: Path | str) -> Path:
     return path.with_name(f"{path.stem}.drives.toml")
 
 
+def drive_data(source: Path | str | Any, given: Path | str | None = None) -> DriveData:
+    """Return the drive data of a model: those ``given``, else those beside its file, if there are any."""
+    if given is not None:
+        return read_drives(Path(given))
+    if isinstance(source, str | Path) and drives_path(source).is_file():
+        return read_drives(drives_path(source))
+    return DriveData()
+
+
 def import_robot(
     source: Path | str | Any,
     *,
@@ -57,10 +66,8 @@ def import_robot(
     """
     is_file = isinstance(source, str | Path)
     tree = _tree(Path(source)) if is_file else tree_of(source)
-    if drives is None and is_file and drives_path(source).is_file():
-        drives = drives_path(source)
     if not isinstance(drives, DriveData):
-        drives = DriveData() if drives is None else read_drives(Path(drives))
+        drives = drive_data(source, drives)
     chain = chain_of(tree, base or drives.base, tip or drives.tip)
     if drives.sample_time is None:
         drives = drives.model_copy(update={"sample_time": sample_time_s})
@@ -77,7 +84,7 @@ def _tree(path: Path) -> Tree:
         return read_dh(path)
     root = read_xml(path)
     if root.tag == "robot":
-        return read_urdf(path)
+        return read_urdf(root, path)
     if root.tag == "mujoco":
-        return read_mjcf(path)
+        return read_mjcf(root, path)
     raise RobotError(f"{root.where}: expected <robot> (URDF) or <mujoco> (MJCF) as the root")

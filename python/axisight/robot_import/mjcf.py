@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from axisight.errors import MissingExtraError, RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
@@ -18,15 +19,13 @@ from axisight.robot_import.xml_tree import Element
 Array = NDArray[np.float64]
 
 
-def read_mjcf(path: Path) -> Tree:
-    """Return the bodies of an MJCF file as MuJoCo compiles it.
+def read_mjcf(root: Element, path: Path) -> Tree:
+    """Return the bodies of an MJCF file, whose root was read, as MuJoCo compiles it.
 
     Angles are MuJoCo's ``qpos``. What a serial chain cannot have is in the notes. Raises RobotError with file,
     line and element, also for files outside the folder of the model, and MissingExtraError without MuJoCo.
     """
-    elements = with_includes(path)
-    if elements[0].tag != "mujoco":
-        raise RobotError(f"{elements[0].where}: expected <mujoco>, the root of an MJCF")
+    elements = with_includes(root, path)
     return _Compiled(_compiled(path), elements, path).tree()
 
 
@@ -229,19 +228,12 @@ def _is_motor(model: Any, i: int) -> bool:
 
 
 def _rotation(quaternion: Array) -> Array:
-    w, x, y, z = np.asarray(quaternion, dtype=np.float64)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """Return the rotation (3, 3) of a quaternion with the real part first."""
+    return np.asarray(Rotation.from_quat(np.roll(quaternion, -1)).as_matrix())
 
 
 def _moved(motion: Motion, axis: Array, by: float) -> Pose:
     """Return the pose after a joint has moved by an angle [rad] or way [m]."""
     if motion == "prismatic":
         return Pose(np.eye(3), by * axis)
-    half = by / 2
-    return Pose(_rotation(np.array([np.cos(half), *(np.sin(half) * axis)])), np.zeros(3))
+    return Pose(Rotation.from_rotvec(by * axis).as_matrix(), np.zeros(3))

@@ -15,18 +15,17 @@ _FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "f
 _DEEPEST = 20
 
 
-def with_includes(path: Path) -> list[Element]:
-    """Return the root of a model file and of all that it includes.
+def with_includes(root: Element, path: Path) -> list[Element]:
+    """Return the root of a model file, which was read, and those of all that it includes.
 
     Raises RobotError, with the line, for a file outside its folder, one that includes itself, and as
     `read_xml`.
     """
     folder = path.resolve().parent
-    return _read(path, folder, [])
+    return _checked(root, path, folder, [])
 
 
-def _read(path: Path, folder: Path, above: list[Path]) -> list[Element]:
-    root = read_xml(path)
+def _checked(root: Element, path: Path, folder: Path, above: list[Path]) -> list[Element]:
     here = [*above, path.resolve()]
     if len(here) > _DEEPEST:
         raise RobotError(f"{root.where}: expected at most {_DEEPEST} files in one another")
@@ -51,7 +50,7 @@ def _read(path: Path, folder: Path, above: list[Path]) -> list[Element]:
                 )
             if not included.is_file():
                 raise RobotError(f"{element.where}: file: expected a file, got {included.name!r}")
-            found += _read(included, folder, here)
+            found += _checked(read_xml(included), included, folder, here)
     return found
 
 

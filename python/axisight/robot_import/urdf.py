@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
-from axisight.robot_import.xml_tree import Element, read_xml
+from axisight.robot_import.xml_tree import Element
 
 Array = NDArray[np.float64]
 
@@ -24,11 +25,8 @@ _MOTIONS: dict[str, Motion] = {
 _XACRO = "xacro:"
 
 
-def read_urdf(path: Path) -> Tree:
-    """Return the bodies of a URDF file; raises RobotError naming file, line and element."""
-    root = read_xml(path)
-    if root.tag != "robot":
-        raise RobotError(f"{root.where}: expected <robot>, the root of a URDF")
+def read_urdf(root: Element, path: Path) -> Tree:
+    """Return the bodies of a URDF file by its root; raises RobotError naming file, line and element."""
     unrun = next((e for e in root.walk() if e.tag.startswith(_XACRO)), None)
     if unrun is not None:
         raise RobotError(
@@ -39,7 +37,7 @@ def read_urdf(path: Path) -> Tree:
         raise RobotError(f"{root.where}: expected at least one <link>, got none")
     joints = _named(root, "joint")
     ratios = _ratios(root)
-    above = {_end(j, "child", links): j for j in _once_above(joints, links)}
+    above = _above(joints, links)
     order = _from_the_root(root, links, above)
     bodies = {name: _body(name, links[name], above.get(name), ratios, links) for name in order}
     return Tree(root.attributes.get("name", path.stem), bodies, str(path))
@@ -69,8 +67,8 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
     return name
 
 
-def _once_above(joints: dict[str, Element], links: dict[str, Element]) -> list[Element]:
-    """Return the joints; raises RobotError where two move one link: a closed loop."""
+def _above(joints: dict[str, Element], links: dict[str, Element]) -> dict[str, Element]:
+    """Return the joint that moves each link; raises RobotError where two move one: a closed loop."""
     seen: dict[str, Element] = {}
     for joint in joints.values():
         child = _end(joint, "child", links)
@@ -80,7 +78,7 @@ def _once_above(joints: dict[str, Element], links: dict[str, Element]) -> list[E
                 f"{joint.where}: expected a tree, got a closed loop: {child!r} is the child of {other!r} too"
             )
         seen[child] = joint
-    return list(joints.values())
+    return seen
 
 
 def _from_the_root(
@@ -157,19 +155,8 @@ def _pose(origin: Element | None) -> Pose:
         return still()
     roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
     position = origin.numbers("xyz", 3, (0.0, 0.0, 0.0))
-    return Pose(rotation_rpy(roll, pitch, yaw), np.array(position))
-
-
-def rotation_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) by roll, pitch and yaw [rad] about the fixed axes x, y, z in turn."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    turned = Rotation.from_euler("xyz", [roll, pitch, yaw])
+    return Pose(turned.as_matrix(), np.array(position))
 
 
 def _axis(joint: Element) -> Array:

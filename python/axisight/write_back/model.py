@@ -12,7 +12,6 @@ from axisight.effects.stated import DRY_FRICTION, ROTOR, VISCOUS_FRICTION
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, write_identified
-from axisight.robot_import import is_model_file
 from axisight.robot_import.xml_tree import Element, parse_xml
 from axisight.storage import write_whole
 from axisight.write_back.xml_edits import Edits
@@ -25,6 +24,8 @@ _NUMBERS = {
     "robot": {DRY_FRICTION[0]: "friction", VISCOUS_FRICTION: "damping"},
     "mujoco": {DRY_FRICTION[0]: "frictionloss", VISCOUS_FRICTION: "damping", ROTOR: "armature"},
 }
+
+_KINDS = (".urdf", ".xml", ".mjcf")
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def check_target(source: Path | str, target: Path | str, *, overwrite: bool = Fa
         raise InputError(f"{path} exists: choose another name")
     if kind == ".toml":
         return
-    if not is_model_file(source) or Path(source).suffix.lower() != kind:
+    if kind not in _KINDS or Path(source).suffix.lower() != kind:
         raise InputError(
             f"{path}: expected {Path(source).suffix or '.toml'} as the model that was diagnosed, or .toml, got "
             f"{kind!r}"
