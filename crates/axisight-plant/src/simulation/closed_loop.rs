@@ -5,7 +5,7 @@ use super::late_reading::LateReading;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
-use crate::plant::{Axis, EquilibriumError, Lead, Plant, equilibrium};
+use crate::plant::{Axis, EquilibriumError, Lead, Plant, PlantError, equilibrium};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -123,6 +123,9 @@ pub enum SimulationError {
     /// An effect is misused.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// The robot that the controller knows cannot be built.
+    #[error(transparent)]
+    Known(#[from] PlantError),
 }
 
 /// Simulate until the longest lane ends; `observe` sees every sample.
@@ -160,7 +163,7 @@ pub fn simulate<S: Scalar>(
         &rest.motor_angle,
         &rest.motor_torque,
         OwnLaw::of(plant, run.sample_time),
-    );
+    )?;
     let mut paths: Vec<_> = plant
         .axes
         .iter()

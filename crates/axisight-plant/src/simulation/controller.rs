@@ -1,13 +1,14 @@
-//! The sampled controllers of `axisight.robot/1`.
+//! The sampled controllers of robot files.
 
-use crate::plant::{Axis, Plant};
+use crate::plant::{Axis, Plant, PlantError};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
 
 /// What effects change of the controller of one axis.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnLaw<S> {
-    /// Factors of the proportional and the integral gain.
+    /// Factors of the proportional and the integral gain; of a PD controller of the position and the
+    /// velocity gain.
     gains: [S; 2],
     /// Torque for the rate of the reference, and for the reference; `None` without.
     forward: Option<[S; 2]>,
@@ -53,31 +54,86 @@ pub struct ControlLoop<S> {
     filtered: Vec<S>,
     first_lag: Vec<S>,
     last_lag: Vec<S>,
+    gravity: Option<KnownGravity<S>>,
+}
+
+/// Gravity of the robot as a controller knows it.
+struct KnownGravity<S> {
+    model: Plant<S>,
+    /// Joint angles, elastic joints at rest; standstill; motor torques there.
+    angle: Vec<S>,
+    still: Vec<S>,
+    torque: Vec<S>,
+}
+
+impl<S: Scalar> KnownGravity<S> {
+    /// The robot that `kind` knows, at motor angles `angle`; `None` where it knows none.
+    fn of(kind: &Controller, angle: &[S]) -> Result<Option<Self>, PlantError> {
+        let Controller::PdPosition {
+            gravity: Some(robot),
+            ..
+        } = kind
+        else {
+            return Ok(None);
+        };
+        let model = Plant::with_kernels(robot, &[], Vec::new())?;
+        let still = vec![S::zero(); model.chain.len()];
+        let mut known = Self {
+            angle: still.clone(),
+            still,
+            torque: vec![S::zero(); angle.len()],
+            model,
+        };
+        known.look(angle);
+        Ok(Some(known))
+    }
+
+    /// Take the torques at motor angles `measured`.
+    fn look(&mut self, measured: &[S]) {
+        for (axis, measured) in self.model.axes.iter().zip(measured) {
+            self.angle[axis.joint] = *measured * axis.ratio;
+        }
+        let load = self.model.dynamics.evaluate(&self.angle, &self.still).bias;
+        for (axis, torque) in self.model.axes.iter().zip(&mut self.torque) {
+            *torque = load[axis.joint] * axis.ratio;
+        }
+    }
 }
 
 impl<S: Scalar> ControlLoop<S> {
     /// A controller settled at motor angles `angle` with static torques `feed_forward`; `own` says
     /// by axis what effects change of it, none where it is empty.
+    ///
+    /// # Errors
+    /// [`PlantError`] of a robot that the controller knows and that cannot be built.
     pub fn new(
         kind: &Controller,
         sample_time: f64,
         angle: &[S],
         feed_forward: &[S],
         own: Vec<OwnLaw<S>>,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, PlantError> {
+        let gravity = KnownGravity::of(kind, angle)?;
+        let mut feed_forward = feed_forward.to_vec();
+        if let Some(known) = &gravity {
+            // Where it settled it holds the arm, whatever it knows.
+            let known = feed_forward.iter_mut().zip(&known.torque);
+            known.for_each(|(u, g)| *u -= *g);
+        }
+        Ok(Self {
+            gravity,
             own,
             filtered: vec![S::zero(); angle.len()],
             kind: kind.clone(),
             sample_time,
-            feed_forward: feed_forward.to_vec(),
+            feed_forward,
             reference_angle: angle.to_vec(),
             previous: None,
             previous_reference: Vec::with_capacity(angle.len()),
             integral: vec![S::zero(); angle.len()],
             first_lag: Vec::with_capacity(angle.len()),
             last_lag: Vec::with_capacity(angle.len()),
-        }
+        })
     }
 
     /// Commands for measured motor angles `measured` and velocity references `reference`.
@@ -86,17 +142,23 @@ impl<S: Scalar> ControlLoop<S> {
         if self.previous_reference.is_empty() {
             self.previous_reference.extend_from_slice(reference);
         }
+        if let Some(known) = &mut self.gravity {
+            known.look(measured);
+        }
         for i in 0..measured.len() {
             let speed = match &self.previous {
                 Some(previous) => (measured[i] - previous[i]) * rate,
                 None => S::zero(),
             };
             let speed = self.filter(i, speed);
-            let speed_error = reference[i] - speed;
+            let speed_error = self.speed_error(reference[i], speed);
             let angle_error = self.reference_angle[i] - measured[i];
             let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
             let feedback = self.feedback(i, speed_error, angle_error, gains);
             out[i] = self.feed_forward[i] + feedback + self.forward(i, reference[i]);
+            if let Some(known) = &self.gravity {
+                out[i] += known.torque[i];
+            }
             self.reference_angle[i] += reference[i] * self.sample_time;
         }
         match &mut self.previous {
@@ -136,6 +198,17 @@ impl<S: Scalar> ControlLoop<S> {
         for_rate * ((reference - before) * (1.0 / self.sample_time)) + for_itself * reference
     }
 
+    /// By how much a speed is off its reference, which is zero where a controller has targets only.
+    #[inline(always)]
+    fn speed_error(&self, reference: S, speed: S) -> S {
+        match self.kind {
+            Controller::PdPosition {
+                feeds_speed: false, ..
+            } => -speed,
+            _ => reference - speed,
+        }
+    }
+
     /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.
     #[inline(always)]
     fn filter(&mut self, i: usize, speed: S) -> S {
@@ -147,7 +220,7 @@ impl<S: Scalar> ControlLoop<S> {
         self.filtered[i]
     }
 
-    /// Torque for errors of speed and angle, the proportional and the integral gain times `gains`.
+    /// Torque for errors of speed and angle, both gains times `gains` as in [`OwnLaw`].
     #[inline(always)]
     fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 2]) -> S {
         let [own_kp, own_ki] = gains;
@@ -161,6 +234,9 @@ impl<S: Scalar> ControlLoop<S> {
                 let integral = self.integral[i];
                 self.integral[i] += error * self.sample_time;
                 own_kp * (error * kp[i]) + own_ki * (integral * ki[i])
+            }
+            Controller::PdPosition { kp, kd, .. } => {
+                own_kp * (angle_error * kp[i]) + own_ki * (speed_error * kd[i])
             }
             Controller::None => S::zero(),
         }

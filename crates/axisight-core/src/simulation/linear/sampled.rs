@@ -39,7 +39,7 @@ pub fn simulate_linear<S: Scalar>(
             got: format!("{:?}", run.start),
         });
     }
-    let mut state = LinearLoop::<S>::new(plant, run);
+    let mut state = LinearLoop::<S>::new(plant, run)?;
     let mut paths = torque_paths(plant, run)?;
     Ok(samples(&mut state, &mut paths, run, n_samples, observe))
 }
@@ -128,7 +128,7 @@ struct LinearLoop<'a, S> {
 const FARTHEST_MOVE: f64 = 0.1;
 
 impl<'a, S: Scalar> LinearLoop<'a, S> {
-    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Self {
+    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Result<Self, SimulationError> {
         let (n, m) = (plant.n_states(), plant.n_axes());
         let substeps = match run.method {
             Method::RungeKutta4 { substeps } | Method::Nystrom4 { substeps } => substeps.max(1),
@@ -148,7 +148,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         let mut ripple = vec![Ripple::zero(); m];
         plant.waves.evaluate(&angle, &mut powers, &mut ripple);
         let padded = Tiles::padded(n);
-        Self {
+        Ok(Self {
             plant,
             propagator,
             substeps,
@@ -159,7 +159,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 &angle,
                 &torque,
                 Vec::new(),
-            ),
+            )?,
             signals: Signals::new(m),
             ripple,
             powers,
@@ -169,7 +169,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             missed: vec![S::zero(); 2 * m],
             absolute: lift(&plant.rest),
             coarse: S::zero(),
-        }
+        })
     }
 
     /// Measure, command, and note what acts on the motors.
