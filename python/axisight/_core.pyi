@@ -293,7 +293,9 @@ class Robot:
     def position_noise_std(self) -> float:
         """Standard deviation of the motor position measurement [rad], white, per sample."""
     @property
-    def controller_kind(self) -> Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]:
+    def controller_kind(
+        self,
+    ) -> Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]:
         """Kind of controller."""
     @property
     def controller_gains(self) -> dict[str, _Array]:

@@ -342,13 +342,14 @@ fn read_controller(
             Ok(Controller::Cascade { kv, kp, ki })
         }
         ControllerKind::PdPosition => {
-            let switches = ["velocity_feedforward", "gravity_compensation"];
+            let switches = ["velocity_feedforward", "gravity_compensation", "continuous"];
             section.only(&[&["kind", "kp", "kd"][..], &switches].concat())?;
             let known = section.flag(switches[1], false)?;
             Ok(Controller::PdPosition {
                 kp: gains("kp", "Nm/rad")?,
                 kd: gains("kd", "Nm s/rad")?,
                 feeds_speed: section.flag(switches[0], true)?,
+                continuous: section.flag(switches[2], false)?,
                 gravity: known.then(|| Arc::new(robot.clone())),
             })
         }

@@ -100,6 +100,9 @@ pub enum Controller {
         kd: Vec<f64>,
         /// Whether the rate of the targets is `w_ref`; zero where it is not.
         feeds_speed: bool,
+        /// Whether the law holds between samples, too: an actuator in a simulator, or a drive much faster
+        /// than the sample time.
+        continuous: bool,
         /// The robot as the controller knows it, whose gravity torque at the measured pose `u_ff`
         /// follows; constant without one. What is fitted of a machine changes nothing of it.
         gravity: Option<Arc<RobotDescription>>,
@@ -109,6 +112,11 @@ pub enum Controller {
 }
 
 impl Controller {
+    /// Whether it is told positions.
+    pub fn has_targets(&self) -> bool {
+        matches!(self, Self::PdPosition { .. })
+    }
+
     /// The same controller for a loop `factor` times as fast: damping torque with the factor,
     /// stiffness torque with its square.
     #[must_use]
@@ -131,11 +139,13 @@ impl Controller {
                 kp,
                 kd,
                 feeds_speed,
+                continuous,
                 gravity,
             } => Self::PdPosition {
                 kp: scaled(kp, factor * factor),
                 kd: scaled(kd, factor),
                 feeds_speed: *feeds_speed,
+                continuous: *continuous,
                 gravity: gravity.clone(),
             },
             Self::None => Self::None,

@@ -52,6 +52,13 @@ pub struct Run<'a> {
     pub cancel: Option<&'a AtomicBool>,
 }
 
+impl Run<'_> {
+    /// Whether delays are those of targets, not of torques.
+    pub fn has_late_targets(&self) -> bool {
+        matches!(self.drive, Drive::Reference(_)) && self.controller.has_targets()
+    }
+}
+
 /// One sample as the log sees it, and the truth behind it.
 #[derive(Debug)]
 pub struct Sample<'a, S> {
@@ -164,11 +171,13 @@ pub fn simulate<S: Scalar>(
         &rest.motor_torque,
         OwnLaw::of(plant, run.sample_time),
     )?;
+    let late_targets = run.has_late_targets();
     let mut paths: Vec<_> = plant
         .axes
         .iter()
         .zip(&rest.motor_torque)
         .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
+        .map(|path| if late_targets { path.at_once() } else { path })
         .collect();
     let mut signals = Signals::of(plant, &rest.motor_angle, run.sample_time);
     let mut buffers = TorqueBuffers::new(n_axes);

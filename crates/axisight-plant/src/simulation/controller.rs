@@ -1,8 +1,11 @@
 //! The sampled controllers of robot files.
 
+use super::late_target::LateTarget;
+use crate::effect::Kernel;
 use crate::plant::{Axis, Plant, PlantError};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
+use std::sync::Arc;
 
 /// What effects change of the controller of one axis.
 #[derive(Debug, Clone, Copy)]
@@ -14,30 +17,40 @@ pub struct OwnLaw<S> {
     forward: Option<[S; 2]>,
     /// Share of a new speed in the filtered one; `None` without a filter.
     filter: Option<S>,
+    /// By how many samples commands take effect late; `None` at once.
+    late: Option<S>,
 }
 
 impl<S: Scalar> OwnLaw<S> {
     /// What the effects on each axis of a plant make of a controller.
     pub fn of(plant: &Plant<S>, sample_time: f64) -> Vec<Self> {
-        let one = |axis: &Axis<S>| {
-            let mut own = Self {
-                gains: [S::one(); 2],
-                forward: None,
-                filter: None,
-            };
-            for kernel in &axis.kernels {
-                if let Some([kp, ki]) = kernel.controller_gains() {
-                    own.gains = [own.gains[0] * kp, own.gains[1] * ki];
-                }
-                own.forward = kernel.feedforward().or(own.forward);
-                if let Some(lag) = kernel.speed_filter() {
-                    // Backward difference: without a lag the speed is what it was.
-                    own.filter = Some((lag + sample_time).recip() * sample_time);
-                }
-            }
-            own
+        let of = |axis: &Axis<S>| Self::of_axis(&axis.kernels, sample_time);
+        plant.axes.iter().map(of).collect()
+    }
+
+    /// The same of one axis.
+    pub fn of_axis(kernels: &[Arc<dyn Kernel<S>>], sample_time: f64) -> Self {
+        let mut own = Self {
+            gains: [S::one(); 2],
+            forward: None,
+            filter: None,
+            late: None,
         };
-        plant.axes.iter().map(one).collect()
+        for kernel in kernels {
+            if let Some([kp, ki]) = kernel.controller_gains() {
+                own.gains = [own.gains[0] * kp, own.gains[1] * ki];
+            }
+            if let Some(delay) = kernel.delay() {
+                let delay = delay * (1.0 / sample_time);
+                own.late = Some(own.late.map_or(delay, |other| other + delay));
+            }
+            own.forward = kernel.feedforward().or(own.forward);
+            if let Some(lag) = kernel.speed_filter() {
+                // Backward difference: without a lag the speed is what it was.
+                own.filter = Some((lag + sample_time).recip() * sample_time);
+            }
+        }
+        own
     }
 }
 
@@ -55,6 +68,23 @@ pub struct ControlLoop<S> {
     first_lag: Vec<S>,
     last_lag: Vec<S>,
     gravity: Option<KnownGravity<S>>,
+    last_speed: Vec<S>,
+    /// Of axes whose targets take effect late.
+    late: Vec<Option<LateTarget<S>>>,
+}
+
+/// What is late where a controller has targets of positions: its loop is closed at the motor, and what is
+/// commanded from afar are the targets. Empty for others, whose torques are late.
+fn late_targets<S: Scalar>(
+    kind: &Controller,
+    own: &[OwnLaw<S>],
+    angle: &[S],
+) -> Vec<Option<LateTarget<S>>> {
+    if !kind.has_targets() {
+        return Vec::new();
+    }
+    let of = |(own, angle): (&OwnLaw<S>, &S)| Some(LateTarget::new(own.late?, *angle));
+    own.iter().zip(angle).map(of).collect()
 }
 
 /// Gravity of the robot as a controller knows it.
@@ -122,6 +152,8 @@ impl<S: Scalar> ControlLoop<S> {
         }
         Ok(Self {
             gravity,
+            last_speed: vec![S::zero(); angle.len()],
+            late: late_targets(kind, &own, angle),
             own,
             filtered: vec![S::zero(); angle.len()],
             kind: kind.clone(),
@@ -150,9 +182,15 @@ impl<S: Scalar> ControlLoop<S> {
                 Some(previous) => (measured[i] - previous[i]) * rate,
                 None => S::zero(),
             };
+            let (angle, speed) = self.halfway(i, measured[i], speed);
             let speed = self.filter(i, speed);
-            let speed_error = self.speed_error(reference[i], speed);
-            let angle_error = self.reference_angle[i] - measured[i];
+            let target = [self.reference_angle[i], reference[i]];
+            let [target_angle, target_speed] = match self.late.get_mut(i) {
+                Some(Some(late)) => late.read(target),
+                _ => target,
+            };
+            let speed_error = self.speed_error(target_speed, speed);
+            let angle_error = target_angle - angle;
             let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
             let feedback = self.feedback(i, speed_error, angle_error, gains);
             out[i] = self.feed_forward[i] + feedback + self.forward(i, reference[i]);
@@ -196,6 +234,22 @@ impl<S: Scalar> ControlLoop<S> {
         let before = self.previous_reference[i];
         self.previous_reference[i] = reference;
         for_rate * ((reference - before) * (1.0 / self.sample_time)) + for_itself * reference
+    }
+
+    /// Angle and speed of axis `i` that a command is for: those measured, or, of a law that holds between
+    /// samples, those halfway to the next one. A speed measured is that of half a sample ago.
+    #[inline(always)]
+    fn halfway(&mut self, i: usize, angle: S, speed: S) -> (S, S) {
+        let Controller::PdPosition {
+            continuous: true, ..
+        } = self.kind
+        else {
+            return (angle, speed);
+        };
+        let change = speed - self.last_speed[i];
+        self.last_speed[i] = speed;
+        let ahead = (speed + change * 0.5) * (0.5 * self.sample_time);
+        (angle + ahead, speed + change)
     }
 
     /// By how much a speed is off its reference, which is zero where a controller has targets only.

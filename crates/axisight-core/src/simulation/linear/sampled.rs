@@ -5,7 +5,7 @@ use super::plant::LinearPlant;
 use super::propagator::Propagator;
 use super::tiles::Tiles;
 use axisight_plant::simulation::{
-    ControlLoop, Line, Method, Run, Sample, SampleTorque, Signals, SimulationError, Status,
+    ControlLoop, Line, Method, OwnLaw, Run, Sample, SampleTorque, Signals, SimulationError, Status,
     TorqueBuffers, TorquePath, check, lane_value,
 };
 use axisight_scalar::Scalar;
@@ -83,6 +83,21 @@ fn samples<S: Scalar>(
     collapsed.map_or(Status::Completed, Status::StepSizeCollapsed)
 }
 
+/// What effects on the path of commands change of a controller: where targets are late, all that they do.
+fn own_laws<S: Scalar>(
+    plant: &LinearPlant,
+    run: &Run<'_>,
+) -> Result<Vec<OwnLaw<S>>, SimulationError> {
+    if !run.has_late_targets() {
+        return Ok(Vec::new());
+    }
+    let of_axis = |kernels: Vec<_>| OwnLaw::of_axis(&kernels, run.sample_time);
+    let each = plant.axes.iter().map(|axis| axis.path_kernels());
+    Ok(each
+        .map(|kernels| kernels.map(of_axis))
+        .collect::<Result<_, _>>()?)
+}
+
 /// From command to delivered torque of every axis, settled at rest.
 fn torque_paths<S: Scalar>(
     plant: &LinearPlant,
@@ -93,7 +108,12 @@ fn torque_paths<S: Scalar>(
     for (axis, u) in plant.axes.iter().zip(torques) {
         let rest = S::constant(*u);
         let kernels = axis.path_kernels()?;
-        paths.push(TorquePath::through(kernels, rest, run.sample_time));
+        let path = TorquePath::through(kernels, rest, run.sample_time);
+        paths.push(if run.has_late_targets() {
+            path.at_once()
+        } else {
+            path
+        });
     }
     Ok(paths)
 }
@@ -158,7 +178,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 run.sample_time,
                 &angle,
                 &torque,
-                Vec::new(),
+                own_laws(plant, run)?,
             )?,
             signals: Signals::new(m),
             ripple,
