@@ -14,13 +14,27 @@ from axisight.logs.log import Floats, Log
 
 
 def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
-    """Check the number of axes, and that a reference is there for all axes or for none."""
+    """Check the number of axes, that all have a torque, and a reference all of them or none."""
     findings = []
     got = len(found.columns.axis)
     if n_axes is not None and got != n_axes:
         findings.append(
             Finding(
                 "error", "axis", f"expected {n_axes} axes, got columns for {got}", "axes_differ"
+            )
+        )
+    without = [number for number, axis in enumerate(found.columns.axis, 1) if axis.torque is None]
+    if without:
+        looked_for = found.pattern.looked_for("torque") if found.pattern is not None else ""
+        findings.append(
+            Finding(
+                "error",
+                f"torque_{without[0]}",
+                f"expected a torque (or force, or current or voltage with its scale) of every axis, got none "
+                f"of axes {', '.join(map(str, without))}"
+                f"{f'; no column is called {looked_for}' if looked_for else ''}",
+                "torque_missing",
+                without[0],
             )
         )
     with_ref = [
