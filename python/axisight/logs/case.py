@@ -70,7 +70,8 @@ def read_case(folder: Path | str, columns: AnyMap | Path | str | None = None) ->
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
     `columns` is what `read_log` takes. Raises CaseError naming file and field: case.toml missing or
-    invalid, unknown keys, no estimation log, robot file missing, one file listed twice, logs with different numbers of axes,
+    invalid, unknown keys, no estimation log, robot file missing, one file listed twice, logs with
+    different numbers of axes,
     a period that is not a whole number of samples or is longer than the log. Raises LogError for a
     log that cannot be read or has another sample rate.
     """
