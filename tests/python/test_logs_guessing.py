@@ -22,7 +22,7 @@ from columns_data import (
     write_csv,
     write_lerobot,
 )
-from logs_data import write
+from logs_data import native_columns, write
 
 N = 6
 JOINTS = ("pan", "lift", "elbow", "roll", "bend", "flange")
@@ -159,6 +159,28 @@ def test_names_of_a_maker_in_other_units_are_none(tmp_path):
     assert found.named is None
     assert found.columns.axis[0].position.unit == "deg"
     assert any("names are those of ur-rtde, but actual_q_" in doubt for doubt in found.doubts)
+
+
+def test_a_gripper_beyond_the_axes_of_the_robot(tmp_path):
+    folder = write_lerobot(tmp_path / "set", n_axes=7)
+    found = guess_columns(folder, robot(6))
+    assert found.named == "lerobot"
+    assert "axes = 6  # those of the robot; the file has 7" in found.text
+    assert found.doubts == ("axes: the first 6 of 7",)
+    (tmp_path / "columns.toml").write_text(found.text)
+    assert read_log(folder, tmp_path / "columns.toml", robot=robot(6)).n_axes == 6
+
+
+def test_states_without_efforts(tmp_path):
+    found = guess_columns(write_lerobot(tmp_path / "set", effort=False))
+    assert found.columns.axis[5].position.name == "observation.state[5]"
+    assert found.columns.axis[5].torque is None
+    assert "target of the position" in found.unused["action[0] and 5 like it"]
+
+
+def test_native_columns_need_no_map(tmp_path):
+    with pytest.raises(LogError, match="it needs no map"):
+        guess_columns(write(tmp_path / "a.csv", native_columns()))
 
 
 def test_an_episode_of_lerobot(tmp_path):

@@ -9,7 +9,7 @@ import typer
 
 from axisight.cli.common import OUT, errors
 from axisight.errors import InputError
-from axisight.logs import MAPS, ColumnMap, named_map_text
+from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
 from axisight.robot import load_robot
 from axisight.storage import write_whole
@@ -65,10 +65,12 @@ def guess_command(
 
 
 def _say_found(out: Path, log: Path, found: Proposal) -> None:
-    if not isinstance(found.columns, ColumnMap):
+    if found.named is None:
+        _say(f"{out}: a map of its own; look at the reasons in it before use")
+    elif found.doubts:
+        _say(f"{out}: the names are those of {found.named}, with fewer axes")
+    else:
         _say(f"{out}: the names are those of {found.named}; --columns {found.named} does the same")
-        return
-    _say(f"{out}: {len(found.columns.axis)} axes; look at the reasons in it before use")
     for doubt in found.doubts:
         _say(f"doubtful: {doubt}")
     for name, reason in found.unused.items():

@@ -19,8 +19,8 @@ _SHOWN = 60
 class Draft:
     """A map in the making.
 
-    ``fields`` holds one (signal, unit) per axis, ``open_fields`` those that lack a number only a person
-    knows; ``why`` gives the reason of a field, ``unused`` that of a name that was left out. ``doubts`` are
+    ``fields`` holds one (signal, unit) per axis, ``torques`` those of which a person has to choose one, or
+    to state its scale; ``why`` gives the reason of a field, ``unused`` that of a name that was left out. ``doubts`` are
     choices that others might be right for.
     """
 
@@ -38,7 +38,7 @@ class Draft:
     rate_name: str | None = None
     sample_time_s: float = 0.0
     fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)
-    open_fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)
+    torques: list[list[tuple[Series, str]]] = field(default_factory=list)
     why: dict[str, str] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)

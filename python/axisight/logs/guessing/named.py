@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,20 @@ from axisight.robot import Robot
 _ALIKE = 0.9
 
 
-def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[str | None, list[str]]:
+@dataclass(frozen=True)
+class Fit:
+    """A shipped map that fits; ``axes`` are those to take where the file has more than the robot."""
+
+    name: str
+    in_file: int
+    axes: int | None = None
+
+
+def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[Fit | None, list[str]]:
     """Return the map whose names a file has all, and why numbers speak against others that have them.
 
-    A map fits with time, and position and torque of every axis, in the units that it states.
+    A map fits with time, and position and torque of every axis, in the units that it states; of more axes
+    than the robot has the first are taken.
     """
     against = []
     for name in MAPS:
@@ -37,12 +48,13 @@ def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[str | No
             continue
         if not _all_there(columns, arrays):
             continue
-        if robot is not None and len(columns.axis) != robot.n_axes:
-            wrong: str | None = f"{len(columns.axis)} axes, where the robot has {robot.n_axes}"
-        else:
-            wrong = _contradiction(columns, arrays)
+        wrong = _contradiction(columns, arrays)
+        in_file = len(columns.axis)
+        if robot is not None and in_file < robot.n_axes:
+            wrong = f"{in_file} axes, where the robot has {robot.n_axes}"
         if wrong is None:
-            return name, []
+            more = robot is not None and in_file > robot.n_axes
+            return Fit(name, in_file, robot.n_axes if more and robot is not None else None), []
         against.append(f"the names are those of {name}, but {wrong}")
     return None, against
 

@@ -31,8 +31,8 @@ _WORDS = {
     "time": "time timestamp timestamps stamp t ts tm clock ipoc sec secs seconds ms msec us usec ns nsec",
 }
 _QUANTITIES = {word: quantity for quantity, words in _WORDS.items() for word in words.split()}
-# Words that alone are a position, where nothing else is one.
-_PLACES = {"joint", "joints", "axis"}
+# Words that alone are a position, where nothing else is one; LeRobot has states and actions.
+_PLACES = {"joint", "joints", "axis", "state", "action"}
 _MEASURED = _words("actual act measured meas feedback fb present real ist")
 _WANTED = _words(
     "target ref reference cmd command commanded des desired set setpoint goal soll planned action"

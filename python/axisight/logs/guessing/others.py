@@ -85,7 +85,8 @@ def take_torque(draft: Draft) -> None:
             draft.doubts.append(f"torque: left out, for it could be {listed}")
             draft.leave(families, f"a choice that is open: {listed}")
             draft.why["torque"] = f"open: {listed}"
-            _leave_open(draft, families[0], quantity)
+            for family in families:
+                _leave_open(draft, family, quantity)
             return
         family = families[0]
         if quantity == "torque" and family.meaning.unit in (None, "Nm", "N"):
@@ -124,7 +125,7 @@ def _leave_open(draft: Draft, family: Family, quantity: str) -> None:
     signals = family.of(draft.axes)
     assert signals is not None
     unit = {"current": "A", "voltage": "V"}.get(quantity, "Nm")
-    draft.open_fields["torque"] = [(series, unit) for series in signals]
+    draft.torques.append([(series, unit) for series in signals])
 
 
 def _likely(draft: Draft) -> str:

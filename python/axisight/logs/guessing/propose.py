@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from axisight.errors import LogError
 from axisight.logs.columns import CsvOptions
 from axisight.logs.guessing.angles import find_positions, settle_positions
 from axisight.logs.guessing.clock import take_time
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, families_of
-from axisight.logs.guessing.named import named_map
+from axisight.logs.guessing.named import Fit, named_map
 from axisight.logs.guessing.others import (
     take_joint_positions,
     take_temperature,
@@ -23,6 +24,7 @@ from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
 from axisight.logs.sources import Arrays, load_arrays
 from axisight.robot import Robot
 
+_NATIVE = ("time_s", "position_1", "torque_cmd_1")
 # Why a signal with that quantity in its name is not used, unless something better is known.
 _REASONS = {
     "": "no word of its name is known",
@@ -37,7 +39,8 @@ _REASONS = {
 class Proposal:
     """A proposed map: its TOML, and the map that this is.
 
-    ``named`` is the shipped map whose names the file has, None without one. ``doubts`` are choices that
+    ``named`` is the shipped map whose names the file has, None without one; then it is that map, but for
+    `axes` where the robot has fewer. ``doubts`` are choices that
     others might be right for, ``unused`` says of every name that was left out why.
     """
 
@@ -57,15 +60,18 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     said. ``robot`` gives the number, names and kinds of the axes.
 
     Raises LogError, listing the columns seen, when no time or no position of any axis is found, and when
-    there are fewer axes than those of the robot; and as `read_log` for a file that cannot be read.
+    there are fewer axes than those of the robot; for a file that needs no map; and as `read_log` for a
+    file that cannot be read.
     """
     path = Path(path)
     arrays, csv = _opened(path)
-    named, against = named_map(arrays, robot, path)
-    if named is not None:
-        head = f"# The names of {path.name} are all those of this map, which ships as {named}:"
-        text = f"{head}\n# --columns {named} does without this file.\n#\n{named_map_text(named)}"
-        return Proposal(text, parse_column_map(text, str(path)), named, (), {})
+    if set(_NATIVE) <= set(arrays):
+        raise LogError(
+            f"{path}: expected a log without the native columns, got one: it needs no map"
+        )
+    fit, against = named_map(arrays, robot, path)
+    if fit is not None:
+        return _named(path, fit)
     series, unused = series_of(arrays)
     joints = [] if robot is None else list(robot.axis_names)
     families = families_of(series, joints)
@@ -83,6 +89,18 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     return Proposal(
         text, parse_column_map(text, f"{path}: guess"), None, tuple(draft.doubts), draft.unused
     )
+
+
+def _named(path: Path, fit: Fit) -> Proposal:
+    """Return a shipped map as it is, or with the number of axes that the robot has."""
+    head = f"# The names of {path.name} are all those of this map, which ships as {fit.name}"
+    if fit.axes is None:
+        head += f":\n# --columns {fit.name} does without this file.\n#\n"
+    else:
+        head += f".\naxes = {fit.axes}  # those of the robot; the file has {fit.in_file}\n#\n"
+    text = head + named_map_text(fit.name)
+    doubts = () if fit.axes is None else (f"axes: the first {fit.axes} of {fit.in_file}",)
+    return Proposal(text, parse_column_map(text, f"{path}: guess"), fit.name, doubts, {})
 
 
 def _opened(path: Path) -> tuple[Arrays, CsvOptions]:
@@ -110,7 +128,7 @@ def load_header(path: Path, separator: str) -> list[str]:
 def _leave_rest(draft: Draft) -> None:
     """Give every signal that is not used a reason."""
     used = {id(one) for field in draft.fields for one in draft.signals(field)}
-    used |= {id(one) for entries in draft.open_fields.values() for one, _ in entries}
+    used |= {id(one) for signals in draft.torques for one, _ in signals}
     for family in draft.families:
         if family.label not in draft.unused and not any(
             id(one) in used or one is draft.time or one.label in draft.unused

@@ -37,10 +37,10 @@ def text_of(draft: Draft) -> str:
         for name in _FIELDS:
             if name in draft.fields:
                 lines.append(f"{name} = {_inline(*draft.fields[name][axis])}")
-            elif name in draft.open_fields:
-                series, unit = draft.open_fields[name][axis]
-                scale = ", scale = ..." if unit in "AV" else ""
-                lines.append(f"# {name} = {_inline(series, unit, scale)}")
+        for signals in draft.torques:
+            series, unit = signals[axis]
+            scale = ", scale = ..." if unit in "AV" else ""
+            lines.append(f"# torque = {_inline(series, unit, scale)}")
     lines += _csv(draft.csv)
     if draft.unused:
         lines += ["", "# Not used:"]
