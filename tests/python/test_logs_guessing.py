@@ -213,6 +213,25 @@ def test_currents_wait_for_the_torque_constant(tmp_path):
     np.testing.assert_allclose(log.torque_nm, 2.0 * motion(6)["torque"] * GEAR, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "name", ["tau{} [mNm]", "tau{}_mNm", "torque_{} (%)", "torque{}_percent", "Moment {} [kNm]"]
+)
+def test_units_that_maps_do_not_have_wait_for_a_scale(tmp_path, name):
+    found = guessed(tmp_path, table("t", "q{}", "dq{}", name))
+    assert found.columns.axis[0].torque is None
+    assert 'unit = "Nm", scale = ... }' in found.text
+    assert any("state the Nm (or N) per " in doubt for doubt in found.doubts)
+    with pytest.raises(LogError, match="expected a unit of angles or lengths, got mrad"):
+        guessed(tmp_path, table("t", "q{}_mrad", "", name))
+
+
+def test_axes_that_names_keep_apart_are_said(tmp_path):
+    columns = table("t", "wrist_{}_pos", "", "wrist_{}_effort")
+    columns["elbow_pos"] = columns["wrist_1_pos"]
+    found = guessed(tmp_path, columns)
+    assert any("fewer axes are left out: elbow_pos" in doubt for doubt in found.doubts)
+
+
 def test_targets_errors_and_the_tool_are_told_from_measurements(tmp_path):
     columns = table("t", "actual_pos_{}", "actual_vel_{}", "measured_torque_{}")
     columns |= table("t", "target_pos_{}", "target_vel_{}", "torque_cmd_{}")
@@ -344,6 +363,8 @@ def test_what_cannot_be_guessed_lists_the_columns(tmp_path, columns, words):
         ("rec.act_vel_mot_deg_per_s", ("velocity", False, "deg/s", "motor", "rec")),
         ("Motor speed 2 [1/min]", ("velocity", None, "rpm", "motor", 2)),
         ("torque_3 (N·m)", ("torque", None, "Nm", None, 3)),
+        ("torque_3 [mNm]", ("torque", None, "mNm", None, 3)),
+        ("motor_cur_2_mA", ("current", None, "ma", "motor", 2)),
         ("current_2_a", ("current", None, "A", None, 2)),
         ("J5", ("", None, None, None, 5)),
         ("ms", ("time", None, "ms", None, "")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -59,5 +60,5 @@ def column_file(path: Path) -> Path:
     return Path(str(_shipped(str(path)))) if str(path) in MAPS else path
 
 
-def _shipped(name: str) -> resources.abc.Traversable:
+def _shipped(name: str) -> Traversable:
     return resources.files("axisight.logs.maps") / f"{name}.toml"

@@ -51,7 +51,11 @@ def _single(draft: Draft, found: list[Family]) -> Family:
     if len(largest_ones) > 1:
         listed = ", ".join(f.label for f in largest_ones)
         raise draft.refusal(f"position: expected one column per axis, got a choice of {listed}")
-    draft.leave([f for f in kinds if f is not largest_ones[0]], "positions of fewer axes")
+    fewer = [f for f in kinds if f is not largest_ones[0]]
+    draft.leave(fewer, "positions of fewer axes")
+    if fewer:
+        listed = ", ".join(f.label for f in fewer)
+        draft.doubts.append(f"axes: positions of fewer axes are left out: {listed}")
     return largest_ones[0]
 
 

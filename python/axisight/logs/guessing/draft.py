@@ -20,8 +20,8 @@ class Draft:
     """A map in the making.
 
     ``fields`` holds one (signal, unit) per axis, ``torques`` those of which a person has to choose one, or
-    to state its scale; ``why`` gives the reason of a field, ``unused`` that of a name that was left out. ``doubts`` are
-    choices that others might be right for.
+    to state its scale (``scaled``: even of a torque). ``why`` gives the reason of a field, ``unused`` that
+    of a name that was left out. ``doubts`` are choices that others might be right for.
     """
 
     path: Path
@@ -39,6 +39,7 @@ class Draft:
     sample_time_s: float = 0.0
     fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)
     torques: list[list[tuple[Series, str]]] = field(default_factory=list)
+    scaled: bool = False
     why: dict[str, str] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)

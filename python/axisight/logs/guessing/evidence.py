@@ -19,7 +19,8 @@ from axisight.logs.units import si_factor
 _RATES_HZ = (2.0, 20_000.0)
 _TIME_UNITS = ("s", "ms", "us", "ns")
 _ALIKE = 0.9
-_EXACT = 0.03
+# Factors of units are further apart.
+_EXACT = 0.05
 _BAND_HZ = 10.0
 # A joint in rad stays within that; more is degrees, or a motor's.
 LARGEST_JOINT_RAD = 7.0

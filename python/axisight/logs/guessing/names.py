@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from axisight.logs.guessing.series import Series
 
-_TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+_TOKEN = re.compile(r"[mk]Nm|m[AV](?![a-z])|[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _BRACKET = re.compile(r"[\[(]\s*(1/min|[^\])\d][^\])]*?)\s*[\])]")
 # A1, J1: the letter is the axis, no ampere.
 _AXIS_LETTER = re.compile(r"(?<![A-Za-z])[AaJj](?=\d|#)")
@@ -40,7 +40,7 @@ _WANTED = _words(
 # What is none of an axis, or no measurement: of the tool, computed by a model, a bound.
 _OTHER = _words(
     "ext external tcp ee pose cartesian tool wrench hat gripper finger min max limit std var mode status "
-    "ff grav gravity coriolis friction model init raw kin"
+    "ff grav gravity coriolis friction model init kin"
 )
 _MOTOR = _words("motor motors mot rotor")
 _JOINT = _words("joint joints link gear arm se secondary output")
@@ -63,6 +63,8 @@ _UNITS = {
     "us": "us", "usec": "us", "micros": "us", "µs": "us", "microseconds": "us",
     "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns", "nanosec": "ns",
 }  # fmt: skip
+# Units that maps do not have: what bears one waits for a person and a scale.
+_FOREIGN = _words("mnm knm ncm kn mrad mdeg arcmin arcsec ma mv cm krpm percent pct hz")
 # Single letters are units in brackets, or at the end of a name of that quantity.
 _LETTERS = {"m": "m", "n": "N", "a": "A", "v": "V", "s": "s", "c": "degC", "k": "K", "m s": "m/s"}
 _LETTER_OF = {"s": "time", "a": "current", "v": "voltage", "m s": "velocity", "c": "temperature"}
@@ -72,9 +74,9 @@ _LETTER_OF = {"s": "time", "a": "current", "v": "voltage", "m s": "velocity", "c
 class Meaning:
     """What a name says; None where it does not.
 
-    ``quantity`` is "" for none, "other" for what is none of an axis; ``wanted`` tells a target from a
-    measurement; ``axis`` is its number as it stands there, or what is left of the name; ``stem`` is shared by the
-    axes of one family.
+    ``quantity`` is "" for none, "other" for what is none of an axis; ``unit`` may be one that maps do not
+    have; ``wanted`` tells a target from a measurement; ``axis`` is its number as it stands there, or what
+    is left of the name; ``stem`` is shared by the axes of one family.
     """
 
     quantity: str
@@ -110,7 +112,10 @@ def meaning_of(series: Series, joints: Sequence[str] = ()) -> Meaning:
 
 def _bracket_unit(text: str) -> str | None:
     key = " ".join(re.findall(r"[a-zµ°]+", text.lower()))
-    return _UNITS.get(key) or _LETTERS.get(key) or ("rpm" if text == "1/min" else None)
+    if text == "1/min":
+        return "rpm"
+    foreign = text.strip() == "%" or bool(set(key.split()) & _FOREIGN)
+    return text.strip() if foreign else _UNITS.get(key) or _LETTERS.get(key)
 
 
 def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str, str]:
@@ -144,7 +149,7 @@ def _word_unit(words: list[str], quantity: str) -> tuple[str | None, list[str]]:
         for start in range(0 if len(words) == size else 1, len(words) - size + 1):
             key = " ".join(words[start : start + size])
             letter = _LETTER_OF.get(key) == quantity and start + size == len(words)
-            unit = _LETTERS[key] if letter else _UNITS.get(key)
+            unit = _LETTERS[key] if letter else key if key in _FOREIGN else _UNITS.get(key)
             if unit is not None:
                 return unit, [*words[:start], *words[start + size :]]
     return None, words

@@ -93,7 +93,9 @@ def take_torque(draft: Draft) -> None:
             _take(draft, family, wanted=wanted)
         else:
             _leave_open(draft, family, quantity)
-            unit = family.meaning.unit or ("A" if quantity == "current" else "V")
+            draft.scaled = True
+            usual = {"torque": "Nm", "current": "A", "voltage": "V"}[quantity]
+            unit = family.meaning.unit or usual
             draft.why["torque"] = f"{family.label}: {quantity}s, state the Nm (or N) per {unit}"
             draft.doubts.append(f"torque: state the Nm (or N) per {unit} of {family.label}")
         return

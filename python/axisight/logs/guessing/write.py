@@ -39,7 +39,7 @@ def text_of(draft: Draft) -> str:
                 lines.append(f"{name} = {_inline(*draft.fields[name][axis])}")
         for signals in draft.torques:
             series, unit = signals[axis]
-            scale = ", scale = ..." if unit in "AV" else ""
+            scale = ", scale = ..." if unit in "AV" or draft.scaled else ""
             lines.append(f"# torque = {_inline(series, unit, scale)}")
     lines += _csv(draft.csv)
     if draft.unused:
