@@ -9,7 +9,7 @@ from axisight.errors import LogError
 from axisight.logs import check_log, load_column_map, read_log
 from axisight.logs.guessing import guess_columns
 from axisight.logs.guessing.names import meaning_of
-from axisight.logs.guessing.series import Series
+from axisight.logs.guessing.series import Series, series_of
 from axisight.logs.sources import load_arrays
 from columns_data import (
     DEG,
@@ -44,7 +44,7 @@ def table(
 
 def shuffled(columns: dict) -> dict:
     keys = list(columns)
-    np.random.default_rng(1).shuffle(keys)
+    np.random.default_rng(4).shuffle(keys)
     return {key: columns[key] for key in keys}
 
 
@@ -122,6 +122,22 @@ def test_a_guess_reads_what_was_written(tmp_path, name, shuffle):
         assert re.search(rf"^# {field}: .+: .+", found.text, re.MULTILINE)
 
 
+def test_small_motions_in_degrees_are_known_by_their_speeds(tmp_path):
+    for velocity, unit in ((1.0, "rad/s"), (RPM, "rpm")):
+        small = {"position": 0.05 * DEG, "velocity": 0.05 * velocity}
+        path = write_csv(tmp_path / "a.csv", table("t", "q{}", "dq{}", "tau{}", **small))
+        axis = guess_columns(path).columns.axis[0]
+        assert (axis.position.unit, axis.velocity.unit) == ("deg", unit)
+
+
+def test_signals_of_matrices_are_their_rows_or_columns():
+    q = motion(N)["position"]
+    for array in (q, q.T):
+        found, other = series_of({"q": array, "t": q[:, 0], "k": np.ones(3)})
+        np.testing.assert_array_equal(np.column_stack([s.values for s in found[:N]]), q)
+        assert list(other) == ["k"]
+
+
 @pytest.mark.parametrize("kind", [".npz", ".h5", ".mat"])
 @pytest.mark.parametrize("across", [True, False])
 def test_matrices(tmp_path, kind, across):
@@ -151,7 +167,7 @@ def test_names_of_a_maker_are_known(tmp_path, maker, n_axes):
     )
 
 
-def test_names_of_a_maker_in_other_units_are_none(tmp_path):
+def test_angles_of_a_maker_in_other_units_are_none(tmp_path):
     columns = maker_columns("ur-rtde", 6)
     for k in range(6):
         columns[f"actual_q_{k}"] = columns[f"actual_q_{k}"] * DEG
@@ -181,6 +197,30 @@ def test_states_without_efforts(tmp_path):
 def test_native_columns_need_no_map(tmp_path):
     with pytest.raises(LogError, match="it needs no map"):
         guess_columns(write(tmp_path / "a.csv", native_columns()))
+
+
+def test_speeds_of_a_maker_in_other_units_are_none(tmp_path):
+    columns = maker_columns("abb", 6)
+    columns |= {f"speed_J{k}": columns[f"speed_J{k}"] / DEG for k in range(1, 7)}
+    found = guess_columns(write_csv(tmp_path / "a.csv", columns), robot(6))
+    assert found.named is None
+    assert any("names are those of abb, but speed_J1 is 0.01745" in d for d in found.doubts)
+    axis = found.columns.axis[0]
+    assert (axis.position.unit, axis.velocity.unit) == ("deg", "rad/s")
+
+
+def test_doubtful_times(tmp_path):
+    columns = table("t", "q{}", "dq{}", "tau{}")
+    found = guessed(tmp_path, columns | {"t": columns["t"] * 50})
+    assert any("ms by 5000 Hz; s would be 5 Hz" in doubt for doubt in found.doubts)
+    columns["t_ms"] = columns.pop("t")
+    found = guessed(tmp_path, columns)
+    assert any("t_ms says ms, which makes 2.5e+05 Hz" in doubt for doubt in found.doubts)
+
+
+def test_joints_by_name_without_a_robot(tmp_path):
+    found = guessed(tmp_path, FILES["joints by name"][0])
+    assert any("in the order of the file (pan, lift," in doubt for doubt in found.doubts)
 
 
 def test_an_episode_of_lerobot(tmp_path):

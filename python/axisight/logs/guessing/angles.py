@@ -6,6 +6,7 @@ from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.evidence import (
     LARGEST_JOINT_DEG,
     LARGEST_JOINT_RAD,
+    PAIRS_APART,
     Agreement,
     agreement,
     largest,
@@ -129,7 +130,7 @@ def _by_velocity(seen: Agreement, velocity_unit: str | None) -> str | None:
         unit
         for unit in _POSITION_UNITS
         for other in named
-        if seen.is_factor(si_factor(unit) / si_factor(other or "rad/s"))
+        if seen.is_factor(si_factor(unit) / si_factor(other or "rad/s"), PAIRS_APART)
     }
     return fits.pop() if len(fits) == 1 else None
 

@@ -19,8 +19,9 @@ from axisight.logs.units import si_factor
 _RATES_HZ = (2.0, 20_000.0)
 _TIME_UNITS = ("s", "ms", "us", "ns")
 _ALIKE = 0.9
-# Factors of units are further apart.
-_EXACT = 0.05
+# Of all pairs of units two factors are 4.7 % apart; beside a known unit they are far apart.
+PAIRS_APART = 0.02
+UNITS_APART = 0.05
 _BAND_HZ = 10.0
 # A joint in rad stays within that; more is degrees, or a motor's.
 LARGEST_JOINT_RAD = 7.0
@@ -56,9 +57,9 @@ class Agreement:
         """Whether the one is the derivative of the other, up to a factor."""
         return self.axes > 0 and abs(self.alike) >= _ALIKE
 
-    def is_factor(self, factor: float) -> bool:
-        """Whether velocities are the derivatives times ``factor``."""
-        return self.clear and abs(self.ratio / factor - 1.0) <= _EXACT
+    def is_factor(self, factor: float, within: float) -> bool:
+        """Whether velocities are the derivatives times ``factor``, to a share of it."""
+        return self.clear and abs(self.ratio / factor - 1.0) <= within
 
 
 def agreement(

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from axisight.logs.guessing.draft import Draft
-from axisight.logs.guessing.evidence import agreement, follows_acceleration, largest
+from axisight.logs.guessing.evidence import (
+    UNITS_APART,
+    agreement,
+    follows_acceleration,
+    largest,
+)
 from axisight.logs.guessing.families import Family, of_quantity
 from axisight.logs.guessing.series import Series
 from axisight.logs.units import PRISMATIC_UNITS, si_factor
@@ -62,7 +67,7 @@ def _velocity_units(
     both = len({unit in PRISMATIC_UNITS for unit in units}) > 1
     position = units[0]
     possible = _SLIDING if position in PRISMATIC_UNITS else _TURNING
-    fits = [u for u in possible if seen.is_factor(si_factor(position) / si_factor(u))]
+    fits = [u for u in possible if seen.is_factor(si_factor(position) / si_factor(u), UNITS_APART)]
     said = f"{seen.ratio:.4g} times the derivative of the position (correlation {seen.alike:.3f})"
     if not fits:
         return f"{said}, which no unit explains: gear ratio, or another sign?"
