@@ -1,5 +1,6 @@
 """The commands ``axisight columns``, and names of maps wherever a command takes a map."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ def test_list_and_show():
     listed = run("columns", "list")
     for name in MAPS:
         assert f"{name}: " in listed
+        assert re.search(rf"{name}: [^:]+(: [^:]+)?\. ?", listed + " "), "a whole sentence"
         shown = CliRunner().invoke(app, ["columns", "show", name])
         assert shown.output == named_map_text(name)
     text = run("columns", "show", "fanuc", code=2)

@@ -1,6 +1,5 @@
 """Folders of LeRobot, versions 2 and 3: one episode is one log."""
 
-import json
 import shutil
 
 import numpy as np
@@ -115,5 +114,5 @@ def test_episodes_in_a_case_and_on_the_command_line(tmp_path):
     assert [log.name for log in case.logs] == ["set#0", "set#1"]
     shown = CliRunner().invoke(app, ["check", str(tmp_path / "set#1")])
     assert "uniform at 250 Hz" in " ".join(shown.output.split())
-    info = json.loads((tmp_path / "set/meta/info.json").read_text())
-    assert info["total_episodes"] == 2
+    unused = [f.column for f in check_log(tmp_path / "set#1").findings if "not used" in f.message]
+    assert unused == [*(f"action[{k}]" for k in range(6)), "episode_index", "frame_index"]

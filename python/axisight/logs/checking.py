@@ -65,7 +65,8 @@ def check_log(path: Path | str, columns: AnyMap | Path | str | None = None) -> L
         findings.append(Finding("ok", "rate", f"uniform at {rate:.6g} Hz for {seconds:.6g} s"))
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("warning", "map", note) for note in found.notes]
-    findings += [Finding("ok", name, "not a native column, not used") for name in found.unused]
+    why = "not a native column, not used" if found.pattern is None else "not used by the map"
+    findings += [Finding("ok", name, why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
     sound = all(finding.severity != "error" for finding in findings)
     if sound and rate is not None and grid.stamps_s is None:

@@ -82,10 +82,14 @@ def gather(
                 _take_signal(files, result, (name, number), signal)
     if result.columns.side == "joint" and robot is not None:
         _to_motors(result, robot)
-    used = {label.split("[")[0] for label in result.labels.values()}
     if given is None:
-        result.unused = tuple(sorted(set(files.main) - used - {"time_s"}))
+        result.unused = tuple(sorted(set(files.main) - _used_names(result.columns)))
     return result
+
+
+def _used_names(columns: ColumnMap) -> set[str]:
+    signals = [getattr(axis, name) for axis in columns.axis for name in _FIELDS]
+    return {a.name for a in (columns.time, *signals) if a is not None}
 
 
 def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> AnyMap:
