@@ -113,7 +113,7 @@ def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
     text = changed(text, "<actuator>", '<actuator><position name="servo" joint="elbow" kp="9"/>')
     robot = import_robot(written(tmp_path, text, "arm.xml"))
     assert "1 equality constraints left out" in robot.toml
-    assert "actuator 'servo' is no plain motor" in robot.toml
+    assert "actuators of elbow are told positions, those of other joints are not" in robot.toml
 
 
 def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

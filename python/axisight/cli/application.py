@@ -49,6 +49,10 @@ _COMMANDS = {
         "about:check_command",
         "Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels.",
     ),
+    "columns": (
+        "columns:columns_app",
+        "List, show and guess column maps: where a log keeps its signals, in which unit.",
+    ),
     "schema": (
         "about:schema_command",
         "Print the JSON Schema of the verdict that `diagnose --json` writes.",

@@ -27,7 +27,12 @@ To = Annotated[
         "--to", metavar="SECONDS", help="Leave out what comes after in each log. Default: its end."
     ),
 ]
-Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
+Columns = Annotated[
+    Path | None,
+    typer.Option(
+        help="Column map (TOML) for logs in other formats, or the name of one: axisight columns list."
+    ),
+]
 
 
 @contextmanager

@@ -15,6 +15,8 @@ from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.faults import refused
 from axisight.gap.inputs import part_of
 from axisight.logs import Log, check_log, read_log
+from axisight.logs.map_files import column_file
+from axisight.logs.sources import files_of
 from axisight.robot import Robot, load_robot
 from axisight.robot_file import (
     Identified,
@@ -130,7 +132,8 @@ def provenance(
     method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
 ) -> Provenance:
     """Return where values come from: hashes of files, the column map too, and the options given."""
-    files = [*files, *([] if columns is None else [columns])]
+    files = [part for path in files for part in files_of(path)]
+    files += [] if columns is None else [column_file(columns)]
     count = Counter(path.name for path in files)
     names = [path.name if count[path.name] == 1 else str(path) for path in files]
     return Provenance(

@@ -11,7 +11,7 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli.common import OUT, From, To, errors, numbers
+from axisight.cli.common import OUT, Columns, From, To, errors, numbers
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.gap.inputs import part_of
@@ -30,9 +30,7 @@ def simulate_command(
         Path, typer.Argument(help="Log whose velocity references (or torques) drive the run.")
     ],
     out: Annotated[Path, typer.Option(help="Parquet log to write.")],
-    columns: Annotated[
-        Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")
-    ] = None,
+    columns: Columns = None,
     torque: Annotated[
         bool, typer.Option("--torque", help="Drive with the log's torques, without controller.")
     ] = False,

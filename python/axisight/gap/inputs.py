@@ -11,7 +11,7 @@ import numpy as np
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
-from axisight.logs.sources_bag import is_bag
+from axisight.logs.sources import is_folder_log
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
 
@@ -111,7 +111,7 @@ def _read(
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
-    if len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0]):
+    if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
         case = read_case(paths[0], columns)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)

@@ -11,21 +11,26 @@ from axisight.logs.columns import (
     TimeColumn,
     TorqueColumn,
     VelocityColumn,
-    load_column_map,
-    parse_column_map,
 )
 from axisight.logs.filters import decimate_zero_phase, differentiate, lowpass
 from axisight.logs.findings import Finding
 from axisight.logs.log import AxisKind, Log
+from axisight.logs.map_files import AnyMap, load_column_map, named_map_text, parse_column_map
+from axisight.logs.maps import MAPS
+from axisight.logs.patterns import AxisPattern, ColumnPattern
 from axisight.logs.reading import read_log
 from axisight.logs.render import render
 from axisight.logs.validate import check_same_rate
 
 __all__ = [
+    "MAPS",
+    "AnyMap",
     "AxisColumns",
     "AxisKind",
+    "AxisPattern",
     "Case",
     "ColumnMap",
+    "ColumnPattern",
     "CsvOptions",
     "Finding",
     "Log",
@@ -41,6 +46,7 @@ __all__ = [
     "differentiate",
     "load_column_map",
     "lowpass",
+    "named_map_text",
     "parse_column_map",
     "read_case",
     "read_log",

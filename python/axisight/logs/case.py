@@ -11,9 +11,11 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.errors import CaseError
-from axisight.logs.columns import ColumnMap, describe_validation, load_column_map
+from axisight.logs.columns import describe_validation
 from axisight.logs.log import Log
+from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.reading import read_log
+from axisight.logs.sources import is_folder_log
 from axisight.logs.sources_bag import is_bag
 from axisight.logs.validate import check_same_rate
 from axisight.robot import Robot, load_robot
@@ -64,11 +66,12 @@ class Case:
         return tuple(log for log, own in zip(self.logs, self.roles, strict=True) if own == role)
 
 
-def read_case(folder: Path | str, columns: ColumnMap | Path | str | None = None) -> Case:
+def read_case(folder: Path | str, columns: AnyMap | Path | str | None = None) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
-    Raises CaseError naming file and field: case.toml missing or invalid, unknown keys, no
-    estimation log, robot file missing, one file listed twice, logs with different numbers of axes,
+    `columns` is what `read_log` takes. Raises CaseError naming file and field: case.toml missing or
+    invalid, unknown keys, no estimation log, robot file missing, one file listed twice, logs with
+    different numbers of axes,
     a period that is not a whole number of samples or is longer than the log. Raises LogError for a
     log that cannot be read or has another sample rate.
     """
@@ -94,7 +97,9 @@ def read_case(folder: Path | str, columns: ColumnMap | Path | str | None = None)
     given = load_column_map(columns) if isinstance(columns, str | Path) else columns
     # Logs of motors are read without the robot, which may be a file that only later is looked at.
     joints = given is not None and given.side == "joint"
-    recorded = any(is_bag(folder / entry.file) for entry in content.log)
+    recorded = any(
+        is_bag(folder / entry.file) or is_folder_log(folder / entry.file) for entry in content.log
+    )
     robot = load_robot(robot_path) if joints or recorded else None
     logs = tuple(
         _read_entry(path, number, entry, given, robot) for number, entry in enumerate(content.log)
@@ -122,10 +127,10 @@ def _parse(path: Path) -> _CaseFile:
 
 
 def _read_entry(
-    path: Path, number: int, entry: _LogEntry, columns: ColumnMap | None, robot: Robot | None
+    path: Path, number: int, entry: _LogEntry, columns: AnyMap | None, robot: Robot | None
 ) -> Log:
     file = path.parent / entry.file
-    if not file.is_file() and not is_bag(file):
+    if not file.is_file() and not is_folder_log(file):
         raise CaseError(f"{path}: log.{number}.file: expected an existing file, got {entry.file!r}")
     log = read_log(file, columns, robot=robot)
     if entry.period_s is not None:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from axisight.errors import LogError
-from axisight.logs.columns import ColumnMap
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel, Gathered, gather
 from axisight.logs.log import Floats
+from axisight.logs.map_files import AnyMap
 from axisight.logs.quality import check_signal
 from axisight.logs.reading import grid_of
 from axisight.logs.rows import check_rows
@@ -22,6 +22,7 @@ from axisight.logs.validate import check_axes, check_finite, check_lengths
 _UNITS = {
     "position": ("rad", "m"),
     "torque": ("Nm", "N"),
+    "position_ref": ("rad", "m"),
     "velocity_ref": ("rad/s", "m/s"),
     "velocity": ("rad/s", "m/s"),
     "joint_position": ("rad", "m"),
@@ -45,7 +46,7 @@ class LogReport:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_log(path: Path | str, columns: ColumnMap | Path | str | None = None) -> LogReport:
+def check_log(path: Path | str, columns: AnyMap | Path | str | None = None) -> LogReport:
     """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
 
     Takes the files and column maps that `read_log` takes. A file or map that cannot be used at all
@@ -64,7 +65,9 @@ def check_log(path: Path | str, columns: ColumnMap | Path | str | None = None) -
         seconds = grid.n_samples / rate
         findings.append(Finding("ok", "rate", f"uniform at {rate:.6g} Hz for {seconds:.6g} s"))
     findings += [Finding("ok", "time", note) for note in grid.notes]
-    findings += [Finding("ok", name, "not a native column, not used") for name in found.unused]
+    findings += [Finding("warning", "map", note) for note in found.notes]
+    why = "not a native column, not used" if found.pattern is None else "not used by the map"
+    findings += [Finding("ok", name, why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
     sound = all(finding.severity != "error" for finding in findings)
     if sound and rate is not None and grid.stamps_s is None:

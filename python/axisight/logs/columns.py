@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from axisight.errors import LogError
 from axisight.logs.units import (
     PRISMATIC_UNITS,
     REVOLUTE_UNITS,
@@ -33,7 +30,8 @@ class Address(_Strict):
     `name` is a column of a table or a variable of a MAT, HDF5 or NPZ file; fields of structs and
     members of groups follow after dots (`rec.meas.q`). `index` picks from a matrix in NumPy order
     and counts from 0: "1,:" is the second row, ":,2" the third column, a lone integer the entry of
-    the first dimension. `file` names another file in the log's folder that holds this signal.
+    the first dimension. `file` names another file in the log's folder that holds this signal. `note`
+    is said of every log that is read by it.
     """
 
     name: Text
@@ -41,6 +39,7 @@ class Address(_Strict):
         None
     )
     file: Text | None = None
+    note: Text | None = None
 
     @property
     def label(self) -> str:
@@ -52,12 +51,15 @@ class Address(_Strict):
 class TimeColumn(Address):
     """Time stamps; `resample_hz` interpolates irregular ones linearly onto a uniform grid.
 
+    "mean" is the mean rate of the stamps, for logs whose rate nobody knows beforehand; stamps that are
+    uniform stay as they are.
+
     Resampling is for logs stamped by a host computer. It has no anti-alias filter and bridges gaps
     by straight lines; the log's notes say so.
     """
 
     unit: TimeUnit = "s"
-    resample_hz: Positive | None = None
+    resample_hz: Positive | Literal["mean"] | None = None
 
 
 class _Signal(Address):
@@ -106,7 +108,9 @@ class TemperatureColumn(_Signal):
 
 
 class AxisColumns(_Strict):
-    """The signals of one driven axis: its position, and its torque or the targets of its position."""
+    """The signals of one driven axis. A log is read only where all axes have a torque, or targets of their positions;
+    a check needs neither.
+    """
 
     position: PositionColumn
     torque: TorqueColumn | None = None
@@ -124,8 +128,6 @@ class AxisColumns(_Strict):
     @model_validator(mode="after")
     def _one_kind(self) -> AxisColumns:
         wrong = REVOLUTE_UNITS if self.prismatic else PRISMATIC_UNITS
-        if self.torque is None and self.position_ref is None:
-            raise ValueError("torque: expected a column, or position_ref in its place")
         for field in ("torque", "position_ref", "velocity_ref", "velocity", "joint_position"):
             signal = getattr(self, field)
             if signal is not None and signal.unit in wrong:
@@ -136,7 +138,10 @@ class AxisColumns(_Strict):
 
 
 class CsvOptions(_Strict):
-    """How a CSV file is written; without a header, columns are named "0", "1" and so on."""
+    """How a CSV file is written; without a header, columns are named "0", "1" and so on.
+
+    `separator` "auto" is what stands between the names of the header.
+    """
 
     separator: Text = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
@@ -177,23 +182,3 @@ def describe_validation(error: ValidationError) -> str:
         else:
             parts.append(f"{path}: {item['msg']}, got {item['input']!r}")
     return "; ".join(parts)
-
-
-def parse_column_map(text: str, where: str = "column map") -> ColumnMap:
-    """Parse the TOML `text` of a column map. Raises LogError naming `where` and each bad field."""
-    try:
-        return ColumnMap.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise LogError(f"{where}: expected TOML, got: {error}") from error
-    except ValidationError as error:
-        raise LogError(f"{where}: {describe_validation(error)}") from error
-
-
-def load_column_map(path: Path | str) -> ColumnMap:
-    """Read a column map file. Raises LogError when it cannot be read or is not valid."""
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: column map cannot be read: {error}") from error
-    return parse_column_map(text, where=str(path))

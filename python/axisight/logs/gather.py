@@ -11,18 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import LogError
-from axisight.logs.columns import Address, ColumnMap, load_column_map
+from axisight.logs.columns import Address, AxisColumns, ColumnMap
 from axisight.logs.findings import Finding
 from axisight.logs.joint_states import joint_state_map
 from axisight.logs.log import Floats
+from axisight.logs.map_files import AnyMap, load_column_map
+from axisight.logs.mean_rate import mean_rate_hz
 from axisight.logs.native import native_map
+from axisight.logs.patterns import ColumnPattern
 from axisight.logs.sources import Arrays, load_arrays
 from axisight.logs.sources_bag import is_bag
+from axisight.logs.sources_lerobot import is_lerobot
 from axisight.logs.units import si_factor, si_offset
 
 if TYPE_CHECKING:
     from axisight.robot import Robot
 
+_FIELDS = tuple(AxisColumns.model_fields)
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
 
@@ -39,11 +44,21 @@ class Gathered:
     rate_hz: float | None = None
     findings: list[Finding] = field(default_factory=list)
     unused: tuple[str, ...] = ()
+    pattern: ColumnPattern | None = None
+
+    @property
+    def notes(self) -> list[str]:
+        """What the map says of signals that were taken by it, each once."""
+        signals = [getattr(axis, name) for axis in self.columns.axis for name in _FIELDS]
+        addresses: list[Address | None] = [self.columns.time, *signals]
+        return list(
+            dict.fromkeys(a.note for a in addresses if a is not None and a.note is not None)
+        )
 
 
 def gather(
     path: Path | str,
-    columns: ColumnMap | Path | str | None = None,
+    columns: AnyMap | Path | str | None = None,
     robot: Robot | None = None,
 ) -> Gathered:
     """Open a log and take out every mapped signal; problems of single columns become findings.
@@ -52,28 +67,35 @@ def gather(
     the map itself cannot be used.
     """
     path = Path(path)
-    given = columns if columns is None or isinstance(columns, ColumnMap) else None
-    if columns is not None and given is None:
-        assert not isinstance(columns, ColumnMap)
-        given = load_column_map(columns)
+    given = load_column_map(columns) if isinstance(columns, Path | str) else columns
     files = _Files(path, given)
-    result = Gathered(path, _usual_map(files.main, robot, path) if given is None else given)
+    chosen = _usual_map(files.main, robot, path) if given is None else given
+    pattern = chosen if isinstance(chosen, ColumnPattern) else None
+    if isinstance(chosen, ColumnPattern):
+        chosen = chosen.for_file(files.main, robot, path)
+    result = Gathered(path, chosen, pattern=pattern)
     _take_time(files, result)
     for number, axis in enumerate(result.columns.axis):
-        for name in type(axis).model_fields:
+        for name in _FIELDS:
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
     if result.columns.side == "joint" and robot is not None:
         _to_motors(result, robot)
-    used = {label.split("[")[0] for label in result.labels.values()}
     if given is None:
-        result.unused = tuple(sorted(set(files.main) - used - {"time_s"}))
+        result.unused = tuple(sorted(set(files.main) - _used_names(result.columns)))
     return result
 
 
-def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> ColumnMap:
-    """Return the map of a file that comes without one: of a recording of ROS, or of native columns."""
+def _used_names(columns: ColumnMap) -> set[str]:
+    signals = [getattr(axis, name) for axis in columns.axis for name in _FIELDS]
+    return {a.name for a in (columns.time, *signals) if a is not None}
+
+
+def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> AnyMap:
+    """Return the map of a file that comes without one: of ROS, of LeRobot, or of native columns."""
+    if is_lerobot(path):
+        return load_column_map("lerobot")
     return joint_state_map(arrays, robot, path) if is_bag(path) else native_map(arrays, str(path))
 
 
@@ -91,7 +113,7 @@ def _to_motors(result: Gathered, robot: Robot) -> None:
 class _Files:
     """The log's own arrays and those of sibling files, each file opened once."""
 
-    def __init__(self, path: Path, columns: ColumnMap | None) -> None:
+    def __init__(self, path: Path, columns: AnyMap | None) -> None:
         self._folder = path.parent
         self._csv = columns.csv if columns is not None else None
         self._opened: dict[str, Arrays] = {}
@@ -115,6 +137,11 @@ def _take_time(files: _Files, result: Gathered) -> None:
         result.findings.append(
             Finding("error", columns.time.label if columns.time else "", str(error))
         )
+    if columns.time is not None and columns.time.resample_hz == "mean":
+        where = f"{result.path}: {columns.time.label}"
+        mean = None if result.time_s is None else mean_rate_hz(result.time_s, where)
+        time = columns.time.model_copy(update={"resample_hz": mean})
+        result.columns = columns.model_copy(update={"time": time})
     rate = columns.sample_rate_hz
     if rate is None:
         return

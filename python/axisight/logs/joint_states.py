@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import LogError
@@ -16,10 +15,6 @@ if TYPE_CHECKING:
     from axisight.robot import Robot
 
 _REQUIRED = ("position", "effort")
-# Stamps that are further off a uniform grid than this share of a step are put on one.
-_UNIFORM = 0.01
-# A step this many times the usual one is a hole, which nobody should bridge unasked.
-_HOLE = 5.0
 
 
 def joint_state_map(
@@ -50,10 +45,7 @@ def joint_state_map(
         _axis(arrays, topic, joint, prismatic)
         for joint, prismatic in zip(wanted or found, slides, strict=True)
     ]
-    time: dict[str, Any] = {"name": f"{topic}.time_s", "unit": "s"}
-    rate = _rate_hz(np.asarray(arrays[f"{topic}.time_s"]), where, topic)
-    if rate is not None:
-        time["resample_hz"] = rate
+    time = {"name": f"{topic}.time_s", "unit": "s", "resample_hz": "mean"}
     return ColumnMap.model_validate({"time": time, "axis": axes, "side": "joint"})
 
 
@@ -79,25 +71,3 @@ def _axis(
         for key, field, unit in fields
         if f"{topic}.{field}.{joint}" in arrays
     }
-
-
-def _rate_hz(time_s: NDArray[np.float64], where: Path, topic: str) -> float | None:
-    """Return the rate to resample at; None where stamps are uniform, or not usable anyway."""
-    steps: Sequence[float] | NDArray[np.float64] = np.diff(time_s)
-    if len(time_s) < 3 or np.any(np.asarray(steps) <= 0):
-        return None
-    usual = float(np.median(steps))
-    mean = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
-    off = np.abs(time_s - time_s[0] - mean * np.arange(len(time_s))).max()
-    if off < _UNIFORM * mean:
-        return None
-    longest = float(np.max(steps))
-    if longest > _HOLE * usual:
-        raise LogError(
-            f"{where}: {topic}.time_s: expected a message every {usual:.4g} s, got a hole of {longest:.4g} s "
-            f"after {time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by a column "
-            f"map with resample_hz"
-        )
-    # The mean: single late messages do not count.
-    rate = 1.0 / mean
-    return float(round(rate)) if abs(round(rate) / rate - 1.0) < 0.01 else rate

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from axisight.errors import LogError
-from axisight.logs.columns import ColumnMap
 from axisight.logs.findings import raise_errors
 from axisight.logs.gather import Gathered, gather
 from axisight.logs.grid import Grid, make_grid
 from axisight.logs.log import Floats, Log, not_logged
+from axisight.logs.map_files import AnyMap
+from axisight.logs.sources_lerobot import is_lerobot
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
 if TYPE_CHECKING:
@@ -21,15 +22,17 @@ if TYPE_CHECKING:
 
 def read_log(
     path: Path | str,
-    columns: ColumnMap | Path | str | None = None,
+    columns: AnyMap | Path | str | None = None,
     *,
     n_axes: int | None = None,
     robot: Robot | None = None,
 ) -> Log:
     """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or .db3.
 
-    `columns` is a column map, the path of one, or None for a file with the native column names
-    of `axisight.case/1` or a recording of ROS (a rosbag2 may be its folder). `robot` is the one it is a log of:
+    `columns` is a column map, the path of one, the name of one that ships with the package (`ur-rtde`,
+    `franka`, ...), or None for a file with the native column names of `axisight.case/1`, a recording of
+    ROS (a rosbag2 may be its folder) or a folder of LeRobot (`folder#3` is its episode 3).
+    `robot` is the one it is a log of:
     its axes are found by the names of its joints in recordings, and its gear ratios turn signals
     of joints into those of motors. `n_axes` is the number of driven axes the caller expects, those of the
     robot unless given. The result is in SI units on a uniform grid that starts at 0.
@@ -57,13 +60,15 @@ def read_log(
 def grid_of(found: Gathered) -> Grid:
     """Return the time grid of gathered signals, with findings."""
     time = found.columns.time
+    resample = time.resample_hz if time is not None else None
+    assert resample != "mean"  # gathering has put the number
     n_samples = max((values.size for values in found.signals.values()), default=0)
     return make_grid(
         found.time_s,
         found.rate_hz,
         n_samples,
         label=time.label if time is not None else "sample_rate_hz",
-        resample_hz=time.resample_hz if time is not None else None,
+        resample_hz=resample,
     )
 
 
@@ -83,7 +88,8 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
     position, torque = matrix("position"), matrix("torque")
     assert position is not None
     return Log(
-        name=found.path.stem,
+        # What stands after a dot in the name of a folder is no suffix.
+        name=found.path.name if is_lerobot(found.path) else found.path.stem,
         sample_time_s=grid.sample_time_s,
         time_s=time_s,
         torque_nm=not_logged(position.shape) if torque is None else torque,
@@ -97,7 +103,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
         axis_kinds=tuple(
             "prismatic" if axis.prismatic else "revolute" for axis in found.columns.axis
         ),
-        notes=tuple(grid.notes),
+        notes=(*grid.notes, *found.notes),
     )
 
 

@@ -3,32 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from axisight.errors import LogError, MissingExtraError
 from axisight.logs.columns import CsvOptions
 from axisight.logs.sources_bag import BAG_SUFFIXES, is_bag, load_bag
 from axisight.logs.sources_hdf5 import load_hdf5
+from axisight.logs.sources_lerobot import (
+    check_episode,
+    files_of_episode,
+    is_lerobot,
+    load_lerobot,
+)
 from axisight.logs.sources_mat import load_mat
+from axisight.logs.sources_parquet import load_parquet
 
 Arrays = dict[str, NDArray[Any]]
+
+
+def is_folder_log(path: Path) -> bool:
+    """Whether a path is a log though it may be no file: a recording of ROS, an episode of LeRobot."""
+    return is_bag(path) or is_lerobot(path)
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files that a log consists of."""
+    if is_lerobot(path):
+        return files_of_episode(path)
+    return sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
 
 
 def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
     """Return every array of the file by (dotted) name; scalars are 0-dimensional.
 
     The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording of
-    ROS (.mcap, .bag, .db3, or the folder of a rosbag2). Raises MissingExtraError for one without the
-    library that reads it, LogError for a missing file, an unknown suffix, and a truncated or corrupt file.
+    ROS (.mcap, .bag, .db3, or the folder of a rosbag2). A folder of LeRobot is another log, of one
+    episode (`folder#3`). Raises MissingExtraError for one without the library that reads it, LogError for
+    a missing file, an unknown suffix, an episode that is not there, and a truncated or corrupt file.
     """
     loaders: dict[str, Callable[[Path], Arrays]] = {
-        ".parquet": _load_parquet,
+        ".parquet": load_parquet,
         ".csv": lambda file: _load_csv(file, csv or CsvOptions()),
         ".mat": load_mat,
         ".h5": load_hdf5,
@@ -36,11 +56,14 @@ def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
         ".npz": _load_npz,
         **dict.fromkeys(BAG_SUFFIXES, load_bag),
     }
-    folder_of_bag = path.is_dir() and is_bag(path)
-    suffix = ".db3" if folder_of_bag else path.suffix.lower()
+    folder = path.is_dir() and is_bag(path)
+    suffix = ".db3" if folder else path.suffix.lower()
+    if is_lerobot(path):
+        check_episode(path)
+        folder, suffix, loaders = True, ".parquet", {".parquet": load_lerobot}
     if suffix not in loaders:
         raise LogError(f"{path}: suffix: expected one of {', '.join(loaders)}, got {suffix!r}")
-    if not path.is_file() and not folder_of_bag:
+    if not path.is_file() and not folder:
         raise LogError(f"{path}: expected a file, got {'a folder' if path.is_dir() else 'nothing'}")
     try:
         return loaders[suffix](path)
@@ -56,19 +79,11 @@ def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
         ) from error
 
 
-def _load_parquet(path: Path) -> Arrays:
-    # Not pandas.read_parquet: that turns a stored index such as time_s into no column at all
-    table = pq.read_table(path)
-    return {
-        name: np.asarray(column.to_numpy())
-        for name, column in zip(table.column_names, table.columns, strict=True)
-    }
-
-
 def _load_csv(path: Path, options: CsvOptions) -> Arrays:
+    separator = options.separator
     frame = pd.read_csv(
         path,
-        sep=options.separator,
+        sep=_separator(path, options.skip_rows) if separator == "auto" else separator,
         decimal=options.decimal,
         header=0 if options.header else None,
         skiprows=options.skip_rows,
@@ -76,6 +91,13 @@ def _load_csv(path: Path, options: CsvOptions) -> Arrays:
         index_col=False,
     )
     return {str(name).strip(): frame[name].to_numpy() for name in frame.columns}
+
+
+def _separator(path: Path, skip_rows: int) -> str:
+    """Return what stands between the names of a header: a tab or semicolon, comma, or else a space."""
+    with path.open(encoding="utf-8") as file:
+        header = next(islice(file, skip_rows, None), "")
+    return next((mark for mark in "\t;," if mark in header), " ")
 
 
 def _load_npz(path: Path) -> Arrays:

@@ -14,7 +14,7 @@ from axisight.logs.log import Floats, Log
 
 
 def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
-    """Check the number of axes, and that a reference is there for all axes or for none."""
+    """Check the number of axes, that all have a torque, and a reference all of them or none."""
     findings = []
     got = len(found.columns.axis)
     if n_axes is not None and got != n_axes:
@@ -23,9 +23,24 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
                 "error", "axis", f"expected {n_axes} axes, got columns for {got}", "axes_differ"
             )
         )
+    if all(axis.torque is None for axis in found.columns.axis):
+        findings += _no_torque(found)
+    else:
+        findings += _partly(found, "torque", "a torque", "torque_missing")
     findings += _partly(found, "velocity_ref", "a velocity reference", "reference_missing")
-    findings += _partly(found, "position_ref", "a target of the position", "reference_missing")
-    return findings + _partly(found, "torque", "a torque", "torque_missing")
+    return findings + _partly(found, "position_ref", "a target of the position", "reference_missing")
+
+
+def _no_torque(found: Gathered) -> list[Finding]:
+    """Return a finding where there are no targets of positions either, from which a command follows."""
+    if any(axis.position_ref is not None for axis in found.columns.axis):
+        return []
+    looked_for = found.pattern.looked_for("torque") if found.pattern is not None else ""
+    message = (
+        "expected a torque (or force, or current or voltage with its scale) of every axis, or targets of "
+        f"positions, got neither{f'; no column is called {looked_for}' if looked_for else ''}"
+    )
+    return [Finding("error", "torque_1", message, "torque_missing", 1)]
 
 
 def _partly(found: Gathered, field: str, words: str, name: str) -> list[Finding]:

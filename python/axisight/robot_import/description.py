@@ -74,7 +74,12 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         document["tolerances"] = drives.tolerances
     if effects:
         document["effect"] = effects
-    head = [f"imported from {source}", *chain.notes, *_defaults(tables, drives, controller)]
+    servos = [joint.body.joint for joint in chain.joints if joint.body.drive.servo is not None]
+    head = [
+        f"imported from {source}",
+        *chain.notes,
+        *_defaults(tables, drives, controller, servos),
+    ]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
 
 
@@ -96,7 +101,10 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
 
 
 def _defaults(
-    tables: list[dict[str, Any]], drives: DriveData, controller: dict[str, Any] | None
+    tables: list[dict[str, Any]],
+    drives: DriveData,
+    controller: dict[str, Any] | None,
+    servos: list[str],
 ) -> list[str]:
     """Return what was taken where neither the model file nor the drive data say anything."""
     out = []
@@ -105,6 +113,11 @@ def _defaults(
     if all(table["drive"]["motor_inertia"] == 0.0 for table in tables):
         out.append("no rotors: motors have no inertia")
     if controller is None:
+        if servos:
+            out.append(
+                f"actuators of {', '.join(servos)} are told positions, those of other joints are not: left out, "
+                f"to be said in the drive data"
+            )
         out.append("no controller: logs are compared by inverse dynamics")
     elif drives.controller is None:
         out.append("controller: actuators that are told positions")

@@ -199,7 +199,8 @@ class _Compiled:
         model = self.model
         out = []
         for i in range(model.nu):
-            if not (_is_motor(model, i) or _is_servo(model, i)):
+            is_servo = int(model.actuator_trnid[i, 0]) in self.servos and _is_servo(model, i)
+            if not (_is_motor(model, i) or is_servo):
                 out.append(
                     f"actuator {self._name('actuator', i)!r} is no plain motor: its gain and bias are the "
                     f"controller's, to be said in the drive data"

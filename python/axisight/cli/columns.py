@@ -1,0 +1,82 @@
+"""The commands ``axisight columns``: maps that ship with the package, and one guessed for a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.cli.common import OUT, errors
+from axisight.errors import InputError
+from axisight.logs import MAPS, named_map_text
+from axisight.logs.guessing import Proposal, guess_columns
+from axisight.robot import load_robot
+from axisight.storage import write_whole
+
+columns_app = typer.Typer(no_args_is_help=True, add_completion=False)
+
+
+@columns_app.callback()
+def _columns() -> None:
+    """List, show and guess column maps: where a log keeps its signals, in which unit."""
+
+
+@columns_app.command("list")
+def list_command() -> None:
+    """List the maps that ship with the package, by what their first line says."""
+    for name in MAPS:
+        first = named_map_text(name).splitlines()[0].removeprefix("# ")
+        _say(f"{name}: {first}")
+
+
+@columns_app.command("show")
+def show_command(name: Annotated[str, typer.Argument(help="Name of a map, as listed.")]) -> None:
+    """Print a map that ships with the package, to be used as it is or changed."""
+    with errors():
+        typer.echo(named_map_text(name), nl=False)
+
+
+@columns_app.command("guess")
+def guess_command(
+    log: Annotated[Path, typer.Argument(help="Log in any format, by a maker or home-made.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Column map to write. Default: the screen.")
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="robot.toml, URDF, MJCF or preset: number, names and kinds of axes.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace a file that exists.")] = False,
+) -> None:
+    """Propose a column map from names and numbers, with the reason of every choice beside it."""
+    with errors():
+        if out is not None and out.exists() and not overwrite:
+            raise InputError(f"{out} exists: choose another name or pass --overwrite")
+        found = guess_columns(log, None if robot is None else load_robot(robot))
+        if out is None:
+            typer.echo(found.text, nl=False)
+            return
+        write_whole(out, found.text)
+        _say_found(out, log, found)
+
+
+def _say_found(out: Path, log: Path, found: Proposal) -> None:
+    if found.named is None:
+        _say(f"{out}: a map of its own; look at the reasons in it before use")
+    elif found.doubts:
+        _say(f"{out}: the names are those of {found.named}, with fewer axes")
+    else:
+        _say(f"{out}: the names are those of {found.named}; --columns {found.named} does the same")
+    for doubt in found.doubts:
+        _say(f"doubtful: {doubt}")
+    for name, reason in found.unused.items():
+        _say(f"not used: {name}: {reason}")
+    _say(f"then: axisight check {log} --columns {out}")
+
+
+def _say(text: str) -> None:
+    OUT.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,146 @@
+"""From a file to a column map for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from axisight.errors import LogError
+from axisight.logs.columns import CsvOptions
+from axisight.logs.guessing.angles import find_positions, settle_positions
+from axisight.logs.guessing.clock import take_time
+from axisight.logs.guessing.draft import Draft
+from axisight.logs.guessing.families import Family, families_of
+from axisight.logs.guessing.named import Fit, named_map
+from axisight.logs.guessing.others import (
+    take_joint_positions,
+    take_temperature,
+    take_targets,
+    take_torque,
+    take_velocity,
+)
+from axisight.logs.guessing.series import series_of
+from axisight.logs.guessing.write import text_of
+from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
+from axisight.logs.sources import Arrays, load_arrays
+from axisight.robot import Robot
+
+_NATIVE = ("time_s", "position_1", "torque_cmd_1")
+# Why a signal with that quantity in its name is not used, unless something better is known.
+_REASONS = {
+    "": "no word of its name is known",
+    "other": "of the tool, computed, or a bound, by its name",
+    "error": "a difference, by its name",
+    "acceleration": "logs have no accelerations",
+    "time": "another time",
+}
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed map: its TOML, and the map that this is.
+
+    ``named`` is the shipped map whose names the file has, None without one; then it is that map, but for
+    `axes` where the robot has fewer. ``doubts`` are choices that
+    others might be right for, ``unused`` says of every name that was left out why.
+    """
+
+    text: str
+    columns: AnyMap
+    named: str | None
+    doubts: tuple[str, ...]
+    unused: dict[str, str]
+
+
+def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
+    """Propose a column map for a log without one, from the names of its columns and their numbers.
+
+    Names give quantity, axis and, with a suffix or in brackets, unit. Numbers give units that no name says: of
+    the time by its steps, of angles and speeds as one is the derivative of the other, or by size.
+    Velocities that are no such derivatives, and what could be one of several columns, are left out and
+    said. ``robot`` gives the number, names and kinds of the axes.
+
+    Raises LogError, listing the columns seen, when no time or no position of any axis is found, and when
+    there are fewer axes than those of the robot; for a file that needs no map; and as `read_log` for a
+    file that cannot be read.
+    """
+    path = Path(path)
+    arrays, csv = _opened(path)
+    if set(_NATIVE) <= set(arrays):
+        raise LogError(
+            f"{path}: expected a log without the native columns, got one: it needs no map"
+        )
+    fit, against = named_map(arrays, robot, path)
+    if fit is not None:
+        return _named(path, fit)
+    series, unused = series_of(arrays)
+    joints = [] if robot is None else list(robot.axis_names)
+    families = families_of(series, joints)
+    draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
+    family = find_positions(draft)
+    take_time(draft, arrays)
+    settle_positions(draft, family)
+    for field in ("velocity", "velocity_ref"):
+        take_velocity(draft, field)
+    take_torque(draft)
+    take_targets(draft)
+    take_joint_positions(draft)
+    take_temperature(draft)
+    _leave_rest(draft)
+    text = text_of(draft)
+    return Proposal(
+        text, parse_column_map(text, f"{path}: guess"), None, tuple(draft.doubts), draft.unused
+    )
+
+
+def _named(path: Path, fit: Fit) -> Proposal:
+    """Return a shipped map as it is, or with the number of axes that the robot has."""
+    head = f"# The names of {path.name} are all those of this map, which ships as {fit.name}"
+    if fit.axes is None:
+        head += f":\n# --columns {fit.name} does without this file.\n#\n"
+    else:
+        head += f".\naxes = {fit.axes}  # those of the robot; the file has {fit.in_file}\n#\n"
+    text = head + named_map_text(fit.name)
+    doubts = () if fit.axes is None else (f"axes: the first {fit.axes} of {fit.in_file}",)
+    return Proposal(text, parse_column_map(text, f"{path}: guess"), fit.name, doubts, {})
+
+
+def _opened(path: Path) -> tuple[Arrays, CsvOptions]:
+    """Return the arrays of a file, of a CSV with the separator and decimal mark that its header shows."""
+    if path.suffix.lower() != ".csv":
+        return load_arrays(path), CsvOptions()
+    arrays = load_arrays(path, CsvOptions(separator="auto"))
+    if len(load_header(path, ",")) == len(arrays):
+        return arrays, CsvOptions()
+    numbers = [values.dtype.kind in "iuf" for values in arrays.values()]
+    comma = CsvOptions(separator="auto", decimal=",")
+    return (
+        (arrays, CsvOptions(separator="auto"))
+        if all(numbers)
+        else (load_arrays(path, comma), comma)
+    )
+
+
+def load_header(path: Path, separator: str) -> list[str]:
+    """Return the names in the first line of a CSV."""
+    with path.open(encoding="utf-8") as file:
+        return file.readline().split(separator)
+
+
+def _leave_rest(draft: Draft) -> None:
+    """Give every signal that is not used a reason."""
+    used = {id(one) for field in draft.fields for one in draft.signals(field)}
+    used |= {id(one) for signals in draft.torques for one, _ in signals}
+    for family in draft.families:
+        if family.label not in draft.unused and not any(
+            id(one) in used or one is draft.time or one.label in draft.unused
+            for one in family.signals.values()
+        ):
+            draft.leave([family], _reason(family))
+
+
+def _reason(family: Family) -> str:
+    quantity = family.meaning.quantity
+    if family.meaning.wanted:
+        return f"a target of the {quantity}"
+    return _REASONS.get(quantity, f"another {quantity}")

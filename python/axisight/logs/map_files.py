@@ -1,0 +1,64 @@
+"""Column maps as files: written by users, or shipped with the package under a name."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from axisight.errors import LogError
+from axisight.logs.columns import ColumnMap, describe_validation
+from axisight.logs.maps import MAPS
+from axisight.logs.patterns import ColumnPattern
+
+AnyMap = ColumnMap | ColumnPattern
+"""A map of so many axes, or one for any number of them."""
+
+
+def parse_column_map(text: str, where: str = "column map") -> AnyMap:
+    """Parse the TOML `text` of a column map. Raises LogError naming `where` and each bad field."""
+    try:
+        content = tomllib.loads(text)
+        kind = ColumnPattern if "every_axis" in content else ColumnMap
+        return kind.model_validate(content)
+    except tomllib.TOMLDecodeError as error:
+        raise LogError(f"{where}: expected TOML, got: {error}") from error
+    except ValidationError as error:
+        raise LogError(f"{where}: {describe_validation(error)}") from error
+
+
+def named_map_text(name: str) -> str:
+    """Return the TOML of a map that ships with the package. Raises LogError listing their names."""
+    if name not in MAPS:
+        raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {name!r}")
+    return _shipped(name).read_text("utf-8")
+
+
+def load_column_map(path: Path | str) -> AnyMap:
+    """Read a column map file, or the shipped one of that name (`ur-rtde`, `franka`, ...).
+
+    Raises LogError when it cannot be read or is not valid; for a file that is not there with the names
+    of the shipped ones.
+    """
+    if str(path) in MAPS:
+        return parse_column_map(named_map_text(str(path)), where=str(path))
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(
+            f"{path}: column map cannot be read: expected a file or one of {', '.join(MAPS)}: {error}"
+        ) from error
+    return parse_column_map(text, where=str(path))
+
+
+def column_file(path: Path) -> Path:
+    """Return the file that `load_column_map` reads for a path or a name."""
+    return Path(str(_shipped(str(path)))) if str(path) in MAPS else path
+
+
+def _shipped(name: str) -> Traversable:
+    return resources.files("axisight.logs.maps") / f"{name}.toml"

@@ -1,0 +1,12 @@
+"""Column maps that ship with the package: the names that makers and recorders give their signals."""
+
+from importlib import resources
+
+MAPS = tuple(
+    sorted(
+        file.name.removesuffix(".toml")
+        for file in resources.files(__name__).iterdir()
+        if file.name.endswith(".toml")
+    )
+)
+"""Names of the column maps in this folder."""

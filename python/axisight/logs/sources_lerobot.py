@@ -1,0 +1,89 @@
+"""Folders of LeRobot, versions 2 and 3: episodes in Parquet files under ``data``, ``meta/info.json`` beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from axisight.errors import LogError
+from axisight.logs.columns import describe_validation
+from axisight.logs.sources_parquet import load_parquet
+
+_INFO = Path("meta") / "info.json"
+_EPISODE = "episode_index"
+
+
+class _Info(BaseModel):
+    """What is used of ``meta/info.json``; the rest is about videos and tasks."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    total_episodes: Annotated[int, Field(ge=0)]
+
+
+def split_episode(path: Path) -> tuple[Path, int | None]:
+    """Return the folder and the episode of ``folder#3``; None without a choice."""
+    head, mark, number = path.name.rpartition("#")
+    if mark and head and number.isdecimal() and not path.exists():
+        return path.with_name(head), int(number)
+    return path, None
+
+
+def is_lerobot(path: Path) -> bool:
+    """Whether a path is a folder of LeRobot, with an episode after ``#`` or without."""
+    return (split_episode(path)[0] / _INFO).is_file()
+
+
+def files_of_episode(path: Path) -> list[Path]:
+    """Return the files that may hold the episode of a path, with the description of the folder."""
+    folder, episode = split_episode(path)
+    found = sorted((folder / "data").rglob("*.parquet"))
+    # Version 2 has a file for each; in version 3 many share one.
+    own = [file for file in found if file.stem == f"episode_{episode or 0:06d}"]
+    return [folder / _INFO, *(own or found)]
+
+
+def check_episode(path: Path) -> None:
+    """Raise LogError, naming the folder, for several episodes without a choice, or one that is not there."""
+    folder, episode = split_episode(path)
+    total = _info(folder / _INFO).total_episodes
+    if total == 0:
+        raise LogError(f"{folder}: total_episodes: expected at least one episode, got none")
+    if episode is None and total > 1:
+        raise LogError(
+            f"{folder}: expected the choice of an episode, {folder.name}#0 to {folder.name}#{total - 1}, "
+            f"got a folder with {total} of them"
+        )
+    if episode is not None and episode >= total:
+        raise LogError(
+            f"{folder}: expected an episode from 0 to {total - 1} after #, got {episode}"
+        )
+
+
+def load_lerobot(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the columns of one episode by name; `observation.state` becomes `observation.state[0]`, ...
+
+    The folder may be given alone where it has a single episode. Raises LogError for an episode without
+    rows, and whatever the reader raises on a damaged file.
+    """
+    number = split_episode(path)[1] or 0
+    filters = [(_EPISODE, "=", number)]
+    parts = [load_parquet(file, filters) for file in files_of_episode(path)[1:]]
+    parts = [part for part in parts if part and next(iter(part.values())).size]
+    if not parts:
+        raise LogError(f"expected rows with {_EPISODE} {number} below data, got none")
+    shared = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in shared}
+
+
+def _info(path: Path) -> _Info:
+    try:
+        return _Info.model_validate_json(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: cannot be read: {error}") from error
+    except ValidationError as error:
+        raise LogError(f"{path}: {describe_validation(error)}") from error
