@@ -14,6 +14,7 @@ from . import (
     robot_export,
     robot_file,
     robot_import,
+    signal_files,
     write_back,
 )
 from .effects import (
@@ -131,6 +132,7 @@ __all__ = [
     "robot_import",
     "robot_parameter",
     "robot_parameters",
+    "signal_files",
     "simulate",
     "simulate_batch",
     "to_mujoco",
