@@ -23,6 +23,7 @@ MODULES = (
     axisight.graybox,
     axisight.identifiability,
     axisight.montecarlo,
+    axisight.mujoco,
     axisight.records,
     axisight.rigid_body,
     axisight.robot_file,

@@ -125,5 +125,17 @@ SPRING_CHANGES = {
 }
 """Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
 
+WITH_MEMORY = frozenset(
+    {
+        "presliding_friction",
+        "friction_warmup",
+        "extra_mode",
+        "input_delay",
+        "actuator_bandwidth",
+        "current_loop",
+    }
+)
+"""Effects on motors and joints whose torque hangs on what was before."""
+
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""
