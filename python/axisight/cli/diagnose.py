@@ -188,8 +188,8 @@ def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Pat
         return
     made = write_back.write_model(source, robot, found.causes, target)
     OUT.print(f"model: {made.path}, with {', '.join(made.placed) or 'none'}", soft_wrap=True)
-    if made.left_out:
-        OUT.print(f"no place in it for {', '.join(made.left_out)}", soft_wrap=True)
+    for label in made.left_out:
+        OUT.print(f"no place in it for {label}: {made.why[label]}", soft_wrap=True)
 
 
 def _write_experiment(found: Diagnosis, folder: Path) -> None:

@@ -91,6 +91,15 @@ VISCOUS_FRICTION = "viscous_friction"
 ROTOR = "rotor_inertia"
 """What the inertia of a motor is that a model file leaves out."""
 
+MOTOR_INERTIA = "motor_inertia"
+"""What a rotor is that is heavier or lighter than the simulator's."""
+
+LINK_MASS, LINK_COM, LINK_INERTIA, LOAD = "link_mass", "link_com", "link_inertia", "payload"
+"""What a link is whose mass [1], centre of mass [m] or inertia [1] is another, and a load on the last link.
+
+Parameters: the relative change; the shift in the frame of the link; mass [kg] and place.
+"""
+
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
 """What a spring that pulls a joint to zero is, and its parameter."""
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.gap.faults import Finding
 from axisight.gap.separate.experiment import Experiment
 from axisight.storage import write_whole
@@ -123,6 +124,11 @@ class Cause:
     def label(self) -> str:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
         return label(self.effect, self.axis, self.axes)
+
+    def as_effect(self) -> Effect:
+        """Return the effect with the values that were found."""
+        values = {name: p.value for name, p in self.parameters.items()}
+        return Effect(self.effect, None if self.axes else self.axis, values, self.axes)
 
 
 @dataclass(frozen=True)

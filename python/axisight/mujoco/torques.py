@@ -27,20 +27,18 @@ _INSTEAD = {
 }
 
 
+def is_torque(effect: Effect) -> bool:
+    """Whether an effect is a torque of the angle, speed, load and command of one joint."""
+    return not _why_none(effect)
+
+
 def check_applicable(effects: Sequence[Effect], n_axes: int) -> None:
     """Raise InputError naming the first effect that is no torque of angle, speed, load and command.
 
     ``n_axes``: how many there are.
     """
     for effect in effects:
-        info = effect_info(effect.name)
-        why = _INSTEAD.get(info.acts, "")
-        if info.scope == "axes":
-            why = "it acts between two axes"
-        elif effect.name in WITH_MEMORY:
-            why = "it has a memory, and a torque of the moment has none"
-        elif (info.stands_for or ("",))[0] == "motor_inertia":
-            why = "it is an armature: write it into the model, write_back.write_model"
+        why = _why_none(effect)
         if why:
             raise InputError(
                 f"effect {effect.label!r}: expected one that is a torque of the joint's angle, speed, load "
@@ -50,6 +48,18 @@ def check_applicable(effects: Sequence[Effect], n_axes: int) -> None:
             raise InputError(
                 f"effect {effect.label!r}: axis: expected one from 1 to {n_axes}, got {effect.axis}"
             )
+
+
+def _why_none(effect: Effect) -> str:
+    """Return why an effect is no such torque, nothing where it is one."""
+    info = effect_info(effect.name)
+    if info.scope == "axes":
+        return "it acts between two axes"
+    if effect.name in WITH_MEMORY:
+        return "it has a memory, and a torque of the moment has none"
+    if (info.stands_for or ("",))[0] == "motor_inertia":
+        return "it is an armature: write it into the model, write_back.write_model"
+    return _INSTEAD.get(info.acts, "")
 
 
 class EffectTorques:
@@ -77,14 +87,19 @@ class EffectTorques:
         # The wheel k turns by the sum of all angles up to it, and its torque is felt by all of them.
         wheels = load - np.append(load[1:], 0.0)
         acceleration = np.diff(wheels, prepend=0.0)
-        rows = np.ones((len(speeds), 1))
-        motion = [rows * (x / self.ratio) for x in (angle, acceleration)]
-        record = (motion[0], speeds / self.ratio, motion[1], rows * command)
+        every = np.ones((len(speeds), 1))
+        record = (
+            every * (angle / self.ratio),
+            np.ascontiguousarray(speeds / self.ratio),
+            every * (acceleration / self.ratio),
+            every * command,
+            np.ones_like(speeds),
+        )
         found = _core.evaluate_inverse_dynamics(
             self._robot.core,
             self._others,
             [],
-            [(*(np.ascontiguousarray(x) for x in record), np.ones_like(speeds))],
+            [record],
             self._weighting,
             self._options,
         )

@@ -75,7 +75,8 @@ class Drive:
     """What a file says of the drive of a joint, on the joint side unless said otherwise.
 
     ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
-    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero.
+    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero; ``gain`` is
+    the motor's torque per command.
     """
 
     gear_ratio: float = 1.0
@@ -83,6 +84,7 @@ class Drive:
     damping: float = 0.0
     friction: float = 0.0
     spring: float = 0.0
+    gain: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

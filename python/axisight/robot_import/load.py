@@ -8,7 +8,7 @@ from typing import Any
 from axisight.errors import RobotError
 from axisight.robot.robot import MODEL_SUFFIXES, Robot
 from axisight.robot_import.bodies import Tree
-from axisight.robot_import.chain import chain_of
+from axisight.robot_import.chain import Chain, chain_of
 from axisight.robot_import.description import description
 from axisight.robot_import.dh import read_dh
 from axisight.robot_import.drives import DriveData, read_drives
@@ -65,10 +65,9 @@ def import_robot(
 
     """
     is_file = isinstance(source, str | Path)
-    tree = _tree(Path(source)) if is_file else tree_of(source)
     if not isinstance(drives, DriveData):
         drives = drive_data(source, drives)
-    chain = chain_of(tree, base or drives.base, tip or drives.tip)
+    tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
     if drives.sample_time is None:
         drives = drives.model_copy(update={"sample_time": sample_time_s})
     text = description(chain, drives, Path(source).name if is_file else "a pinocchio.Model")
@@ -76,6 +75,14 @@ def import_robot(
         return Robot.from_toml(text)
     except RobotError as error:
         raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
+
+
+def bodies_and_chain(
+    source: Path | str | Any, drives: DriveData, *, base: str | None = None, tip: str | None = None
+) -> tuple[Tree, Chain]:
+    """Return what a model has, and the chain that is made of it; arguments as for `import_robot`."""
+    tree = _tree(Path(source)) if isinstance(source, str | Path) else tree_of(source)
+    return tree, chain_of(tree, base or drives.base, tip or drives.tip)
 
 
 def _tree(path: Path) -> Tree:

@@ -136,6 +136,7 @@ class _Compiled:
                 float(model.dof_damping[dof]),
                 float(model.dof_frictionloss[dof]),
                 float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
+                self._gains().get(j, 1.0),
             )
         else:
             drive = Drive()
@@ -170,14 +171,21 @@ class _Compiled:
 
     def _ratios(self) -> dict[int, float]:
         """Return the gear ratio of joints that one motor drives: one over its gear."""
+        found = self._motors(self.model.actuator_gear[:, 0])
+        return {j: 1.0 / g for j, g in found.items() if g != 0}
+
+    def _gains(self) -> dict[int, float]:
+        """Return the torque per command of joints that one motor drives."""
+        return self._motors(self.model.actuator_gainprm[:, 0])
+
+    def _motors(self, values: Array) -> dict[int, float]:
+        """Return values of actuators by joint, of joints that one motor drives."""
         model, kinds = self.model, self.mujoco.mjtTrn
         found: dict[int, list[float]] = {}
         for i in range(model.nu):
             if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT) and _is_motor(model, i):
-                found.setdefault(int(model.actuator_trnid[i, 0]), []).append(
-                    float(model.actuator_gear[i, 0])
-                )
-        return {j: 1.0 / g[0] for j, g in found.items() if len(g) == 1 and g[0] != 0}
+                found.setdefault(int(model.actuator_trnid[i, 0]), []).append(float(values[i]))
+        return {j: x[0] for j, x in found.items() if len(x) == 1}
 
     def _notes(self, ratios: dict[int, float]) -> list[str]:
         """Return what of the file a serial chain with drives does not say."""
@@ -221,10 +229,16 @@ class _Compiled:
         return self.lines.get((tag, name), f"{self.path}, <{tag} {name!r}>")
 
 
+# Torque per command of what may still be a motor: others have commands that are no torques.
+_GAINS = (0.2, 3.0)
+
+
 def _is_motor(model: Any, i: int) -> bool:
-    """Whether an actuator is a source of torque: gain one, no bias, no state of its own."""
+    """Whether an actuator is a source of torque: a gain about one, no bias, no state of its own."""
     plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
-    return bool(plain and model.actuator_dyntype[i] == 0 and model.actuator_gainprm[i, 0] == 1)
+    low, high = _GAINS
+    torque = low <= model.actuator_gainprm[i, 0] <= high
+    return bool(plain and torque and model.actuator_dyntype[i] == 0)
 
 
 def _rotation(quaternion: Array) -> Array:
