@@ -108,7 +108,7 @@ MACHINES = {
         "coulomb_friction@2", "axis='0 1 0' damping", "axis='0 1 0' frictionloss=\"25\" damping"
     ),
     "viscous friction": Machine("viscous_friction@1", 'damping="4"', 'damping="22"'),
-    "rotor": Machine("rotor_inertia@3", 'armature="0.4"', 'armature="1.6"'),
+    "rotor": Machine("motor_inertia@3", 'armature="0.4"', 'armature="1.6"'),
     "heavier link": Machine("link_mass@2", 'mass="14"', 'mass="22"'),
     "other centre": Machine("link_com@3", 'pos="0.15 0 0.02"', 'pos="0.2 0.02 0.05"'),
     "load": Machine(

@@ -173,6 +173,17 @@ def test_an_mjcf_has_gains_springs_and_rotors(tmp_path: Path):
     assert 'gainprm="1.02"/>' in other.path.read_text()
 
 
+def test_a_motor_with_an_end_tag_becomes_general(tmp_path: Path):
+    text = changed(
+        MJCF, '<motor joint="shoulder" gear="50"/>', '<motor joint="shoulder" gear="50"> </motor>'
+    )
+    source = written(tmp_path, text, "arm.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "new.xml")
+    line = '<general joint="shoulder" gear="50" gainprm="1.07"> </general>'
+    assert line in made.path.read_text()
+    assert [e.label for e in load_robot(made.path).effects if e.name == GAIN.effect] == [GAIN.label]
+
+
 def test_only_numbers_that_change_are_written(tmp_path: Path):
     source = written(tmp_path, MJCF, "arm.xml")
     made = write_model(source, load_robot(source), [HEAVIER], tmp_path / "new.xml")
@@ -203,6 +214,15 @@ def test_a_body_of_shapes_gets_an_inertial(tmp_path: Path):
     assert made.why == {"link_mass@1": "the compiler option settotalmass makes masses of its own"}
 
 
+def test_a_body_of_another_file_stays(tmp_path: Path):
+    inner = MJCF[MJCF.index('      <body name="lower"') : MJCF.index("    </body>\n  </worldbody>")]
+    written(tmp_path, f"<mujoco>{inner}</mujoco>", "lower.xml")
+    source = written(tmp_path, changed(MJCF, inner, '<include file="lower.xml"/>'), "arm.xml")
+    made = write_model(source, load_robot(source), [HEAVIER, LOAD], tmp_path / "new.xml")
+    assert made.placed == ("link_mass@1",)
+    assert made.why == {"payload": "'lower' stands in another file or has no name"}
+
+
 def test_what_has_no_place_is_told_why(tmp_path: Path):
     source = written(tmp_path, MJCF, "arm.xml")
     robot = load_robot(source)
@@ -222,6 +242,18 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
         "link_inertia@2": "'lower' has no mass of its own",
         "torque_constant@2": "expected one motor of the joint that has a gain, got none",
     }
+    other = written(
+        tmp_path, changed(MJCF, "stiffness=", 'springref="0.4" stiffness='), "other.xml"
+    )
+    made = write_model(
+        other,
+        load_robot(other),
+        [several("cable_stiffness", 1, stiffness_nm_rad=4.0)],
+        tmp_path / "o.xml",
+    )
+    assert made.why == {"cable_stiffness@1": "the joint's spring pulls to another place than zero"}
+    made = write_model(source, load_robot("scara_like"), [LOAD], tmp_path / "s.xml")
+    assert made.why == {"payload": "the robot is not the chain that the file says"}
     urdf = written(tmp_path, URDF)
     made = write_model(urdf, load_robot(urdf), [thinner, ripple], tmp_path / "new.urdf")
     assert made.why == {

@@ -42,10 +42,14 @@ class Edits:
             made = _attribute(name).sub(b"", made, count=1)
         for name, value in attributes.items():
             made = _with(made, name, value)
+        end = start + len(old)
         if tag:
             made = b"<" + tag.encode() + made[1 + len(element.tag.encode()) :]
+            if not old.endswith(b"/>"):
+                blanks, end = self._closed(element, end)
+                made += blanks + b"</" + tag.encode() + b">"
         lead = _comment(comment) + self._indent(start) if comment else b""
-        self._replace(start, start + len(old), lead + made)
+        self._replace(start, end, lead + made)
 
     def add(
         self, element: Element, child: str, attributes: Mapping[str, Numbers], comment: str = ""
@@ -82,6 +86,13 @@ class Edits:
         if found is None:
             raise RobotError(f"{element.where}: its text cannot be edited")
         return found.start(), found.group()
+
+    def _closed(self, element: Element, start: int) -> tuple[bytes, int]:
+        """Return the text of an element without content, which begins at ``start``, and where it ends."""
+        found = re.compile(rb"([^<]*)</[^>]*>").match(self.text, start)
+        if found is None:
+            raise RobotError(f"{element.where}: expected no content, its text cannot be edited")
+        return found.group(1), found.end()
 
     def _indent(self, start: int) -> bytes:
         """Return the line break and the blanks before an element; nothing where it follows another."""
