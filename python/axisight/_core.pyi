@@ -293,13 +293,16 @@ class Robot:
     def position_noise_std(self) -> float:
         """Standard deviation of the motor position measurement [rad], white, per sample."""
     @property
-    def controller_kind(self) -> Literal["pi_velocity", "p_velocity", "cascade", "none"]:
+    def controller_kind(
+        self,
+    ) -> Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]:
         """Kind of controller."""
     @property
     def controller_gains(self) -> dict[str, _Array]:
         """Gains by name, shape (n_axes,) each, motor side.
 
-        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s]. ``pd_position`` has ``kp``
+        [Nm/rad] and ``kd`` [Nm s/rad].
         """
     @property
     def gravity_m_s2(self) -> list[float]:
@@ -323,6 +326,13 @@ class Robot:
         """Return the same robot with a controller for a loop so many times as fast as stated."""
     def with_effects(self, effects: _Effects) -> Robot:
         """Return the same robot with other effects of its own; raises InputError."""
+    def with_operating_point(self, angle: Sequence[float]) -> Robot:
+        """Return the same robot with another operating point [rad]; raises InputError."""
+    @property
+    def velocity_feedforward(self) -> bool:
+        """Whether a controller with targets of positions takes their rate as its speed reference."""
+    def with_velocity_feedforward(self, on: bool) -> Robot:
+        """Return the same robot with or without it; raises InputError for another controller."""
     @property
     def tolerances(self) -> list[tuple[str, float]]:
         """Relative standard deviation [1] of its own parameters by quantity, where stated."""

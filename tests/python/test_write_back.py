@@ -184,6 +184,24 @@ def test_a_motor_with_an_end_tag_becomes_general(tmp_path: Path):
     assert [e.label for e in load_robot(made.path).effects if e.name == GAIN.effect] == [GAIN.label]
 
 
+def test_defaults_do_not_make_a_motor_a_servo(tmp_path: Path):
+    """What a file has for all <general> does not reach the one that a <motor> becomes; a servo stays."""
+    servos = '<default><general biastype="affine" gainprm="400" biasprm="0 -400 -20"/></default>'
+    text = changed(MJCF, "  <worldbody>", f"  {servos}\n  <worldbody>")
+    source = written(tmp_path, text, "arm.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "new.xml")
+    line = 'gear="50" gainprm="1.07" gaintype="fixed" biastype="none" dyntype="none"/>'
+    assert line in made.path.read_text()
+    again = load_robot(made.path)
+    assert [e.label for e in again.effects if e.name == GAIN.effect] == [GAIN.label]
+    assert write_model(made.path, again, [GAIN], tmp_path / "more.xml").left_out == ()
+    source = written(tmp_path, changed(text, "<motor", "<general"), "servo.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "other.xml")
+    assert made.why == {
+        GAIN.label: "expected one motor of the joint that has a gain, got <general>"
+    }
+
+
 def test_only_numbers_that_change_are_written(tmp_path: Path):
     source = written(tmp_path, MJCF, "arm.xml")
     made = write_model(source, load_robot(source), [HEAVIER], tmp_path / "new.xml")

@@ -17,6 +17,7 @@ use pyo3::types::PyDict;
 
 /// A robot description with its rigid-body algorithms.
 #[pyclass(frozen, module = "axisight._core")]
+#[derive(Clone)]
 pub struct Robot {
     pub description: RobotDescription,
     body: RigidBody,
@@ -26,8 +27,15 @@ pub struct Robot {
 }
 
 /// What pickle keeps of a robot: its text, the changes made to it, the speed of its controller,
-/// its effects.
-type Kept = (String, Vec<(String, f64)>, f64, Vec<EffectTuple>);
+/// its effects, its operating point, whether its controller feeds speed forward.
+type Kept = (
+    String,
+    Vec<(String, f64)>,
+    f64,
+    Vec<EffectTuple>,
+    Vec<f64>,
+    bool,
+);
 
 type Matrix2<'py> = Bound<'py, PyArray2<f64>>;
 type Matrix3<'py> = Bound<'py, PyArray3<f64>>;
@@ -135,13 +143,18 @@ impl Robot {
         let stated = read_robot(&self.source).map_err(input_error)?;
         let mut description = self.description.clone();
         description.controller = stated.controller.at_speed(factor);
-        Ok(Self {
+        let out = Self {
             body: self.body.clone(),
             description,
             source: self.source.clone(),
             changes: self.changes.clone(),
             controller_speed: factor,
-        })
+        };
+        let on = self.velocity_feedforward();
+        if out.velocity_feedforward() == on {
+            return Ok(out);
+        }
+        out.with_velocity_feedforward(on)
     }
 
     /// Effects that the simulator of this robot has.
@@ -164,6 +177,46 @@ impl Robot {
         })
     }
 
+    /// The same robot with another operating point.
+    fn with_operating_point(&self, angle: Vec<f64>) -> PyResult<Self> {
+        let expected = self.description.n_axes();
+        if angle.len() != expected || angle.iter().any(|x| !x.is_finite()) {
+            return Err(input_error(format!(
+                "angle: expected {expected} finite numbers, got {angle:?}"
+            )));
+        }
+        let mut out = self.clone();
+        out.description.operating_point = angle;
+        Ok(out)
+    }
+
+    /// Whether a controller with targets of positions takes their rate as the reference of its speed.
+    #[getter]
+    fn velocity_feedforward(&self) -> bool {
+        !matches!(
+            self.description.controller,
+            Controller::PdPosition {
+                feeds_speed: false,
+                ..
+            }
+        )
+    }
+
+    /// The same robot whose controller with targets of positions has none of speed, or their rate.
+    fn with_velocity_feedforward(&self, on: bool) -> PyResult<Self> {
+        let mut out = self.clone();
+        match &mut out.description.controller {
+            Controller::PdPosition { feeds_speed, .. } => *feeds_speed = on,
+            _ => {
+                return Err(input_error(format!(
+                    "controller: expected kind pd_position, got {}",
+                    self.controller_kind()
+                )));
+            }
+        }
+        Ok(out)
+    }
+
     /// Relative standard deviation of the robot's own parameters by quantity, where stated.
     #[getter]
     fn tolerances(&self) -> Vec<(String, f64)> {
@@ -177,11 +230,18 @@ impl Robot {
         changes: Vec<(String, f64)>,
         controller_speed: f64,
         effects: Vec<EffectTuple>,
+        operating_point: Vec<f64>,
+        velocity_feedforward: bool,
     ) -> PyResult<Self> {
-        Self::from_toml(text)?
+        let robot = Self::from_toml(text)?
             .with_parameters(changes)?
             .with_controller_speed(controller_speed)?
-            .with_effects(effects)
+            .with_effects(effects)?
+            .with_operating_point(operating_point)?;
+        if velocity_feedforward == robot.velocity_feedforward() {
+            return Ok(robot);
+        }
+        robot.with_velocity_feedforward(velocity_feedforward)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
@@ -192,6 +252,8 @@ impl Robot {
             robot.changes.clone(),
             robot.controller_speed,
             robot.effects(),
+            robot.description.operating_point.clone(),
+            robot.velocity_feedforward(),
         );
         Ok((maker, kept))
     }
@@ -274,6 +336,7 @@ impl Robot {
             Controller::PiVelocity { .. } => "pi_velocity",
             Controller::PVelocity { .. } => "p_velocity",
             Controller::Cascade { .. } => "cascade",
+            Controller::PdPosition { .. } => "pd_position",
             Controller::None => "none",
         }
     }
@@ -292,6 +355,10 @@ impl Robot {
                 set("kv", kv)?;
                 set("kp", kp)?;
                 set("ki", ki)?;
+            }
+            Controller::PdPosition { kp, kd, .. } => {
+                set("kp", kp)?;
+                set("kd", kd)?;
             }
             Controller::None => {}
         }

@@ -282,8 +282,8 @@ def fit(
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
-    """Whether a simulation can run as the logs did: a controller, and references to all of them."""
-    return robot.controller_kind != "none" and all(
+    """Whether a simulation can run as the logs did: a controller of speed, and references to all of them."""
+    return robot.controller_kind not in ("none", "pd_position") and all(
         log.velocity_ref_rad_s is not None for log in logs
     )
 

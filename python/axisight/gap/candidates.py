@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
-from axisight.gap.starts import STARTS, Place, Response, Situation, Trial
+from axisight.gap.starts import STARTS, TARGET_STARTS, Place, Response, Situation, Trial
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -55,6 +55,7 @@ def all_candidates(
     at: Situation,
     *,
     inverse_dynamics: bool = False,
+    by_targets: bool = False,
     threads: int = 1,
 ) -> list[FreeEffect]:
     """Return one candidate per effect and place that can act on this robot and has a gap.
@@ -69,7 +70,8 @@ def all_candidates(
         if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
     ]
     with ThreadPoolExecutor(threads) as pool:
-        found = pool.map(lambda t: STARTS[t.info.name](t), trials)
+        starts = {**STARTS, **TARGET_STARTS} if by_targets else STARTS
+        found = pool.map(lambda t: starts[t.info.name](t), trials)
         out = [candidate for candidate in found if candidate is not None]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,6 +206,9 @@ class ClosedLoopFitter(ModelFitter):
     follow it, (n, n_axes).
     """
 
+    driven_by: ClassVar[Literal["tracking", "reference"]] = "tracking"
+    compared: ClassVar[Literal["torque", "position"]] = "torque"
+
     def __init__(
         self,
         robot: Robot,
@@ -263,8 +267,8 @@ class ClosedLoopFitter(ModelFitter):
         return _core.fit_simulation(
             *self._problem(effects, parameters),
             options,
-            input="tracking",
-            output="torque",
+            input=self.driven_by,
+            output=self.compared,
             warm=warm,
             courses=near,
             cancel=self.cancel,
@@ -277,8 +281,8 @@ class ClosedLoopFitter(ModelFitter):
         return _core.courses(
             *self._problem(effects, parameters),
             options,
-            input="tracking",
-            output="torque",
+            input=self.driven_by,
+            output=self.compared,
             cancel=self.cancel,
         )
 
@@ -294,8 +298,8 @@ class ClosedLoopFitter(ModelFitter):
         return _core.evaluate_simulation(
             *self._problem(effects, parameters),
             options,
-            input="tracking",
-            output="torque",
+            input=self.driven_by,
+            output=self.compared,
             warm=warm,
             courses=near,
             cancel=self.cancel,

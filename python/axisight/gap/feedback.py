@@ -49,6 +49,9 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
     kp, ki = gains["kp"], gains.get("ki", 0.0)
     back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
     out = (1 - back) / time
+    if robot.controller_kind == "pd_position":
+        out = gains["kd"] * out + kp
+        return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
     # The error of a cascade is summed up to the sample before.
     cascade = "kv" in gains
     summed = ki * time * back / (1 - back)

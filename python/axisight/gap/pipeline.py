@@ -24,7 +24,7 @@ from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
-from axisight.gap.gate import pass_gate
+from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.modes import view_of
@@ -36,6 +36,7 @@ from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.straight import bent_for
+from axisight.gap.targets import with_commands
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
@@ -96,12 +97,19 @@ def diagnose(
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
-    noted = pass_gate(machine, fit_logs, held_logs)
+    n_fit = len(fit_logs)
+    commanded = with_commands(machine, [*fit_logs, *held_logs])
+    if commanded is not None:
+        machine, logs = commanded.robot, commanded.as_logged()
+        noted = pass_gate_by_targets(machine, logs[:n_fit], logs[n_fit:])
+        fit_logs, held_logs = list(commanded.logs[:n_fit]), list(commanded.logs[n_fit:])
+    else:
+        noted = pass_gate(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
     recovered = with_references(machine, [*fit_logs, *held_logs])
     if recovered is not None:
-        fit_logs, held_logs = recovered[: len(fit_logs)], recovered[len(fit_logs) :]
-    view = view_of(machine, fit_logs, held_logs, chosen)
+        fit_logs, held_logs = recovered[:n_fit], recovered[n_fit:]
+    view = view_of(machine, fit_logs, held_logs, chosen, commanded)
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     found = believed_by_axis(found, view.fitter, chosen)
     progress("measuring the gap", 0, 1)
@@ -117,7 +125,8 @@ def diagnose(
         if experiment is not None:
             out = replace(out, experiment=experiment, next_experiment=str(experiment))
     if signals:
-        out = replace(out, signals=signals_of(view, held_logs, seen.reach.simulator))
+        after = seen.reach.simulator
+        out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
     out.provenance["references"] = "logged" if view.mode == "closed_loop" else None
     if recovered is not None:
         out = replace(out, checks=(*out.checks, SAYS))

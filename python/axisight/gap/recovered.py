@@ -47,7 +47,8 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     where they are as noisy as measured speeds: the torque is not that of this controller.
     """
     missing = all(log.velocity_ref_rad_s is None for log in logs)
-    if robot.controller_kind == "none" or not missing or rigid_below_hz(robot) == np.inf:
+    of_speed = robot.controller_kind not in ("none", "pd_position")
+    if not of_speed or not missing or rigid_below_hz(robot) == np.inf:
         return None
     if np.any(np.asarray(robot.controller_gains["kp"]) <= 0):
         return None

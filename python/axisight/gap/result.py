@@ -219,8 +219,8 @@ class Diagnosis:
     axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
     simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
     ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
-    less measured. Attributes are ``log``, ``role``, ``mode``, and ``lowpass_hz`` where all signals are low-passed:
-    by inverse dynamics.
+    less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
+    ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
     """
 
     name: str

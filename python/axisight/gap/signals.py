@@ -21,10 +21,13 @@ SIGNALS = {
 """What there is of every log, and what it is."""
 
 
-def signals_of(view: View, held_out: Sequence[Log], after: Variant) -> tuple[xr.Dataset, ...]:
+def signals_of(
+    view: View, held_out: Sequence[Log], after: Variant, *, logged: bool = True
+) -> tuple[xr.Dataset, ...]:
     """Return the signals of the estimation logs of a view, then those of ``held_out``.
 
-    ``after``: the simulator with the causes. Of each log a Dataset as `Diagnosis.signals` describes.
+    ``after``: the simulator with the causes; ``logged``: whether torques were, and are not what the stated
+    controller commands. Of each log a Dataset as `Diagnosis.signals` describes.
     """
     logs = [*view.logs, *held_out]
     roles = ["estimation"] * len(view.logs) + ["validation"] * len(held_out)
@@ -48,18 +51,19 @@ def signals_of(view: View, held_out: Sequence[Log], after: Variant) -> tuple[xr.
                         ["N" if p else "Nm" for p in view.robot.axis_is_prismatic],
                     ),
                 },
-                attrs={"log": log.name, "role": role, **_how(view)},
+                attrs={"log": log.name, "role": role, **_how(view, logged)},
             )
         )
     return tuple(out)
 
 
-def _how(view: View) -> dict[str, str | float]:
+def _how(view: View, logged: bool) -> dict[str, str | float]:
     """Return how simulator and logs were compared."""
     out: dict[str, str | float] = {
         "mode": view.mode,
         "side": "motor",
         "residual": "simulated less measured",
+        "torque": "logged" if logged else "what the controller makes of positions",
     }
     if view.cutoff_hz is not None:
         out["lowpass_hz"] = view.cutoff_hz

@@ -28,6 +28,14 @@ def simulated_torques(
     return _along(changed, logs, threads, effects=variant.effects)
 
 
+def simulated_positions(
+    robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
+) -> list[Array]:
+    """Return the same of the motor positions (n, n_axes) [rad]."""
+    changed = robot.with_parameters(variant.robot_values)
+    return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
+
+
 def _along(
     robot: Robot,
     logs: Sequence[Log],
@@ -35,8 +43,9 @@ def _along(
     *,
     effects: Sequence[Effect] = (),
     noise: Sequence[Array] | None = None,
+    signal: str = "torque_cmd_nm",
 ) -> list[Array]:
-    """Return the torque commanded along the references of logs, which may differ in length."""
+    """Return a signal along the references of logs, which may differ in length."""
     references = _padded([_reference(log) for log in logs])
     out = simulate_batch(
         robot,
@@ -46,8 +55,8 @@ def _along(
         noise=None if noise is None else _padded(noise),
         threads=threads,
     )
-    torque = out["torque_cmd_nm"].values
-    return [torque[i, : log.n_samples] for i, log in enumerate(logs)]
+    values = out[signal].values
+    return [values[i, : log.n_samples] for i, log in enumerate(logs)]
 
 
 def _padded(rows: Sequence[Array]) -> Array:

@@ -506,3 +506,16 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "rotor_inertia": _neutral,
 }
 """By effect."""
+
+# Where positions alone are compared, nothing shows at what speed friction turns round; a law that turns
+# within a sample chatters.
+_TURNS_SLOWLY = 0.05
+
+TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
+    "coulomb_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
+    "asymmetric_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
+    "load_dependent_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
+    # No logged torque tells a controller: a fit has to.
+    "controller_gain": _neutral,
+}
+"""Of those that begin otherwise where positions are compared under the same targets."""

@@ -56,6 +56,12 @@ class View(ABC):
 
         On ``axes`` (from 1), by default those where it leaves something worth a cause.
         """
+        return self._candidates(model, axes)
+
+    def _candidates(
+        self, model: Evidence, axes: Collection[int] | None, *, by_targets: bool = False
+    ) -> list[FreeEffect]:
+        """Return them; ``by_targets``: where positions are compared, not torques."""
         enough = self.floor.expected + self.settings.smallest_gain
         if axes is not None:
             # A square is more than less than nothing, and less than infinity.
@@ -74,6 +80,7 @@ class View(ABC):
             self.logs,
             at,
             inverse_dynamics=self.mode == "inverse_dynamics",
+            by_targets=by_targets,
             threads=self.settings.threads,
         )
         return [f for f in found if f.effect.label not in self.not_offered]

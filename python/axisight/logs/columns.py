@@ -106,10 +106,11 @@ class TemperatureColumn(_Signal):
 
 
 class AxisColumns(_Strict):
-    """The signals of one driven axis."""
+    """The signals of one driven axis: its position, and its torque or the targets of its position."""
 
     position: PositionColumn
-    torque: TorqueColumn
+    torque: TorqueColumn | None = None
+    position_ref: PositionColumn | None = None
     velocity_ref: VelocityColumn | None = None
     velocity: VelocityColumn | None = None
     joint_position: PositionColumn | None = None
@@ -123,7 +124,9 @@ class AxisColumns(_Strict):
     @model_validator(mode="after")
     def _one_kind(self) -> AxisColumns:
         wrong = REVOLUTE_UNITS if self.prismatic else PRISMATIC_UNITS
-        for field in ("torque", "velocity_ref", "velocity", "joint_position"):
+        if self.torque is None and self.position_ref is None:
+            raise ValueError("torque: expected a column, or position_ref in its place")
+        for field in ("torque", "position_ref", "velocity_ref", "velocity", "joint_position"):
             signal = getattr(self, field)
             if signal is not None and signal.unit in wrong:
                 raise ValueError(

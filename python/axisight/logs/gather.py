@@ -78,7 +78,7 @@ def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> ColumnMap:
 
 
 # How a motor's signal follows from the joint's, by the power of the gear ratio r (joint per motor angle).
-_POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "torque": 1}
+_POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "position_ref": -1, "torque": 1}
 
 
 def _to_motors(result: Gathered, robot: Robot) -> None:

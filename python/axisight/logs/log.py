@@ -27,6 +27,7 @@ RESAMPLED = "resampled linearly"
 _VARIABLES = {
     "position_rad": ("position", "rad", "m"),
     "torque_nm": ("torque", "Nm", "N"),
+    "position_ref_rad": ("position_ref", "rad", "m"),
     "velocity_ref_rad_s": ("velocity_ref", "rad/s", "m/s"),
     "velocity_rad_s": ("velocity", "rad/s", "m/s"),
     "joint_position_rad": ("joint_position", "rad", "m"),
@@ -34,16 +35,22 @@ _VARIABLES = {
 }
 
 
+def not_logged(shape: tuple[int, ...]) -> Floats:
+    """Return the torque of a log without one."""
+    return np.full(shape, np.nan)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Log:
     """A run of `n` samples on `axes` driven axes.
 
     `time_s` has shape (n,), starts at 0 and is uniform with step `sample_time_s` (s). Every other
-    array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm),
-    `velocity_ref_rad_s` and `velocity_rad_s` (rad/s), joint-side `joint_position_rad` (rad) and
-    `temperature_c` (degC). Optional arrays are None when the log has none of them; a measured
-    optional array holds NaN in the columns of axes without that sensor. On an axis whose
-    `axis_kinds` entry is "prismatic", rad reads m and Nm reads N.
+    array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm; NaN throughout where
+    it was not logged), `position_ref_rad` (rad, targets of the position), `velocity_ref_rad_s` and
+    `velocity_rad_s` (rad/s), joint-side `joint_position_rad` (rad) and `temperature_c` (degC).
+    Optional arrays are None when the log has none of them; a measured optional array holds NaN in
+    the columns of axes without that sensor. On an axis whose `axis_kinds` entry is "prismatic", rad
+    reads m and Nm reads N.
 
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
     (time grid replaced, resampled). Raises InputError when shapes disagree.
@@ -55,6 +62,7 @@ class Log:
     torque_nm: Floats
     position_rad: Floats
     source: Path
+    position_ref_rad: Floats | None = None
     velocity_ref_rad_s: Floats | None = None
     velocity_rad_s: Floats | None = None
     joint_position_rad: Floats | None = None
@@ -81,6 +89,11 @@ class Log:
             object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
         if len(self.axis_kinds) != shape[1]:
             raise InputError(f"axis_kinds: expected {shape[1]} entries, got {len(self.axis_kinds)}")
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether torque was logged."""
+        return not np.isnan(self.torque_nm).all()
 
     @property
     def n_axes(self) -> int:

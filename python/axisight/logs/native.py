@@ -13,12 +13,12 @@ from axisight.logs.columns import ColumnMap
 NATIVE_STEMS = {
     "position": ("position", "rad"),
     "torque": ("torque_cmd", "Nm"),
+    "position_ref": ("position_ref", "rad"),
     "velocity_ref": ("velocity_ref", "rad/s"),
     "velocity": ("velocity", "rad/s"),
     "joint_position": ("joint_position", "rad"),
     "temperature": ("temperature_c", "degC"),
 }
-_REQUIRED = ("position", "torque")
 _PATTERN = re.compile(
     r"^(" + "|".join(stem for stem, _ in NATIVE_STEMS.values()) + r")_([1-9]\d*)$"
 )
@@ -39,12 +39,17 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
             f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1, "
             f"... or a column map, got {listed}"
         )
+    stems = {match.group(1) for name in present if (match := _PATTERN.match(name))}
+    # Targets of positions stand in for torques where there are none at all.
+    required = {"position", "torque"}
+    if "position_ref" in stems and "torque_cmd" not in stems:
+        required = {"position", "position_ref"}
     axes = []
     for number in range(1, max(numbers) + 1):
         axis: dict[str, Any] = {}
         for field, (stem, unit) in NATIVE_STEMS.items():
             name = f"{stem}_{number}"
-            if field in _REQUIRED or name in present:
+            if field in required or name in present:
                 axis[field] = {"name": name, "unit": unit}
         axes.append(axis)
     return ColumnMap.model_validate({"time": {"name": "time_s", "unit": "s"}, "axis": axes})

@@ -12,7 +12,7 @@ from axisight.logs.columns import ColumnMap
 from axisight.logs.findings import raise_errors
 from axisight.logs.gather import Gathered, gather
 from axisight.logs.grid import Grid, make_grid
-from axisight.logs.log import Floats, Log
+from axisight.logs.log import Floats, Log, not_logged
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
 if TYPE_CHECKING:
@@ -82,14 +82,14 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
 
     position, torque = matrix("position"), matrix("torque")
     assert position is not None
-    assert torque is not None
     return Log(
         name=found.path.stem,
         sample_time_s=grid.sample_time_s,
         time_s=time_s,
-        torque_nm=torque,
+        torque_nm=not_logged(position.shape) if torque is None else torque,
         position_rad=position,
         source=found.path,
+        position_ref_rad=matrix("position_ref"),
         velocity_ref_rad_s=matrix("velocity_ref"),
         velocity_rad_s=matrix("velocity"),
         joint_position_rad=matrix("joint_position"),

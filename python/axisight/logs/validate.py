@@ -23,22 +23,23 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
                 "error", "axis", f"expected {n_axes} axes, got columns for {got}", "axes_differ"
             )
         )
-    with_ref = [
-        number for number, axis in enumerate(found.columns.axis, 1) if axis.velocity_ref is not None
-    ]
-    if with_ref and len(with_ref) != got:
-        missing = sorted(set(range(1, got + 1)) - set(with_ref))
-        findings.append(
-            Finding(
-                "error",
-                f"velocity_ref_{missing[0]}",
-                f"expected a velocity reference for all {got} axes or for none, got it for axes "
-                f"{', '.join(map(str, with_ref))}",
-                "reference_missing",
-                missing[0],
-            )
-        )
-    return findings
+    findings += _partly(found, "velocity_ref", "a velocity reference", "reference_missing")
+    findings += _partly(found, "position_ref", "a target of the position", "reference_missing")
+    return findings + _partly(found, "torque", "a torque", "torque_missing")
+
+
+def _partly(found: Gathered, field: str, words: str, name: str) -> list[Finding]:
+    """Return a finding if only some axes have a signal."""
+    axes = found.columns.axis
+    having = [number for number, axis in enumerate(axes, 1) if getattr(axis, field) is not None]
+    if not having or len(having) == len(axes):
+        return []
+    missing = min(set(range(1, len(axes) + 1)) - set(having))
+    message = (
+        f"expected {words} for all {len(axes)} axes or for none, got it for axes "
+        f"{', '.join(map(str, having))}"
+    )
+    return [Finding("error", f"{field}_{missing}", message, name, missing)]
 
 
 def check_lengths(found: Gathered) -> list[Finding]:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
 """How the names of files end that say a robot in another format."""
 
-ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "none"]
+ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]
 
 
 class Robot:
@@ -152,14 +152,15 @@ class Robot:
 
     @property
     def controller_kind(self) -> ControllerKind:
-        """``pi_velocity``, ``p_velocity``, ``cascade``, or ``none``."""
+        """``pi_velocity``, ``p_velocity``, ``cascade``, ``pd_position``, or ``none``."""
         return self.core.controller_kind
 
     @property
     def controller_gains(self) -> dict[str, Array]:
         """Gains by name, shape (n_axes,) each, motor side.
 
-        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s].
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s]. ``pd_position`` has ``kp``
+        [Nm/rad] and ``kd`` [Nm s/rad].
         """
         return self.core.controller_gains
 
@@ -174,10 +175,34 @@ class Robot:
         """
         return Robot(self.core.with_parameters(list(values.items())))
 
+    @property
+    def velocity_feedforward(self) -> bool:
+        """Whether the rate of the references is the reference of the controller's speed.
+
+        Always so but where targets are positions (``pd_position``) and the file says otherwise, or logs
+        have no references of speed.
+        """
+        return self.core.velocity_feedforward
+
+    def with_velocity_feedforward(self, on: bool) -> Robot:
+        """Return the same robot with its speed reference switched on or off.
+
+        Raises InputError unless its controller is ``pd_position``.
+        """
+        return Robot(self.core.with_velocity_feedforward(on))
+
+    def with_operating_point(self, angle_rad: ArrayLike) -> Robot:
+        """Return the same robot at rest at other driven joint angles (n_axes,) [rad or m].
+
+        Raises InputError for another number of angles, or ones that are not finite.
+        """
+        return Robot(self.core.with_operating_point(np.asarray(angle_rad, float).tolist()))
+
     def with_controller_speed(self, factor: float) -> Robot:
         """Return the same robot with a controller for a loop ``factor`` times as fast as stated.
 
-        ``kp`` and ``kv`` times the factor, ``ki`` times its square: the shape of the loop stays.
+        Gains of speed times the factor, of angle times its square (``kv`` of a cascade times the factor):
+        the shape of the loop stays.
         Raises InputError unless the factor is positive.
         """
         return Robot(self.core.with_controller_speed(factor))

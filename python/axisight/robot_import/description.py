@@ -69,27 +69,49 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         "joint": tables,
         "operating_point": {"joint_angle": drives.operating_point or _rest(joints)},
     }
-    if drives.controller is not None:
-        document["controller"] = drives.controller
+    controller = controller_of(chain, drives)
+    if controller is not None:
+        document["controller"] = controller
     if drives.position_noise_std is not None:
         document["sensor"] = {"position_noise_std": drives.position_noise_std}
     if drives.tolerances is not None:
         document["tolerances"] = drives.tolerances
     if effects:
         document["effect"] = effects
-    head = [f"imported from {source}", *chain.notes, *_defaults(tables, drives)]
+    head = [f"imported from {source}", *chain.notes, *_defaults(tables, drives, controller)]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
 
 
-def _defaults(tables: list[dict[str, Any]], drives: DriveData) -> list[str]:
+def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
+    """Return the controller of the drive data, else that of actuators which are all told positions."""
+    if drives.controller is not None:
+        return drives.controller
+    servos = [joint.body.drive.servo for joint in chain.joints]
+    gains = [servo for servo in servos if servo is not None]
+    if len(gains) < len(servos):
+        return None
+    return {
+        "kind": "pd_position",
+        "kp": [kp for kp, _ in gains],
+        "kd": [kd for _, kd in gains],
+        "velocity_feedforward": False,
+        "continuous": True,
+    }
+
+
+def _defaults(
+    tables: list[dict[str, Any]], drives: DriveData, controller: dict[str, Any] | None
+) -> list[str]:
     """Return what was taken where neither the model file nor the drive data say anything."""
     out = []
     if all(table["drive"]["gear_ratio"] == 1.0 for table in tables):
         out.append("no gear ratios: angles and torques of motors are those of the joints")
     if all(table["drive"]["motor_inertia"] == 0.0 for table in tables):
         out.append("no rotors: motors have no inertia")
-    if drives.controller is None:
+    if controller is None:
         out.append("no controller: logs are compared by inverse dynamics")
+    elif drives.controller is None:
+        out.append("controller: actuators that are told positions")
     return out
 
 

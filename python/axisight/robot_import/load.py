@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from axisight.errors import RobotError
 from axisight.robot.robot import MODEL_SUFFIXES, Robot
 from axisight.robot_import.bodies import Tree
@@ -68,13 +70,43 @@ def import_robot(
     if not isinstance(drives, DriveData):
         drives = drive_data(source, drives)
     tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
-    if drives.sample_time is None:
-        drives = drives.model_copy(update={"sample_time": sample_time_s})
-    text = description(chain, drives, Path(source).name if is_file else "a pinocchio.Model")
-    try:
-        return Robot.from_toml(text)
-    except RobotError as error:
-        raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
+    named = Path(source).name if is_file else "a pinocchio.Model"
+
+    def built(step_s: float | None) -> Robot:
+        stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
+        try:
+            return Robot.from_toml(description(chain, stated, named))
+        except RobotError as error:
+            raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
+
+    if drives.sample_time is not None:
+        return built(None)
+    robot = built(sample_time_s)
+    return robot if drives.controller is not None else built(step_of_servos(robot))
+
+
+# Longest step of actuators that hold positions between samples of logs [s], and how far damping may slow a
+# joint in one: beyond twice as far it would swing.
+_SERVO_STEP_S = 2e-3
+_SLOWED = 0.4
+
+
+def step_of_servos(robot: Robot) -> float:
+    """Return the sample time [s] for a robot's controller: its own, or a whole share of it for servos."""
+    time = robot.sample_time_s
+    if robot.controller_kind != "pd_position":
+        return time
+    rest = np.zeros(robot.n_joints)
+    rest[robot.axis_joints] = robot.operating_point
+    inertia = robot.inertia_matrix(rest)
+    for joint in robot.axis_joints:
+        drive = robot.joints[joint].drive
+        assert drive is not None  # an axis has one
+        inertia[joint, joint] += drive.motor_inertia / drive.gear_ratio**2
+    # Of a motor with all that gives way behind it.
+    felt = robot.gear_ratio**2 / np.diag(np.linalg.inv(inertia))[robot.axis_joints]
+    slowing_s = float(np.min(felt / np.maximum(robot.controller_gains["kd"], 1e-300)))
+    return float(time / np.ceil(time / min(_SERVO_STEP_S, _SLOWED * slowing_s)))
 
 
 def bodies_and_chain(

@@ -71,7 +71,7 @@ class _Compiled:
             "world": Body("world", None, "", "fixed", still(), np.zeros(3), None, str(self.path))
         }
         names = [self._name("body", i) if i else "world" for i in range(model.nbody)]
-        ratios = self._ratios()
+        ratios, self.servos = self._ratios(), self._servos()
         for i in range(1, model.nbody):
             parent = names[model.body_parentid[i]]
             pose = Pose(_rotation(model.body_quat[i]), model.body_pos[i].copy())
@@ -136,6 +136,7 @@ class _Compiled:
                 float(model.dof_damping[dof]),
                 float(model.dof_frictionloss[dof]),
                 float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
+                self.servos.get(j),
                 self._gains().get(j, 1.0),
             )
         else:
@@ -171,28 +172,43 @@ class _Compiled:
 
     def _ratios(self) -> dict[int, float]:
         """Return the gear ratio of joints that one motor drives: one over its gear."""
-        found = self._motors(self.model.actuator_gear[:, 0])
+        found = self._of_one(self.model.actuator_gear[:, 0])
         return {j: 1.0 / g for j, g in found.items() if g != 0}
 
     def _gains(self) -> dict[int, float]:
         """Return the torque per command of joints that one motor drives."""
-        return self._motors(self.model.actuator_gainprm[:, 0])
+        found = self._of_one(self.model.actuator_gainprm[:, 0])
+        return {j: gain for j, gain in found.items() if j not in self.servos}
 
-    def _motors(self, values: Array) -> dict[int, float]:
-        """Return values of actuators by joint, of joints that one motor drives."""
+    def _of_one(self, values: Array) -> dict[int, float]:
+        """Return values of actuators by joint, of joints that one motor or servo drives."""
         model, kinds = self.model, self.mujoco.mjtTrn
         found: dict[int, list[float]] = {}
         for i in range(model.nu):
-            if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT) and _is_motor(model, i):
+            known = _is_motor(model, i) or _is_servo(model, i)
+            if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT) and known:
                 found.setdefault(int(model.actuator_trnid[i, 0]), []).append(float(values[i]))
         return {j: x[0] for j, x in found.items() if len(x) == 1}
+
+    def _servos(self) -> dict[int, tuple[float, float]]:
+        """Return the gains of position and speed of joints whose only actuator is told positions."""
+        model, kinds = self.model, self.mujoco.mjtTrn
+        on_joints = [
+            i for i in range(model.nu) if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT)
+        ]
+        joints = [int(model.actuator_trnid[i, 0]) for i in on_joints]
+        return {
+            j: (float(model.actuator_gainprm[i, 0]), -float(model.actuator_biasprm[i, 2]))
+            for i, j in zip(on_joints, joints, strict=True)
+            if joints.count(j) == 1 and _is_servo(model, i)
+        }
 
     def _notes(self, ratios: dict[int, float]) -> list[str]:
         """Return what of the file a serial chain with drives does not say."""
         model = self.model
         out = []
         for i in range(model.nu):
-            if not _is_motor(model, i):
+            if not (_is_motor(model, i) or _is_servo(model, i)):
                 out.append(
                     f"actuator {self._name('actuator', i)!r} is no plain motor: its gain and bias are the "
                     f"controller's, to be said in the drive data"
@@ -233,12 +249,24 @@ class _Compiled:
 _GAINS = (0.2, 3.0)
 
 
+def is_gain(value: float) -> bool:
+    """Whether a gain of an actuator may be that of a motor: torque per torque that is commanded."""
+    return _GAINS[0] <= value <= _GAINS[1]
+
+
 def _is_motor(model: Any, i: int) -> bool:
     """Whether an actuator is a source of torque: a gain about one, no bias, no state of its own."""
     plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
-    low, high = _GAINS
-    torque = low <= model.actuator_gainprm[i, 0] <= high
+    torque = is_gain(float(model.actuator_gainprm[i, 0]))
     return bool(plain and torque and model.actuator_dyntype[i] == 0)
+
+
+def _is_servo(model: Any, i: int) -> bool:
+    """Whether an actuator is told positions: ``kp (target - length) - kd speed``, without a state of its own."""
+    affine = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 1
+    kp, bias = model.actuator_gainprm[i, 0], model.actuator_biasprm[i]
+    law = bias[0] == 0 and bias[1] == -kp and bias[2] <= 0 and kp > 0
+    return bool(affine and law and model.actuator_dyntype[i] == 0)
 
 
 def _rotation(quaternion: Array) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from axisight.errors import RobotError
 from axisight.robot_import.xml_tree import Element
 
-Numbers = float | Sequence[float]
+Numbers = float | Sequence[float] | str
 
 # A start tag, or an element without content.
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
@@ -109,7 +109,8 @@ def _attribute(name: str) -> re.Pattern[bytes]:
 def _with(tag: bytes, name: str, value: Numbers) -> bytes:
     """Return a start tag with an attribute set."""
     numbers = [value] if isinstance(value, int | float) else value
-    said = '"{}"'.format(" ".join(f"{x:.10g}" for x in numbers)).encode()
+    text = value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in numbers)
+    said = f'"{text}"'.encode()
     known = _attribute(name)
     if known.search(tag):
         return known.sub(lambda m: m.group(1) + said, tag, count=1)

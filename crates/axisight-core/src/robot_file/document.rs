@@ -59,6 +59,15 @@ impl<'a> Section<'a> {
             .number(bound, unit)
     }
 
+    /// A switch that may be left out.
+    pub(super) fn flag(&self, name: &str, otherwise: bool) -> Result<bool, RobotError> {
+        let Some(entry) = self.find(name) else {
+            return Ok(otherwise);
+        };
+        let expected = || entry.refuse("true or false".to_owned());
+        entry.value.as_bool().ok_or_else(expected)
+    }
+
     /// One number per driven joint.
     pub(super) fn per_axis(
         &self,

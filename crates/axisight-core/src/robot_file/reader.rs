@@ -13,6 +13,7 @@ use crate::robot::description::{
     Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, check_unit,
     is_positive_definite,
 };
+use std::sync::Arc;
 use toml::de::DeTable;
 
 /// Schemas by their number.
@@ -89,7 +90,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
     };
     check_chain(&robot, &joint_list, &sections)?;
     let n_axes = robot.n_axes();
-    robot.controller = read_controller(&root, n_axes)?;
+    robot.controller = read_controller(&root, &robot, version)?;
     robot.position_noise_std = read_noise(&root)?;
     robot.operating_point = read_operating_point(&root, n_axes)?;
     robot.effects = read_effects(&root, &robot)?;
@@ -285,10 +286,16 @@ enum ControllerKind {
     PiVelocity,
     PVelocity,
     Cascade,
+    PdPosition,
     None,
 }
 
-fn read_controller(root: &Section, n_axes: usize) -> Result<Controller, RobotError> {
+fn read_controller(
+    root: &Section,
+    robot: &RobotDescription,
+    version: usize,
+) -> Result<Controller, RobotError> {
+    let n_axes = robot.n_axes();
     let Some(entry) = root.find("controller") else {
         return Ok(Controller::None);
     };
@@ -297,9 +304,16 @@ fn read_controller(root: &Section, n_axes: usize) -> Result<Controller, RobotErr
         ("p_velocity", ControllerKind::PVelocity),
         ("cascade", ControllerKind::Cascade),
         ("none", ControllerKind::None),
+        ("pd_position", ControllerKind::PdPosition),
     ];
+    // Files of the first version have the kinds of the first version.
+    let kinds = &kinds[..if version == 1 {
+        kinds.len() - 1
+    } else {
+        kinds.len()
+    }];
     let section = entry.section()?;
-    let kind = section.require("kind", &one_of(&kinds))?.choice(&kinds)?;
+    let kind = section.require("kind", &one_of(kinds))?.choice(kinds)?;
     let gains = |name, unit| section.per_axis(name, n_axes, unit);
     let kp = || gains("kp", "Nm s/rad");
     let ki = || gains("ki", "Nm/rad");
@@ -326,6 +340,18 @@ fn read_controller(root: &Section, n_axes: usize) -> Result<Controller, RobotErr
                 vec![0.0; n_axes]
             };
             Ok(Controller::Cascade { kv, kp, ki })
+        }
+        ControllerKind::PdPosition => {
+            let switches = ["velocity_feedforward", "gravity_compensation", "continuous"];
+            section.only(&[&["kind", "kp", "kd"][..], &switches].concat())?;
+            let known = section.flag(switches[1], false)?;
+            Ok(Controller::PdPosition {
+                kp: gains("kp", "Nm/rad")?,
+                kd: gains("kd", "Nm s/rad")?,
+                feeds_speed: section.flag(switches[0], true)?,
+                continuous: section.flag(switches[2], false)?,
+                gravity: known.then(|| Arc::new(robot.clone())),
+            })
         }
         ControllerKind::None => {
             section.only(&["kind"])?;

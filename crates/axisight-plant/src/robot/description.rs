@@ -4,6 +4,7 @@
 //! runs them and says where in the file the fault lies.
 
 use super::setting::EffectSetting;
+use std::sync::Arc;
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,11 +92,31 @@ pub enum Controller {
         /// Integral gain of the velocity error, zero for a velocity P loop [Nm/rad].
         ki: Vec<f64>,
     },
+    /// Targets are positions: `u = u_ff + kp (phi_ref - phi) + kd (w_ref - w)`.
+    PdPosition {
+        /// Position gain [Nm/rad].
+        kp: Vec<f64>,
+        /// Velocity gain [Nm s/rad].
+        kd: Vec<f64>,
+        /// Whether the rate of the targets is `w_ref`; zero where it is not.
+        feeds_speed: bool,
+        /// Whether the law holds between samples, too: an actuator in a simulator, or a drive much faster
+        /// than the sample time.
+        continuous: bool,
+        /// The robot as the controller knows it, whose gravity torque at the measured pose `u_ff`
+        /// follows; constant without one. What is fitted of a machine changes nothing of it.
+        gravity: Option<Arc<RobotDescription>>,
+    },
     /// No controller: logs are torque-driven only.
     None,
 }
 
 impl Controller {
+    /// Whether it is told positions.
+    pub fn has_targets(&self) -> bool {
+        matches!(self, Self::PdPosition { .. })
+    }
+
     /// The same controller for a loop `factor` times as fast: damping torque with the factor,
     /// stiffness torque with its square.
     #[must_use]
@@ -113,6 +134,19 @@ impl Controller {
                 kv: scaled(kv, factor),
                 kp: scaled(kp, factor),
                 ki: scaled(ki, factor * factor),
+            },
+            Self::PdPosition {
+                kp,
+                kd,
+                feeds_speed,
+                continuous,
+                gravity,
+            } => Self::PdPosition {
+                kp: scaled(kp, factor * factor),
+                kd: scaled(kd, factor),
+                feeds_speed: *feeds_speed,
+                continuous: *continuous,
+                gravity: gravity.clone(),
             },
             Self::None => Self::None,
         }

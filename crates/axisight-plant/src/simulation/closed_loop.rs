@@ -5,7 +5,7 @@ use super::late_reading::LateReading;
 use super::method::{Interval, Method, Stepper};
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
-use crate::plant::{Axis, EquilibriumError, Lead, Plant, equilibrium};
+use crate::plant::{Axis, EquilibriumError, Lead, Plant, PlantError, equilibrium};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,6 +50,13 @@ pub struct Run<'a> {
     pub disturbances: bool,
     /// Set by another thread to end the run early.
     pub cancel: Option<&'a AtomicBool>,
+}
+
+impl Run<'_> {
+    /// Whether delays are those of targets, not of torques.
+    pub fn has_late_targets(&self) -> bool {
+        matches!(self.drive, Drive::Reference(_)) && self.controller.has_targets()
+    }
 }
 
 /// One sample as the log sees it, and the truth behind it.
@@ -123,6 +130,9 @@ pub enum SimulationError {
     /// An effect is misused.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// The robot that the controller knows cannot be built.
+    #[error(transparent)]
+    Known(#[from] PlantError),
 }
 
 /// Simulate until the longest lane ends; `observe` sees every sample.
@@ -160,12 +170,14 @@ pub fn simulate<S: Scalar>(
         &rest.motor_angle,
         &rest.motor_torque,
         OwnLaw::of(plant, run.sample_time),
-    );
+    )?;
+    let late_targets = run.has_late_targets();
     let mut paths: Vec<_> = plant
         .axes
         .iter()
         .zip(&rest.motor_torque)
         .map(|(axis, u)| TorquePath::new(axis, *u, run.sample_time))
+        .map(|path| if late_targets { path.at_once() } else { path })
         .collect();
     let mut signals = Signals::of(plant, &rest.motor_angle, run.sample_time);
     let mut buffers = TorqueBuffers::new(n_axes);

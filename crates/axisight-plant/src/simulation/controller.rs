@@ -1,42 +1,56 @@
-//! The sampled controllers of `axisight.robot/1`.
+//! The sampled controllers of robot files.
 
-use crate::plant::{Axis, Plant};
+use super::late_target::LateTarget;
+use crate::effect::Kernel;
+use crate::plant::{Axis, Plant, PlantError};
 use crate::robot::Controller;
 use axisight_scalar::Scalar;
+use std::sync::Arc;
 
 /// What effects change of the controller of one axis.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnLaw<S> {
-    /// Factors of the proportional and the integral gain.
+    /// Factors of the proportional and the integral gain; of a PD controller of the position and the
+    /// velocity gain.
     gains: [S; 2],
     /// Torque for the rate of the reference, and for the reference; `None` without.
     forward: Option<[S; 2]>,
     /// Share of a new speed in the filtered one; `None` without a filter.
     filter: Option<S>,
+    /// By how many samples commands take effect late; `None` at once.
+    late: Option<S>,
 }
 
 impl<S: Scalar> OwnLaw<S> {
     /// What the effects on each axis of a plant make of a controller.
     pub fn of(plant: &Plant<S>, sample_time: f64) -> Vec<Self> {
-        let one = |axis: &Axis<S>| {
-            let mut own = Self {
-                gains: [S::one(); 2],
-                forward: None,
-                filter: None,
-            };
-            for kernel in &axis.kernels {
-                if let Some([kp, ki]) = kernel.controller_gains() {
-                    own.gains = [own.gains[0] * kp, own.gains[1] * ki];
-                }
-                own.forward = kernel.feedforward().or(own.forward);
-                if let Some(lag) = kernel.speed_filter() {
-                    // Backward difference: without a lag the speed is what it was.
-                    own.filter = Some((lag + sample_time).recip() * sample_time);
-                }
-            }
-            own
+        let of = |axis: &Axis<S>| Self::of_axis(&axis.kernels, sample_time);
+        plant.axes.iter().map(of).collect()
+    }
+
+    /// The same of one axis.
+    pub fn of_axis(kernels: &[Arc<dyn Kernel<S>>], sample_time: f64) -> Self {
+        let mut own = Self {
+            gains: [S::one(); 2],
+            forward: None,
+            filter: None,
+            late: None,
         };
-        plant.axes.iter().map(one).collect()
+        for kernel in kernels {
+            if let Some([kp, ki]) = kernel.controller_gains() {
+                own.gains = [own.gains[0] * kp, own.gains[1] * ki];
+            }
+            if let Some(delay) = kernel.delay() {
+                let delay = delay * (1.0 / sample_time);
+                own.late = Some(own.late.map_or(delay, |other| other + delay));
+            }
+            own.forward = kernel.feedforward().or(own.forward);
+            if let Some(lag) = kernel.speed_filter() {
+                // Backward difference: without a lag the speed is what it was.
+                own.filter = Some((lag + sample_time).recip() * sample_time);
+            }
+        }
+        own
     }
 }
 
@@ -53,31 +67,105 @@ pub struct ControlLoop<S> {
     filtered: Vec<S>,
     first_lag: Vec<S>,
     last_lag: Vec<S>,
+    gravity: Option<KnownGravity<S>>,
+    last_speed: Vec<S>,
+    /// Of axes whose targets take effect late.
+    late: Vec<Option<LateTarget<S>>>,
+}
+
+/// What is late where a controller has targets of positions: its loop is closed at the motor, and what is
+/// commanded from afar are the targets. Empty for others, whose torques are late.
+fn late_targets<S: Scalar>(
+    kind: &Controller,
+    own: &[OwnLaw<S>],
+    angle: &[S],
+) -> Vec<Option<LateTarget<S>>> {
+    if !kind.has_targets() {
+        return Vec::new();
+    }
+    let of = |(own, angle): (&OwnLaw<S>, &S)| Some(LateTarget::new(own.late?, *angle));
+    own.iter().zip(angle).map(of).collect()
+}
+
+/// Gravity of the robot as a controller knows it.
+struct KnownGravity<S> {
+    model: Plant<S>,
+    /// Joint angles, elastic joints at rest; standstill; motor torques there.
+    angle: Vec<S>,
+    still: Vec<S>,
+    torque: Vec<S>,
+}
+
+impl<S: Scalar> KnownGravity<S> {
+    /// The robot that `kind` knows, at motor angles `angle`; `None` where it knows none.
+    fn of(kind: &Controller, angle: &[S]) -> Result<Option<Self>, PlantError> {
+        let Controller::PdPosition {
+            gravity: Some(robot),
+            ..
+        } = kind
+        else {
+            return Ok(None);
+        };
+        let model = Plant::with_kernels(robot, &[], Vec::new())?;
+        let still = vec![S::zero(); model.chain.len()];
+        let mut known = Self {
+            angle: still.clone(),
+            still,
+            torque: vec![S::zero(); angle.len()],
+            model,
+        };
+        known.look(angle);
+        Ok(Some(known))
+    }
+
+    /// Take the torques at motor angles `measured`.
+    fn look(&mut self, measured: &[S]) {
+        for (axis, measured) in self.model.axes.iter().zip(measured) {
+            self.angle[axis.joint] = *measured * axis.ratio;
+        }
+        let load = self.model.dynamics.evaluate(&self.angle, &self.still).bias;
+        for (axis, torque) in self.model.axes.iter().zip(&mut self.torque) {
+            *torque = load[axis.joint] * axis.ratio;
+        }
+    }
 }
 
 impl<S: Scalar> ControlLoop<S> {
     /// A controller settled at motor angles `angle` with static torques `feed_forward`; `own` says
     /// by axis what effects change of it, none where it is empty.
+    ///
+    /// # Errors
+    /// [`PlantError`] of a robot that the controller knows and that cannot be built.
     pub fn new(
         kind: &Controller,
         sample_time: f64,
         angle: &[S],
         feed_forward: &[S],
         own: Vec<OwnLaw<S>>,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, PlantError> {
+        let gravity = KnownGravity::of(kind, angle)?;
+        let mut feed_forward = feed_forward.to_vec();
+        if let Some(known) = &gravity {
+            // Where it settled it holds the arm, whatever it knows.
+            let known = feed_forward.iter_mut().zip(&known.torque);
+            known.for_each(|(u, g)| *u -= *g);
+        }
+        Ok(Self {
+            gravity,
+            last_speed: vec![S::zero(); angle.len()],
+            late: late_targets(kind, &own, angle),
             own,
             filtered: vec![S::zero(); angle.len()],
             kind: kind.clone(),
             sample_time,
-            feed_forward: feed_forward.to_vec(),
+            feed_forward,
             reference_angle: angle.to_vec(),
             previous: None,
             previous_reference: Vec::with_capacity(angle.len()),
             integral: vec![S::zero(); angle.len()],
             first_lag: Vec::with_capacity(angle.len()),
             last_lag: Vec::with_capacity(angle.len()),
-        }
+        })
     }
 
     /// Commands for measured motor angles `measured` and velocity references `reference`.
@@ -86,17 +174,29 @@ impl<S: Scalar> ControlLoop<S> {
         if self.previous_reference.is_empty() {
             self.previous_reference.extend_from_slice(reference);
         }
+        if let Some(known) = &mut self.gravity {
+            known.look(measured);
+        }
         for i in 0..measured.len() {
             let speed = match &self.previous {
                 Some(previous) => (measured[i] - previous[i]) * rate,
                 None => S::zero(),
             };
+            let (angle, speed) = self.halfway(i, measured[i], speed);
             let speed = self.filter(i, speed);
-            let speed_error = reference[i] - speed;
-            let angle_error = self.reference_angle[i] - measured[i];
+            let target = [self.reference_angle[i], reference[i]];
+            let [target_angle, target_speed] = match self.late.get_mut(i) {
+                Some(Some(late)) => late.read(target),
+                _ => target,
+            };
+            let speed_error = self.speed_error(target_speed, speed);
+            let angle_error = target_angle - angle;
             let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
             let feedback = self.feedback(i, speed_error, angle_error, gains);
             out[i] = self.feed_forward[i] + feedback + self.forward(i, reference[i]);
+            if let Some(known) = &self.gravity {
+                out[i] += known.torque[i];
+            }
             self.reference_angle[i] += reference[i] * self.sample_time;
         }
         match &mut self.previous {
@@ -136,6 +236,33 @@ impl<S: Scalar> ControlLoop<S> {
         for_rate * ((reference - before) * (1.0 / self.sample_time)) + for_itself * reference
     }
 
+    /// Angle and speed of axis `i` that a command is for: those measured, or, of a law that holds between
+    /// samples, those halfway to the next one. A speed measured is that of half a sample ago.
+    #[inline(always)]
+    fn halfway(&mut self, i: usize, angle: S, speed: S) -> (S, S) {
+        let Controller::PdPosition {
+            continuous: true, ..
+        } = self.kind
+        else {
+            return (angle, speed);
+        };
+        let change = speed - self.last_speed[i];
+        self.last_speed[i] = speed;
+        let ahead = (speed + change * 0.5) * (0.5 * self.sample_time);
+        (angle + ahead, speed + change)
+    }
+
+    /// By how much a speed is off its reference, which is zero where a controller has targets only.
+    #[inline(always)]
+    fn speed_error(&self, reference: S, speed: S) -> S {
+        match self.kind {
+            Controller::PdPosition {
+                feeds_speed: false, ..
+            } => -speed,
+            _ => reference - speed,
+        }
+    }
+
     /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.
     #[inline(always)]
     fn filter(&mut self, i: usize, speed: S) -> S {
@@ -147,7 +274,7 @@ impl<S: Scalar> ControlLoop<S> {
         self.filtered[i]
     }
 
-    /// Torque for errors of speed and angle, the proportional and the integral gain times `gains`.
+    /// Torque for errors of speed and angle, both gains times `gains` as in [`OwnLaw`].
     #[inline(always)]
     fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 2]) -> S {
         let [own_kp, own_ki] = gains;
@@ -161,6 +288,9 @@ impl<S: Scalar> ControlLoop<S> {
                 let integral = self.integral[i];
                 self.integral[i] += error * self.sample_time;
                 own_kp * (error * kp[i]) + own_ki * (integral * ki[i])
+            }
+            Controller::PdPosition { kp, kd, .. } => {
+                own_kp * (angle_error * kp[i]) + own_ki * (speed_error * kd[i])
             }
             Controller::None => S::zero(),
         }

@@ -6,6 +6,7 @@ mod current_loop;
 mod dormand_prince;
 mod implicit;
 mod late_reading;
+mod late_target;
 mod method;
 mod nystrom4;
 mod runge_kutta4;
@@ -14,6 +15,6 @@ mod torque_path;
 pub use closed_loop::{
     Drive, Run, Sample, Signals, SimulationError, Status, check, lane_value, simulate,
 };
-pub use controller::ControlLoop;
+pub use controller::{ControlLoop, OwnLaw};
 pub use method::{CourseOfAnother, Effort, Method, Stepper};
 pub use torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};

@@ -69,6 +69,13 @@ impl<S: Scalar> TorquePath<S> {
         Self::through(axis.kernels.clone(), rest, sample_time)
     }
 
+    /// The same without its transport delay, which is elsewhere.
+    #[must_use]
+    pub fn at_once(mut self) -> Self {
+        self.delay = None;
+        self
+    }
+
     /// Path through `kernels`, settled at the command `rest`.
     pub fn through(kernels: Vec<Arc<dyn Kernel<S>>>, rest: S, sample_time: f64) -> Self {
         let total = |values: Vec<S>| values.into_iter().reduce(|a, b| a + b);

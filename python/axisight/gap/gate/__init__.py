@@ -1,7 +1,12 @@
 """The gate before a diagnosis: simulator and logs are looked at before anything is fitted to them."""
 
 from axisight.gap.faults import MEANINGS, Finding, RefusedInputError
-from axisight.gap.gate.inspect import check_fit_inputs, check_inputs, pass_gate
+from axisight.gap.gate.inspect import (
+    check_fit_inputs,
+    check_inputs,
+    pass_gate,
+    pass_gate_by_targets,
+)
 
 __all__ = [
     "MEANINGS",
@@ -10,4 +15,5 @@ __all__ = [
     "check_fit_inputs",
     "check_inputs",
     "pass_gate",
+    "pass_gate_by_targets",
 ]

@@ -33,6 +33,19 @@ def pass_gate(
     return findings
 
 
+def pass_gate_by_targets(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+) -> tuple[Finding, ...]:
+    """Return the same of logs whose torque is what the controller commands along them, at their own rate."""
+    logs = [*estimation, *validation]
+    found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
+    found += _of_each(check_log_alone, logs)
+    found += check_copies(estimation, validation)
+    if refused(found):
+        raise RefusedInputError(tuple(found))
+    return tuple(found)
+
+
 def check_inputs(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
 ) -> tuple[Finding, ...]:

@@ -5,7 +5,7 @@ use super::plant::LinearPlant;
 use super::propagator::Propagator;
 use super::tiles::Tiles;
 use axisight_plant::simulation::{
-    ControlLoop, Line, Method, Run, Sample, SampleTorque, Signals, SimulationError, Status,
+    ControlLoop, Line, Method, OwnLaw, Run, Sample, SampleTorque, Signals, SimulationError, Status,
     TorqueBuffers, TorquePath, check, lane_value,
 };
 use axisight_scalar::Scalar;
@@ -39,7 +39,7 @@ pub fn simulate_linear<S: Scalar>(
             got: format!("{:?}", run.start),
         });
     }
-    let mut state = LinearLoop::<S>::new(plant, run);
+    let mut state = LinearLoop::<S>::new(plant, run)?;
     let mut paths = torque_paths(plant, run)?;
     Ok(samples(&mut state, &mut paths, run, n_samples, observe))
 }
@@ -83,6 +83,21 @@ fn samples<S: Scalar>(
     collapsed.map_or(Status::Completed, Status::StepSizeCollapsed)
 }
 
+/// What effects on the path of commands change of a controller: where targets are late, all that they do.
+fn own_laws<S: Scalar>(
+    plant: &LinearPlant,
+    run: &Run<'_>,
+) -> Result<Vec<OwnLaw<S>>, SimulationError> {
+    if !run.has_late_targets() {
+        return Ok(Vec::new());
+    }
+    let of_axis = |kernels: Vec<_>| OwnLaw::of_axis(&kernels, run.sample_time);
+    let each = plant.axes.iter().map(|axis| axis.path_kernels());
+    Ok(each
+        .map(|kernels| kernels.map(of_axis))
+        .collect::<Result<_, _>>()?)
+}
+
 /// From command to delivered torque of every axis, settled at rest.
 fn torque_paths<S: Scalar>(
     plant: &LinearPlant,
@@ -93,7 +108,12 @@ fn torque_paths<S: Scalar>(
     for (axis, u) in plant.axes.iter().zip(torques) {
         let rest = S::constant(*u);
         let kernels = axis.path_kernels()?;
-        paths.push(TorquePath::through(kernels, rest, run.sample_time));
+        let path = TorquePath::through(kernels, rest, run.sample_time);
+        paths.push(if run.has_late_targets() {
+            path.at_once()
+        } else {
+            path
+        });
     }
     Ok(paths)
 }
@@ -128,7 +148,7 @@ struct LinearLoop<'a, S> {
 const FARTHEST_MOVE: f64 = 0.1;
 
 impl<'a, S: Scalar> LinearLoop<'a, S> {
-    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Self {
+    fn new(plant: &'a LinearPlant, run: &Run<'_>) -> Result<Self, SimulationError> {
         let (n, m) = (plant.n_states(), plant.n_axes());
         let substeps = match run.method {
             Method::RungeKutta4 { substeps } | Method::Nystrom4 { substeps } => substeps.max(1),
@@ -148,7 +168,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         let mut ripple = vec![Ripple::zero(); m];
         plant.waves.evaluate(&angle, &mut powers, &mut ripple);
         let padded = Tiles::padded(n);
-        Self {
+        Ok(Self {
             plant,
             propagator,
             substeps,
@@ -158,8 +178,8 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 run.sample_time,
                 &angle,
                 &torque,
-                Vec::new(),
-            ),
+                own_laws(plant, run)?,
+            )?,
             signals: Signals::new(m),
             ripple,
             powers,
@@ -169,7 +189,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             missed: vec![S::zero(); 2 * m],
             absolute: lift(&plant.rest),
             coarse: S::zero(),
-        }
+        })
     }
 
     /// Measure, command, and note what acts on the motors.

@@ -1,0 +1,57 @@
+//! Targets that take effect late, in a line between samples.
+
+use axisight_scalar::Scalar;
+
+/// The targets of one axis that are still on their way.
+pub struct LateTarget<S> {
+    /// Share of a sample by which the target is older than the second entry of the history.
+    fraction: S,
+    /// Angle [rad] and speed [rad/s], oldest first.
+    history: Vec<[S; 2]>,
+}
+
+impl<S: Scalar> LateTarget<S> {
+    /// Targets `samples` late, at rest at `angle` before the run; lanes share the whole part.
+    pub fn new(samples: S, angle: S) -> Self {
+        // Bounds on the delay keep the count small and non-negative.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = samples.lane(0).max(0.0) as usize;
+        Self {
+            fraction: samples - whole as f64,
+            history: vec![[angle, S::zero()]; whole + 2],
+        }
+    }
+
+    /// The target in force at a sample in which `newest` is given.
+    ///
+    /// Targets are held from sample to sample: what is in force over a sample is, in the mean, the line.
+    pub fn read(&mut self, newest: [S; 2]) -> [S; 2] {
+        self.history.rotate_left(1);
+        if let Some(last) = self.history.last_mut() {
+            *last = newest;
+        }
+        let (older, newer) = (self.history[0], self.history[1]);
+        std::array::from_fn(|i| newer[i] + self.fraction * (older[i] - newer[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_late_by_the_delay_and_rests_before_the_run() {
+        let mut late = LateTarget::new(2.25, -1.0);
+        let read: Vec<f64> = (0..8).map(|k| late.read([f64::from(k), 1.0])[0]).collect();
+        assert_eq!(read[0], -1.0);
+        for (k, angle) in read.iter().enumerate().skip(3) {
+            assert!((angle - (k as f64 - 2.25)).abs() < 1e-15, "{k}");
+        }
+    }
+
+    #[test]
+    fn without_a_delay_the_target_is_in_force_at_once() {
+        let mut late = LateTarget::new(0.0, 0.0);
+        assert_eq!(late.read([3.0, 2.0]), [3.0, 2.0]);
+    }
+}

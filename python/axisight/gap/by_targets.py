@@ -1,0 +1,183 @@
+"""Positions of simulator and machine under the same targets, where no torque was logged.
+
+Errors of position are told as the torque that the controller's gains make of them: one number for the
+whole band, comparable with torques of causes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.fitting import Weighting
+from axisight.gap.closed_loop import ClosedLoopFitter
+from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.feedback import controller_response, loop_responses
+from axisight.gap.noise import Floor, position_noise_std, torque_density
+from axisight.gap.settings import Settings
+from axisight.gap.simulated import simulated_positions
+from axisight.gap.targets import Commanded
+from axisight.gap.torques import AS_GIVEN, Variant
+from axisight.gap.tracking_weights import shortest
+from axisight.gap.view import View
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import white_noise
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Of the rate of the logs: what is compared lies below, where a spline between samples is a motion.
+_BAND = 0.35
+# Samples of a segment of a density, at the rate of the logs.
+_SEGMENT = 256
+# Of the slowest frequency that a log holds, half a wave of it: what is slower is constant.
+_WHOLE_LOG = 0.5
+
+
+class TargetsView(View):
+    """Simulator and machine driven by the same targets, positions compared."""
+
+    def __init__(self, commanded: Commanded, logs: list[Log], settings: Settings) -> None:
+        self._commanded = commanded
+        robot = commanded.robot
+        std = np.maximum(position_noise_std(commanded.as_logged()), robot.position_noise_std)
+        self._std_rad = std
+        floor = self._floor(robot, logs, settings)
+        fitter = TargetsFitter(
+            robot, _records(logs), floor.weighting, _tolerances(robot, settings), settings.block_s
+        )
+        super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+
+    def _floor(self, robot: Robot, logs: list[Log], settings: Settings) -> Floor:
+        """Return the floor: noise of the sensors as the gains take it, and errors of formulas.
+
+        Densities at the rate of the logs: below half of it those at the controller's are ``step`` times
+        as large. What is constant along a log is left out: where it begins is known no better.
+        """
+        step = self._commanded.step
+        rate = 1.0 / (robot.sample_time_s * step)
+        slow = [x.torque_nm[::step] for x in logs]
+        like = shortest(logs)
+        segment = max(8, min(_SEGMENT, like.n_samples // step // 2))
+        found = [torque_density(x, rate, segment) for x in slow]
+        f, torque = found[0][0], np.asarray(np.mean([density for _, density in found], axis=0))
+        torque[:, 0] = torque[:, 1]
+        gain = self._gains(f)
+        noise = gain**2 * (self._std_rad**2)[:, None]
+        total = noise + settings.model_error**2 * torque
+        weight = 1.0 / np.sqrt(np.maximum(total, 1e-12 * torque.max()))
+        band = min(settings.bandwidth_hz, _BAND * rate)
+        decimation = max(1, int(rate * step / (2 * band)))
+        passed = f <= rate * step / (2 * decimation)
+        expected = np.mean((noise * weight**2)[:, passed], axis=1)
+        table = gain * weight / np.sqrt(step)
+        slowest = _WHOLE_LOG / max(log.duration_s for log in logs)
+        weighting = Weighting(
+            np.array([0.0, slowest, *f[1:]]),
+            np.column_stack([np.zeros(len(table)), table[:, 0], table[:, 1:]]),
+            decimation,
+        )
+        return Floor(self._std_rad, f, noise, weighting, expected)
+
+    def _gains(self, frequency_hz: Array) -> Array:
+        """Return how the controller answers an error of position, (n_axes, n_freq) [Nm/rad]."""
+        f = np.maximum(frequency_hz, frequency_hz[1])
+        response = controller_response(self._commanded.robot, f)
+        return np.asarray(np.abs(np.einsum("fii->if", response)))
+
+    def candidates(
+        self, model: Evidence, *, axes: Collection[int] | None = None
+    ) -> list[FreeEffect]:
+        """Return the candidates; gains of the controller are among them, for no torque tells them."""
+        return self._candidates(model, axes, by_targets=True)
+
+    def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        """Return the answer of the loop's position to an effect (n_freq,)."""
+        f = np.maximum(frequency_hz, frequency_hz[1])
+        from_angle, from_torque = loop_responses(self.robot, f)
+        on_sensor = effect_info(effect).acts == "sensor"
+        found = (from_angle if on_sensor else from_torque)[:, axis, axis]
+        return np.asarray(found / controller_response(self.robot, f)[:, axis, axis])
+
+    def measured(self, log: Log) -> Array:
+        """Return what the controller commands along the measured positions."""
+        return log.torque_nm
+
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return what it commands along the simulated positions."""
+        positions = simulated_positions(self.robot, variant, logs, threads=self.settings.threads)
+        return [
+            log.torque_nm + self._told(position - log.position_rad)
+            for position, log in zip(positions, logs, strict=True)
+        ]
+
+    def _told(self, error_rad: Array) -> Array:
+        """Return an error of position, known where positions were logged, as torque.
+
+        Without its mean: a log's first position is as noisy as the others, and a run begins there.
+        """
+        step = self._commanded.step
+        logged = error_rad[::step]
+        return self._commanded.of_error(self._commanded.fine(logged - logged.mean(axis=0)))
+
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
+        """Return what noise of the sensors is as torque, for every log."""
+        del variant
+        step = self._commanded.step
+        noise = [
+            white_noise(self.settings.seed, run, len(log.time_s[::step]), self.robot.n_axes)
+            for run, log in enumerate(logs, start=first_run)
+        ]
+        return [self._commanded.of_error(self._commanded.fine(x * self._std_rad)) for x in noise]
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say what was compared."""
+        rate = 1.0 / (self.robot.sample_time_s * self._commanded.step)
+        return (
+            f"No torque was logged: positions are compared under the same targets, up to "
+            f"{_BAND * rate:.3g} Hz, and their errors told as the torque that the stated gains make of them.",
+        )
+
+
+# Of a sample of the controller: how well it is known when a target takes effect. Simulators and drives
+# differ by half of their own steps, which are shorter.
+_WHEN = 0.125
+
+
+def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
+    """Return the tolerances of the simulator's parameters where targets drive it.
+
+    A target that takes effect ``t`` later acts as friction ``kp t`` on the motor: viscous friction is known no
+    better than that.
+    """
+    out = dict(settings.tolerances_of(robot))
+    values, late_s = robot.parameters(), _WHEN * robot.sample_time_s
+    for axis, gain in zip(robot.axis_numbers(), robot.controller_gains["kp"], strict=True):
+        name = robot.axis_parameter(axis, "viscous_friction")
+        if name is not None and values[name] > 0:
+            stated = out.get(name, out["viscous_friction"])
+            out[name] = float(np.hypot(stated, gain * late_s / values[name]))
+    return out
+
+
+def _records(logs: Sequence[Log]) -> list[tuple[Array, Array, Array]]:
+    """Return references, positions and how far each sample counts."""
+    out = []
+    for log in logs:
+        assert log.velocity_ref_rad_s is not None  # logs with commands have them
+        parts = (log.velocity_ref_rad_s, log.position_rad, np.ones_like(log.position_rad))
+        out.append(tuple(np.ascontiguousarray(x, np.float64) for x in parts))
+    return out  # type: ignore[return-value]
+
+
+class TargetsFitter(ClosedLoopFitter):
+    """Position of a simulator that is driven by targets, less the measured one."""
+
+    driven_by = "reference"
+    compared = "position"

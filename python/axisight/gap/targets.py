@@ -1,0 +1,174 @@
+"""Logs of positions and their targets alone: brought to the controller's clock, with what it commands.
+
+A controller of targets is algebra: its command follows from targets and measured positions. Logs are
+often sampled slower than the controller runs, and hold each target until the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from axisight.errors import InputError
+from axisight.gap.noise import position_noise_std
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# By how much a sample time may be off a whole number of the controller's.
+_CLOCK = 0.01
+# Joint angle between the starts of logs below which they start alike [rad, m]: gravity differs by a few
+# per cent beyond.
+_SAME_START = 0.02
+# Share of the top speed with which a log may begin; noise of speeds besides, so many times over.
+_AT_REST = 0.02
+_NOISES = 6.0
+_KIND = "pd_position"
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """Logs at the rate of the controller, their torque what it commands along them.
+
+    ``robot``: at rest where the logs begin, its controller with the references that they have;
+    ``step``: samples of the controller per sample that was logged.
+    """
+
+    robot: Robot
+    logs: tuple[Log, ...]
+    step: int
+
+    def as_logged(self) -> list[Log]:
+        """Return the logs at their own rate."""
+        return [_every(log, self.step) for log in self.logs]
+
+    def fine(self, values: Array) -> Array:
+        """Return samples (n, n_axes) of the logs' rate at that of the controller, as positions are."""
+        return between(values, self.step)
+
+    def of_error(self, error_rad: Array) -> Array:
+        """Return the torque (n, n_axes) [Nm] that the gains make of an error of positions, at the controller's rate."""
+        gains, time = self.robot.controller_gains, self.robot.sample_time_s
+        speed = np.diff(error_rad, axis=0, prepend=error_rad[:1]) / time
+        return np.asarray(-(gains["kp"] * error_rad + gains["kd"] * speed))
+
+
+def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
+    """Return logs without torque with what the controller commands along them; None where torque was logged.
+
+    Raises InputError where only some logs have torque, where the robot has no controller of targets or a
+    log no targets, for sample times that are no multiple of the controller's, and for logs that
+    begin in motion or at different poses.
+    """
+    if all(log.has_torque for log in logs):
+        return None
+    _check(robot, logs)
+    time = robot.sample_time_s
+    step = round(logs[0].sample_time_s / time)
+    start = np.mean([log.position_rad[0] for log in logs], axis=0)
+    fed = robot.velocity_feedforward and all(x.velocity_ref_rad_s is not None for x in logs)
+    machine = robot.with_operating_point(start * robot.gear_ratio).with_velocity_feedforward(fed)
+    return Commanded(machine, tuple(_commanded(machine, log, step) for log in logs), step)
+
+
+def between(values: Array, step: int) -> Array:
+    """Return samples (n, n_axes) with ``step - 1`` more between any two, by a cubic spline."""
+    if step == 1:
+        return values
+    n = len(values)
+    return np.asarray(
+        make_interp_spline(np.arange(n), values, k=3)(np.arange((n - 1) * step + 1) / step)
+    )
+
+
+def _check(robot: Robot, logs: Sequence[Log]) -> None:
+    """Raise InputError naming what keeps a command from following from the logs."""
+    for log in logs:
+        if log.has_torque:
+            others = ", ".join(x.name for x in logs if not x.has_torque)
+            raise InputError(f"torque: expected it in all logs or in none, got none in {others}")
+    if robot.controller_kind != _KIND:
+        raise InputError(
+            f"torque: expected logged torques, or a robot file whose controller is {_KIND}, so that the command "
+            f"follows from targets and positions; got no torque and controller {robot.controller_kind}"
+        )
+    for log in logs:
+        if log.position_ref_rad is None:
+            raise InputError(
+                f"position_ref: expected targets beside the positions of log {log.name!r}, got none"
+            )
+        factor = log.sample_time_s / robot.sample_time_s
+        if round(factor) < 1 or abs(factor / round(factor) - 1) > _CLOCK:
+            raise InputError(
+                f"sample_time: expected a multiple of the controller's {robot.sample_time_s:g} s, got "
+                f"{log.sample_time_s:g} s in log {log.name!r}"
+            )
+        _check_start(robot, log, logs[0])
+
+
+def _check_start(robot: Robot, log: Log, first: Log) -> None:
+    """Refuse a log that begins in motion, or elsewhere than the first one."""
+    off = np.abs(log.position_rad[0] - first.position_rad[0]) * np.abs(robot.gear_ratio)
+    if off.max() > _SAME_START:
+        raise InputError(
+            f"log {log.name!r}: expected a start where log {first.name!r} starts, got one "
+            f"{off.max():.3g} rad off (axis {int(off.argmax()) + 1}, joint side)"
+        )
+    speed = np.gradient(log.position_rad, log.sample_time_s, axis=0)
+    noise = position_noise_std([log]) / log.sample_time_s
+    allowed = _AT_REST * np.abs(speed).max(axis=0) + _NOISES * noise
+    moving = np.abs(speed[0]) > allowed
+    if moving.any():
+        axis = int(np.flatnonzero(moving)[0])
+        raise InputError(
+            f"log {log.name!r}: expected a start at rest, got axis {axis + 1} at {speed[0, axis]:.3g} rad/s: "
+            f"cut it with --from"
+        )
+
+
+def _commanded(robot: Robot, log: Log, step: int) -> Log:
+    """Return a log at the controller's rate, with its command."""
+    assert log.position_ref_rad is not None  # checked before
+    position = between(log.position_rad, step)
+    n, time = len(position), robot.sample_time_s
+    # A target is held until the next one.
+    target = np.repeat(log.position_ref_rad, step, axis=0)[:n]
+    rate = np.diff(target, axis=0, append=target[-1:]) / time
+    if robot.velocity_feedforward and log.velocity_ref_rad_s is not None:
+        rate = np.repeat(log.velocity_ref_rad_s, step, axis=0)[:n]
+        target = target[0] + (np.cumsum(rate, axis=0) - rate) * time
+    gains = robot.controller_gains
+    speed = np.diff(position, axis=0, prepend=position[:1]) / time
+    fed = rate if robot.velocity_feedforward else 0.0
+    torque = gains["kp"] * (target - position) + gains["kd"] * (fed - speed)
+    return replace(
+        log,
+        sample_time_s=time,
+        time_s=np.asarray(time * np.arange(n), dtype=np.float64),
+        position_rad=position,
+        torque_nm=np.ascontiguousarray(torque),
+        position_ref_rad=target,
+        velocity_ref_rad_s=np.ascontiguousarray(rate),
+        velocity_rad_s=None,
+        joint_position_rad=None,
+        temperature_c=None,
+    )
+
+
+def _every(log: Log, step: int) -> Log:
+    """Return every ``step``-th sample of a log."""
+    reference, target = log.velocity_ref_rad_s, log.position_ref_rad
+    return replace(
+        log,
+        sample_time_s=log.sample_time_s * step,
+        time_s=log.time_s[::step],
+        position_rad=log.position_rad[::step],
+        torque_nm=log.torque_nm[::step],
+        position_ref_rad=None if target is None else target[::step],
+        velocity_ref_rad_s=None if reference is None else reference[::step],
+    )

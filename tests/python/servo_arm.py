@@ -1,0 +1,153 @@
+"""An arm of three joints whose actuators are told positions, simulated by MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import Log, Robot, load_robot
+from axisight.logs.log import not_logged
+
+Array = NDArray[np.float64]
+
+RATE_HZ = 50.0
+SECONDS = 20.0
+# Of an encoder of fifteen bits.
+NOISE_RAD = 2e-4
+HOME_RAD = np.array([0.0, 0.5, 0.9])
+REACH_RAD = np.array([0.35, 0.22, 0.3])
+SETTLED_S = 4.0
+
+
+@dataclass(frozen=True)
+class ServoArm:
+    """What differs between machines: SI units, joint side; ``late_s`` of all targets."""
+
+    damping: tuple[float, float, float] = (3.0, 2.0, 0.6)
+    dry_friction: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    armature: tuple[float, float, float] = (0.8, 0.6, 0.15)
+    kp: tuple[float, float, float] = (1800.0, 1800.0, 500.0)
+    kd: tuple[float, float, float] = (120.0, 110.0, 25.0)
+    load_kg: float = 0.0
+    late_s: float = 0.0
+    step_s: float = 5e-4
+    integrator: str = "implicitfast"
+
+    def with_changed(self, field: str, joint: int, value: float) -> ServoArm:
+        """Return the arm with another value of one joint, from 1."""
+        values = list(getattr(self, field))
+        values[joint - 1] = value
+        return replace(self, **{field: tuple(values)})
+
+    def weaker(self, joint: int, factor: float) -> ServoArm:
+        """Return the arm with both gains of a joint times a factor."""
+        out = self.with_changed("kp", joint, self.kp[joint - 1] * factor)
+        return out.with_changed("kd", joint, self.kd[joint - 1] * factor)
+
+    def mjcf(self) -> str:
+        """Return the model."""
+
+        def joint(i: int, axis: str) -> str:
+            return (
+                f'<joint name="j{i + 1}" axis="{axis}" damping="{self.damping[i]}" '
+                f'frictionloss="{self.dry_friction[i]}" armature="{self.armature[i]}"/>'
+            )
+
+        load = ""
+        if self.load_kg:
+            load = f'<body pos="0.05 0 0.35"><geom size="0.05" mass="{self.load_kg}"/></body>'
+        servos = "\n".join(
+            f'    <position joint="j{i + 1}" kp="{self.kp[i]}" kv="{self.kd[i]}"/>'
+            for i in range(3)
+        )
+        return f"""<mujoco model="servo arm">
+  <option timestep="{self.step_s}" integrator="{self.integrator}"/>
+  <worldbody>
+    <body name="l1" pos="0 0 0.3">{joint(0, "0 0 1")}
+      <inertial pos="0.02 0 0.05" mass="8" diaginertia="0.08 0.08 0.05"/>
+      <body name="l2" pos="0.05 0 0.1">{joint(1, "0 1 0")}
+        <inertial pos="0 0.01 0.2" mass="6" diaginertia="0.12 0.12 0.02"/>
+        <body name="l3" pos="0 0 0.42">{joint(2, "0 1 0")}
+          <inertial pos="0.03 0 0.15" mass="3" diaginertia="0.03 0.03 0.006"/>
+          {load}
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+{servos}
+  </actuator>
+</mujoco>
+"""
+
+    def log(self, run: int, noise_rad: float = NOISE_RAD) -> Log:
+        """Return targets and positions of one run, from where the arm has settled."""
+        import mujoco  # noqa: PLC0415 - an extra
+
+        model = mujoco.MjModel.from_xml_string(self.mjcf())
+        data = mujoco.MjData(model)
+        wanted = targets(run)
+        data.qpos[:] = HOME_RAD
+        data.ctrl[:] = wanted[0]
+        mujoco.mj_step(model, data, round(SETTLED_S / self.step_s))
+        steps, late = round(1 / RATE_HZ / self.step_s), round(self.late_s / self.step_s)
+        told = np.concatenate(
+            [np.repeat(wanted[:1], late, axis=0), np.repeat(wanted, steps, axis=0)]
+        )
+        position = np.empty_like(wanted)
+        for k in range(len(wanted)):
+            position[k] = data.qpos
+            for target in told[k * steps : (k + 1) * steps]:
+                data.ctrl[:] = target
+                mujoco.mj_step(model, data)
+        noise = np.random.default_rng(1000 + run).normal(size=position.shape)
+        return Log(
+            name=f"run{run}",
+            sample_time_s=1 / RATE_HZ,
+            time_s=np.arange(len(wanted)) / RATE_HZ,
+            torque_nm=not_logged(position.shape),
+            position_rad=position + noise_rad * noise,
+            position_ref_rad=wanted,
+            source=Path(f"run{run}.parquet"),
+        )
+
+
+def targets(run: int) -> Array:
+    """Return sums of sines up to 2.2 Hz (n, 3) [rad] that begin and end at home."""
+    rng = np.random.default_rng(run)
+    t = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    fade = np.clip(t / 2, 0, 1) * np.clip(t[-1] - t, 0, 1)
+    fade = fade**2 * (3 - 2 * fade)
+    out = np.zeros((len(t), 3))
+    for axis, reach in enumerate(REACH_RAD):
+        for f in rng.uniform(0.1, 2.2, 7):
+            wave = np.sin(2 * np.pi * (f * t + rng.uniform()))
+            out[:, axis] += reach / np.sqrt(7) * wave / max(f, 0.4) ** 0.7
+    return np.asarray(HOME_RAD + out * fade[:, None])
+
+
+def simulator(folder: Path, arm: ServoArm | None = None) -> Robot:
+    """Return the robot of the MJCF of an arm, for logs of its rate."""
+    path = folder / "arm.xml"
+    path.write_text((arm or ServoArm()).mjcf(), "utf-8")
+    return load_robot(path, sample_time_s=1 / RATE_HZ)
+
+
+NOMINAL = ServoArm()
+MACHINES: Mapping[str, ServoArm] = {
+    "coulomb_friction@1": NOMINAL.with_changed("dry_friction", 1, 2.0),
+    "coulomb_friction@2": NOMINAL.with_changed("dry_friction", 2, 2.5),
+    "coulomb_friction@3": NOMINAL.with_changed("dry_friction", 3, 0.8),
+    "viscous_friction@1": NOMINAL.with_changed("damping", 1, 7.0),
+    "viscous_friction@3": NOMINAL.with_changed("damping", 3, 1.6),
+    "motor_inertia@2": NOMINAL.with_changed("armature", 2, 1.0),
+    "input_delay": replace(NOMINAL, late_s=0.008),
+    "payload": replace(NOMINAL, load_kg=0.8),
+    "torque_constant@2": NOMINAL.weaker(2, 0.85),
+    "controller_gain@3": NOMINAL.with_changed("kp", 3, 420.0),
+}
+"""By what the simulator lacks of them."""

@@ -1,0 +1,179 @@
+"""Diagnosis from positions and the targets they were told, without torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from axisight import Effect, Log, Robot, diagnose, load_robot, read_log, simulate
+from axisight.errors import InputError, LogError
+from axisight.gap.targets import between, with_commands
+from axisight.logs.log import not_logged
+from servo_arm import HOME_RAD, MACHINES, NOMINAL, RATE_HZ, ServoArm, simulator, targets
+
+pytest.importorskip("mujoco")
+
+Array = NDArray[np.float64]
+ROUNDING_NM = 1e-9
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return simulator(tmp_path_factory.mktemp("servo"))
+
+
+def test_actuators_that_are_told_positions_are_the_controller(robot: Robot) -> None:
+    assert robot.controller_kind == "pd_position"
+    assert robot.controller_gains["kp"].tolist() == list(NOMINAL.kp)
+    assert robot.controller_gains["kd"].tolist() == list(NOMINAL.kd)
+    assert not robot.velocity_feedforward
+    # A tenth of the logs' sample time: no longer than 2 ms, and damping slows no joint by half in it.
+    assert robot.sample_time_s == pytest.approx(0.002)
+    assert "no plain motor" not in robot.toml
+
+
+def test_the_command_follows_from_targets_and_positions(tmp_path: Path) -> None:
+    """Of a robot that is simulated here, sampled as its controller runs: what it did command."""
+    path = tmp_path / "robot.toml"
+    path.write_text(simulator(tmp_path).toml.replace("continuous = true", "continuous = false"))
+    robot = load_robot(path).with_operating_point(HOME_RAD)
+    time = robot.sample_time_s
+    wanted = targets(1)[:200]
+    rate = np.diff(wanted, axis=0, append=wanted[-1:]) / time
+    out = simulate(robot, rate, method="rk4")
+    # Actuators hold the arm by being off their targets.
+    held = out["torque_cmd_nm"].values[0] / robot.controller_gains["kp"]
+    log = log_of(out["position_rad"].values, wanted + held - wanted[0] + HOME_RAD, time)
+    found = with_commands(robot, [log])
+    assert found is not None
+    assert found.step == 1
+    assert np.abs(found.logs[0].torque_nm - out["torque_cmd_nm"].values).max() < ROUNDING_NM
+
+
+def log_of(position: Array, target: Array | None, time: float, name: str = "run") -> Log:
+    return Log(
+        name=name,
+        sample_time_s=time,
+        time_s=time * np.arange(len(position)),
+        torque_nm=not_logged(position.shape),
+        position_rad=position,
+        position_ref_rad=target,
+        source=Path(f"{name}.parquet"),
+    )
+
+
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+def test_commands_that_are_late_are_targets_that_are(robot: Robot, model: str) -> None:
+    """Two and a half samples late: between targets in a line."""
+    time = robot.sample_time_s
+    wanted = np.repeat(targets(2)[:60], 10, axis=0)
+    late = [Effect("input_delay", axis, {"delay_s": 2.5 * time}) for axis in (1, 2, 3)]
+    shifted = [np.vstack([np.repeat(wanted[:1], k, axis=0), wanted[:-k]]) for k in (2, 3)]
+    rates = [
+        np.diff(x, axis=0, append=x[-1:]) / time for x in (wanted, (shifted[0] + shifted[1]) / 2)
+    ]
+    at_home = robot.with_operating_point(HOME_RAD)
+    found = [
+        simulate(at_home, r, effects=e, model=model, method="rk4")["position_rad"].values  # type: ignore[arg-type]
+        for r, e in zip(rates, (late, []), strict=True)
+    ]
+    assert np.abs(found[0] - found[1]).max() < 1e-12
+    on_time = simulate(at_home, rates[0], model=model, method="rk4")["position_rad"].values  # type: ignore[arg-type]
+    assert np.abs(on_time - found[0]).max() > 1e-4
+
+
+def test_a_law_that_holds_between_samples_is_that_of_short_samples(tmp_path: Path) -> None:
+    """Halfway values are of second order: four times as long samples are sixteen times as far off."""
+    text = simulator(tmp_path).toml
+    wanted = targets(3)[:150]
+
+    def positions(step: int, continuous: str) -> Array:
+        path = tmp_path / "robot.toml"
+        changed = text.replace("sample_time = 0.002", f"sample_time = {0.02 / step}")
+        path.write_text(changed.replace("continuous = true", f"continuous = {continuous}"))
+        robot = load_robot(path).with_operating_point(HOME_RAD)
+        fine = np.repeat(wanted, step, axis=0)
+        rate = np.diff(fine, axis=0, append=fine[-1:]) * step / 0.02
+        return np.asarray(simulate(robot, rate, method="rk4")["position_rad"].values[::step])
+
+    exact = positions(640, "true")
+    errors = [np.abs(positions(step, "true") - exact).max() for step in (10, 40)]
+    sampled = np.abs(positions(10, "false") - exact).max()
+    assert errors[0] < 0.1 * sampled
+    assert errors[1] < errors[0] / 10
+
+
+@pytest.mark.parametrize("lacks", ["coulomb_friction@2", "controller_gain@3", "input_delay"])
+def test_what_a_machine_lacks_is_named(robot: Robot, lacks: str) -> None:
+    logs = [MACHINES[lacks].log(run) for run in (1, 2, 3)]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    assert found.verdict == "explained"
+    assert found.causes[0].label.startswith(lacks)
+    assert found.mode == "closed_loop"
+    assert any("No torque was logged" in check for check in found.checks)
+    if lacks == "coulomb_friction@2":
+        value = found.causes[0].parameters["coulomb_nm"]
+        assert value.value == pytest.approx(2.5, rel=0.1)
+
+
+def test_nothing_is_named_where_nothing_lacks(robot: Robot) -> None:
+    logs = [NOMINAL.log(run) for run in (1, 2, 3)]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    assert found.verdict == "none"
+    assert not found.causes
+
+
+def test_positions_between_samples_lie_on_a_cubic() -> None:
+    k = np.arange(12.0)
+    fine = np.arange(0, 11.01, 0.25)
+    values = between(np.column_stack([k**3, 2 - k]), 4)
+    assert np.allclose(values, np.column_stack([fine**3, 2 - fine]), rtol=0, atol=1e-9)
+
+
+def still(n: int = 100) -> Array:
+    return np.tile(HOME_RAD, (n, 1))
+
+
+def test_logs_that_tell_no_command_are_refused(robot: Robot) -> None:
+    time = 1 / RATE_HZ
+    good = log_of(still(), still(), time)
+    with pytest.raises(InputError, match=r"position_ref.*'bare'"):
+        with_commands(robot, [good, log_of(still(), None, time, "bare")])
+    with pytest.raises(InputError, match="multiple of the controller's"):
+        with_commands(robot, [log_of(still(), still(), 0.003)])
+    with pytest.raises(InputError, match=r"'there'.*where log 'run' starts"):
+        with_commands(robot, [good, log_of(still() + 0.1, still(), time, "there")])
+    moving = still() + 0.1 * time * np.arange(100)[:, None]
+    with pytest.raises(InputError, match=r"at rest.*--from"):
+        with_commands(robot, [log_of(moving, still(), time)])
+    with pytest.raises(InputError, match="in all logs or in none"):
+        with_commands(robot, [good, replace(good, torque_nm=np.zeros((100, 3)))])
+    with pytest.raises(InputError, match="pd_position"):
+        with_commands(load_robot("irb6600_like"), [good])
+
+
+def test_logs_are_read_without_torque_where_they_have_targets(tmp_path: Path) -> None:
+    logged = ServoArm().log(4)
+    table = {"time_s": logged.time_s}
+    for axis in range(3):
+        assert logged.position_ref_rad is not None
+        table[f"position_{axis + 1}"] = logged.position_rad[:, axis]
+        table[f"position_ref_{axis + 1}"] = logged.position_ref_rad[:, axis]
+    path = tmp_path / "run.parquet"
+    pd.DataFrame(table).to_parquet(path)
+    found = read_log(path)
+    assert not found.has_torque
+    assert found.position_ref_rad is not None
+    assert np.array_equal(found.position_ref_rad, logged.position_ref_rad)
+    pd.DataFrame({**table, "torque_cmd_1": table["position_1"]}).to_parquet(path)
+    with pytest.raises(LogError, match="torque_cmd_2"):
+        read_log(path)
+    del table["position_ref_2"]
+    pd.DataFrame(table).to_parquet(path)
+    with pytest.raises(LogError, match="position_ref_2"):
+        read_log(path)
