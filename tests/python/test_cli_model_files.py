@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -13,7 +12,8 @@ from axisight import load_robot
 from axisight.cli import app
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import DriveData
-from import_data import DH, URDF, written
+from import_data import DH, MJCF, URDF, written
+from model_logs import written_log, written_table
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -71,19 +71,11 @@ def test_a_model_needs_logs_beside_it(tmp_path: Path):
 def test_a_model_that_cannot_be_written_is_said_before_anything(tmp_path: Path):
     time = 0.01 * np.arange(300)
     motion = np.column_stack([np.sin(time), np.cos(time)])
-    log = table(tmp_path / "run.parquet", motion, motion, 0.01)
+    log = written_table(tmp_path / "run.parquet", motion, motion)
     path = written(tmp_path, URDF)
     status, said = run("diagnose", path, log, "--validation", log, "--write-model", path)
     assert status == 2
     assert "exists: choose another name" in said
-
-
-def table(path: Path, position: np.ndarray, torque: np.ndarray, step_s: float) -> Path:
-    columns = {"time_s": step_s * np.arange(len(position))}
-    for i in range(position.shape[1]):
-        columns |= {f"position_{i + 1}": position[:, i], f"torque_cmd_{i + 1}": torque[:, i]}
-    pd.DataFrame(columns).to_parquet(path)
-    return path
 
 
 def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
@@ -92,28 +84,10 @@ def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
     bare = bare[: bare.index("  <transmission")] + "</robot>"
     path = written(tmp_path, bare)
     robot = load_robot(path)
-    noise = np.random.default_rng(0)
-    logs = []
-    for k in range(3):
-        time = 0.01 * np.arange(1500)
-        waves = [(0.6, 1.1 + 0.2 * k, 0.3), (0.4, 2.3, 1.0 + k)]
-        shape = [
-            np.sum([a * np.sin(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
-        ]
-        q = np.column_stack(shape)
-        rate = [
-            np.sum([a * w * np.cos(w * time + p + i) for a, w, p in waves], axis=0) for i in (0, 1)
-        ]
-        turn = [
-            -np.sum([a * w**2 * np.sin(w * time + p + i) for a, w, p in waves], axis=0)
-            for i in (0, 1)
-        ]
-        v, a = np.column_stack(rate), np.column_stack(turn)
-        torque = robot.inverse_dynamics(q, v, a) + np.array([1.5, 0.0]) * np.tanh(v / 0.01)
-        torque += 0.02 * noise.normal(size=q.shape)
-        logs.append(
-            table(tmp_path / f"run{k}.parquet", q + 1e-6 * noise.normal(size=q.shape), torque, 0.01)
-        )
+    friction = np.array([1.5, 0.0])
+    logs = [
+        written_log(tmp_path, k, robot, lambda _, v: friction * np.tanh(v / 0.01)) for k in range(3)
+    ]
     new = tmp_path / "new.urdf"
     status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
     assert status == 0, said
@@ -139,3 +113,26 @@ def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
     assert "no gear ratios: angles and torques of motors are those of the joints" in said
     assert "explained" in said
     assert "coulomb_friction@1" in said or "Coulomb friction" in said
+
+
+def test_causes_without_a_number_are_told_why(tmp_path: Path):
+    """An MJCF has no friction that falls from standstill: the command says what to do about it."""
+    bare = MJCF.replace('frictionloss="1.5" armature="0.2" stiffness="3"', "")
+    bare = bare.replace('damping="0.7"', "").replace(' gear="50"', "").replace(' ref="0.3"', "")
+    bare = bare.replace('<joint name="slide" type="slide" axis="1 0 0" pos="0 0.1 0"/>', "")
+    path = written(tmp_path, bare, "arm.xml")
+    size = np.array([1.0, 0.0])
+
+    def stribeck(_q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return size * (1.5 + 1.5 * np.exp(-((v / 0.3) ** 2))) * np.tanh(v / 0.03)
+
+    logs = [written_log(tmp_path, k, load_robot(path), stribeck) for k in range(3)]
+    new = tmp_path / "new.xml"
+    status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
+    assert status == 0, said
+    assert f"model: {new}, with none" in said
+    assert (
+        "no place in it for stribeck_friction@1: MJCF has no number for it: axisight.mujoco.apply adds it at "
+        "every step"
+    ) in said
+    assert new.read_text() == bare

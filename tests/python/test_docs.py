@@ -23,11 +23,13 @@ MODULES = (
     axisight.graybox,
     axisight.identifiability,
     axisight.montecarlo,
+    axisight.mujoco,
     axisight.records,
     axisight.rigid_body,
     axisight.robot_file,
     axisight.robot_export,
     axisight.robot_import,
+    axisight.signal_files,
     axisight.write_back,
 )
 PUBLIC = {f"{m.__name__}.{n}": getattr(m, n) for m in MODULES for n in m.__all__}

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from axisight import load_robot
+from axisight import Effect, Robot, load_robot
 from axisight.errors import InputError
+from axisight.gap.inverse import predicted_torque
 from axisight.gap.result import Cause, Interval
+from axisight.gap.torques import Variant
 from axisight.write_back import write_model
 from import_data import MJCF, URDF, changed, written
 
@@ -20,6 +24,9 @@ def cause(effect: str, axis: int, name: str, value: float) -> Cause:
     interval = Interval(value, 0.9 * value, 1.1 * value)
     return Cause(effect, axis, 0.97, {name: interval}, UNITS, Interval(50.0, 40.0, 60.0))
 
+
+# One joint a body, the second as it is.
+PLAIN = changed(MJCF, '        <joint name="slide" type="slide" axis="1 0 0" pos="0 0.1 0"/>\n', "")
 
 DRY, VISCOUS = (
     cause("coulomb_friction", 1, "coulomb_nm", 0.05),
@@ -96,6 +103,183 @@ def test_a_robot_file_has_place_for_all(tmp_path: Path):
     assert sorted(labels) == ["backlash@1", "coulomb_friction@1", "viscous_friction@2"]
     urdf = write_model(source, load_robot(source), [DRY], tmp_path / "of_urdf.toml")
     assert load_robot(urdf.path).effects[0].values()[0] == pytest.approx(0.05)
+
+
+def several(effect: str, axis: int | None, **values: float) -> Cause:
+    parameters = {name: Interval(value, value, value) for name, value in values.items()}
+    return Cause(effect, axis, 0.9, parameters, {}, Interval(50.0, 40.0, 60.0))
+
+
+HEAVIER = several("link_mass", 1, relative_change=0.2)
+ASIDE = several("link_com", 2, x_m=0.02, y_m=-0.01, z_m=0.03)
+LOAD = several("payload", None, mass_kg=1.5, x_m=0.1, y_m=0.05, z_m=-0.2)
+BULKIER = several("link_inertia", 2, relative_change=0.4)
+GAIN = several("torque_constant", 1, relative_error=0.07)
+SPRING = several("cable_stiffness", 2, stiffness_nm_rad=4.0)
+ROTORS = (
+    several("rotor_inertia", 2, inertia_kg_m2=0.3),
+    several("motor_inertia", 1, relative_change=0.5),
+)
+
+
+def torque_of(robot: Robot, effects: Sequence[Effect] = ()) -> np.ndarray:
+    """Return motor torques at random motions, all effects of the robot and these with it."""
+    random = np.random.default_rng(0)
+    motion = [random.normal(size=(200, robot.n_axes)) for _ in range(4)]
+    return predicted_torque(robot, Variant({}, tuple(effects)), tuple(motion))
+
+
+@pytest.mark.parametrize(
+    "causes",
+    [[HEAVIER], [ASIDE], [LOAD], [BULKIER], [HEAVIER, ASIDE, LOAD, BULKIER, VISCOUS]],
+    ids=lambda causes: causes[0].effect if len(causes) == 1 else "all",
+)
+@pytest.mark.parametrize("kind", ["urdf", "xml"])
+def test_links_become_what_the_simulator_has(tmp_path: Path, causes: list[Cause], kind: str):
+    """Frames that are turned, bodies on fixed joints, another motion of the same robot: the same torque."""
+    text = URDF if kind == "urdf" else PLAIN
+    source = written(tmp_path, text, f"arm.{kind}")
+    robot = load_robot(source)
+    made = write_model(source, robot, causes, tmp_path / f"new.{kind}")
+    assert made.placed == tuple(c.label for c in causes)
+    assert (made.left_out, made.remaining) == ((), ())
+    wanted = torque_of(robot, [c.as_effect() for c in causes])
+    assert np.abs(wanted - torque_of(robot)).max() > 0.005
+    np.testing.assert_allclose(torque_of(load_robot(made.path)), wanted, atol=1e-8)
+    # Nothing but numbers and comments.
+    assert [*map(str.strip, made.path.read_text().splitlines())][-1] == text.split()[-1].strip()
+    removed = [line for line in lines_changed(source, made.path) if line.startswith("-")]
+    assert len(removed) <= 3 * len(causes)
+
+
+def test_an_mjcf_has_gains_springs_and_rotors(tmp_path: Path):
+    source = written(tmp_path, MJCF, "arm.xml")
+    robot = load_robot(source)
+    causes = [GAIN, SPRING, *ROTORS]
+    made = write_model(source, robot, causes, tmp_path / "new.xml")
+    assert made.left_out == ()
+    wanted = torque_of(robot, [c.as_effect() for c in causes])
+    again = load_robot(made.path)
+    np.testing.assert_allclose(torque_of(again), wanted, atol=1e-8)
+    np.testing.assert_allclose(again.gear_ratio, robot.gear_ratio)
+    assert '<general joint="shoulder" gear="50" gainprm="1.07"/>' in made.path.read_text()
+    # Written once more, it is what was found last and not on top.
+    other = write_model(
+        made.path,
+        again,
+        [several("torque_constant", 1, relative_error=0.02)],
+        tmp_path / "more.xml",
+    )
+    assert 'gainprm="1.02"/>' in other.path.read_text()
+
+
+def test_a_motor_with_an_end_tag_becomes_general(tmp_path: Path):
+    text = changed(
+        MJCF, '<motor joint="shoulder" gear="50"/>', '<motor joint="shoulder" gear="50"> </motor>'
+    )
+    source = written(tmp_path, text, "arm.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "new.xml")
+    line = '<general joint="shoulder" gear="50" gainprm="1.07"> </general>'
+    assert line in made.path.read_text()
+    assert [e.label for e in load_robot(made.path).effects if e.name == GAIN.effect] == [GAIN.label]
+
+
+def test_defaults_do_not_make_a_motor_a_servo(tmp_path: Path):
+    """What a file has for all <general> does not reach the one that a <motor> becomes; a servo stays."""
+    servos = '<default><general biastype="affine" gainprm="400" biasprm="0 -400 -20"/></default>'
+    text = changed(MJCF, "  <worldbody>", f"  {servos}\n  <worldbody>")
+    source = written(tmp_path, text, "arm.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "new.xml")
+    line = 'gear="50" gainprm="1.07" gaintype="fixed" biastype="none" dyntype="none"/>'
+    assert line in made.path.read_text()
+    again = load_robot(made.path)
+    assert [e.label for e in again.effects if e.name == GAIN.effect] == [GAIN.label]
+    assert write_model(made.path, again, [GAIN], tmp_path / "more.xml").left_out == ()
+    source = written(tmp_path, changed(text, "<motor", "<general"), "servo.xml")
+    made = write_model(source, load_robot(source), [GAIN], tmp_path / "other.xml")
+    assert made.why == {
+        GAIN.label: "expected one motor of the joint that has a gain, got <general>"
+    }
+
+
+def test_only_numbers_that_change_are_written(tmp_path: Path):
+    source = written(tmp_path, MJCF, "arm.xml")
+    made = write_model(source, load_robot(source), [HEAVIER], tmp_path / "new.xml")
+    assert lines_changed(source, made.path) == [
+        '-      <inertial pos="0.1 0 0.2" mass="4" fullinertia="0.2 0.3 0.25 0.01 0 -0.02"/>',
+        "+      <!-- axisight: link_mass@1: relative_change = 0.2 (0.2 to 0.2), probability 0.90 -->",
+        '+      <inertial pos="0.1 0 0.2" mass="4.8" fullinertia="0.2 0.3 0.25 0.01 0 -0.02"/>',
+    ]
+
+
+def test_a_body_of_shapes_gets_an_inertial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    # MuJoCo writes a warning of the option below beside what runs.
+    monkeypatch.chdir(tmp_path)
+    shapes = changed(
+        MJCF,
+        '<inertial pos="0.1 0 0.2" mass="4" fullinertia="0.2 0.3 0.25 0.01 0 -0.02"/>',
+        '<geom type="capsule" fromto="0 0 0 0.5 0 0.1" size="0.05"/>',
+    )
+    source = written(tmp_path, shapes, "arm.xml")
+    robot = load_robot(source)
+    made = write_model(source, robot, [HEAVIER], tmp_path / "new.xml")
+    np.testing.assert_allclose(
+        torque_of(load_robot(made.path)), torque_of(robot, [HEAVIER.as_effect()]), atol=1e-7
+    )
+    assert "in place of its geoms" in made.path.read_text()
+    own = written(
+        tmp_path, changed(shapes, 'angle="radian"', 'angle="radian" settotalmass="9"'), "b.xml"
+    )
+    made = write_model(own, load_robot(own), [HEAVIER], tmp_path / "c.xml")
+    assert made.why == {"link_mass@1": "the compiler option settotalmass makes masses of its own"}
+
+
+def test_a_body_of_another_file_stays(tmp_path: Path):
+    inner = MJCF[MJCF.index('      <body name="lower"') : MJCF.index("    </body>\n  </worldbody>")]
+    written(tmp_path, f"<mujoco>{inner}</mujoco>", "lower.xml")
+    source = written(tmp_path, changed(MJCF, inner, '<include file="lower.xml"/>'), "arm.xml")
+    made = write_model(source, load_robot(source), [HEAVIER, LOAD], tmp_path / "new.xml")
+    assert made.placed == ("link_mass@1",)
+    assert made.why == {"payload": "'lower' stands in another file or has no name"}
+
+
+def test_what_has_no_place_is_told_why(tmp_path: Path):
+    source = written(tmp_path, MJCF, "arm.xml")
+    robot = load_robot(source)
+    ripple = several("torque_ripple", 1, order_1=6.0, cosine_1_nm=0.1)
+    lighter = several("viscous_friction", 1, viscous_nm_s_rad=-1.0)
+    thinner = several("link_inertia", 2, relative_change=-0.9)
+    servo = several("torque_constant", 2, relative_error=0.1)
+    causes = [PLAY, ripple, lighter, thinner, servo]
+    made = write_model(source, robot, causes, tmp_path / "new.xml")
+    assert made.placed == ()
+    assert made.path.read_bytes() == source.read_bytes()
+    assert [effect.label for effect in made.remaining] == [c.label for c in causes]
+    assert made.why == {
+        "backlash@1": "MJCF has no number for it",
+        "torque_ripple@1": "MJCF has no number for it: axisight.mujoco.apply adds it at every step",
+        "viscous_friction@1": "damping would be -2499, and models have none below zero",
+        "link_inertia@2": "'lower' has no mass of its own",
+        "torque_constant@2": "expected one motor of the joint that has a gain, got none",
+    }
+    other = written(
+        tmp_path, changed(MJCF, "stiffness=", 'springref="0.4" stiffness='), "other.xml"
+    )
+    made = write_model(
+        other,
+        load_robot(other),
+        [several("cable_stiffness", 1, stiffness_nm_rad=4.0)],
+        tmp_path / "o.xml",
+    )
+    assert made.why == {"cable_stiffness@1": "the joint's spring pulls to another place than zero"}
+    made = write_model(source, load_robot("scara_like"), [LOAD], tmp_path / "s.xml")
+    assert made.why == {"payload": "the robot is not the chain that the file says"}
+    urdf = written(tmp_path, URDF)
+    made = write_model(urdf, load_robot(urdf), [thinner, ripple], tmp_path / "new.urdf")
+    assert made.why == {
+        "link_inertia@2": "the inertia that 'lower' would have is that of no body",
+        "torque_ripple@1": "URDF has no number for it",
+    }
 
 
 def test_misuse_is_named(tmp_path: Path):

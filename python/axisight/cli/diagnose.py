@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from axisight import report as pages
-from axisight import write_back
+from axisight import signal_files, write_back
 from axisight.cli.common import OUT, Columns, From, To, bars, errors
 from axisight.cli.fleet import run_fleet
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
@@ -97,6 +97,12 @@ def diagnose_command(
             "one that was diagnosed."
         ),
     ] = None,
+    signals: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
+        ),
+    ] = None,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -127,6 +133,7 @@ def diagnose_command(
             "--effect": effect,
             "--next-experiment": next_experiment,
             "--write-model": write_model,
+            "--signals": signals,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -143,6 +150,8 @@ def diagnose_command(
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
         if write_model is not None:
             write_back.check_target(inputs.robot_source, write_model)
+        if signals is not None:
+            signal_files.check_target(signals, inputs=inputs.files())
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -160,12 +169,16 @@ def diagnose_command(
                 settings=settings,
                 progress=progress,
                 separate=next_experiment is not None,
+                signals=signals is not None,
             )
         write_diagnosis(found, json, report)
         if next_experiment is not None:
             _write_experiment(found, next_experiment)
         if write_model is not None:
             _write_model(found, inputs.robot_source, inputs.robot, write_model)
+        if signals is not None:
+            path = signal_files.write_signals(found.signals, signals)
+            OUT.print(f"signals: {path}", soft_wrap=True)
 
 
 def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Path) -> None:
@@ -175,8 +188,8 @@ def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Pat
         return
     made = write_back.write_model(source, robot, found.causes, target)
     OUT.print(f"model: {made.path}, with {', '.join(made.placed) or 'none'}", soft_wrap=True)
-    if made.left_out:
-        OUT.print(f"no place in it for {', '.join(made.left_out)}", soft_wrap=True)
+    for label in made.left_out:
+        OUT.print(f"no place in it for {label}: {made.why[label]}", soft_wrap=True)
 
 
 def _write_experiment(found: Diagnosis, folder: Path) -> None:

@@ -91,6 +91,15 @@ VISCOUS_FRICTION = "viscous_friction"
 ROTOR = "rotor_inertia"
 """What the inertia of a motor is that a model file leaves out."""
 
+MOTOR_INERTIA = "motor_inertia"
+"""What a rotor is that is heavier or lighter than the simulator's."""
+
+LINK_MASS, LINK_COM, LINK_INERTIA, LOAD = "link_mass", "link_com", "link_inertia", "payload"
+"""What a link is whose mass [1], centre of mass [m] or inertia [1] is another, and a load on the last link.
+
+Parameters: the relative change; the shift in the frame of the link; mass [kg] and place.
+"""
+
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
 """What a spring that pulls a joint to zero is, and its parameter."""
 
@@ -124,6 +133,18 @@ SPRING_CHANGES = {
     "gear_hysteresis": (("share",),),
 }
 """Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
+
+WITH_MEMORY = frozenset(
+    {
+        "presliding_friction",
+        "friction_warmup",
+        "extra_mode",
+        "input_delay",
+        "actuator_bandwidth",
+        "current_loop",
+    }
+)
+"""Effects on motors and joints whose torque hangs on what was before."""
 
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """What the machine of the demonstration has and its simulator has not."""

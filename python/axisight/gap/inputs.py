@@ -29,6 +29,10 @@ class Inputs:
     estimation: tuple[Log, ...]
     validation: tuple[Log, ...]
 
+    def files(self) -> list[Path]:
+        """Return the files that simulator and logs were read from."""
+        return [Path(self.robot_source), *(x.source for x in (*self.estimation, *self.validation))]
+
 
 def read_inputs(
     paths: Sequence[Path],

@@ -34,6 +34,7 @@ from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
 from axisight.gap.search import Search, search
 from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
+from axisight.gap.signals import signals_of
 from axisight.gap.straight import bent_for
 from axisight.gap.targets import with_commands
 from axisight.gap.tolerances import with_tolerances
@@ -62,6 +63,7 @@ def diagnose(
     settings: Settings | None = None,
     progress: Progress = _silent,
     separate: bool = False,
+    signals: bool = False,
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
@@ -75,6 +77,7 @@ def diagnose(
     progress : called with (what, done, total).
     separate : also design the experiment that tells the causes apart which stay open,
         ``Diagnosis.experiment`` (closed loop only).
+    signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
 
     Returns
     -------
@@ -121,6 +124,9 @@ def diagnose(
         progress("designing an experiment", 1, 1)
         if experiment is not None:
             out = replace(out, experiment=experiment, next_experiment=str(experiment))
+    if signals:
+        after = seen.reach.simulator
+        out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
     out.provenance["references"] = "logged" if view.mode == "closed_loop" else None
     if recovered is not None:
         out = replace(out, checks=(*out.checks, SAYS))
@@ -201,7 +207,7 @@ class Reach:
     """The gap on the validation logs before, re-fitted and with the causes one after another.
 
     ``judged``: the same with the floor of a machine that chatters; ``change``: what all of it changes
-    of the simulator's torque there.
+    of the simulator's torque there; ``simulator``: the one with all causes.
     """
 
     stages: Stages
@@ -210,6 +216,7 @@ class Reach:
     overlays: tuple[Overlay, ...]
     left: tuple[ErrorLog, ...]
     change: Stage
+    simulator: Variant
 
 
 def _reach(
@@ -253,6 +260,7 @@ def _reach(
         overlays(logs, before, steps[-1]),
         tuple(ErrorLog(*each) for each in remaining),
         measure([b - a for a, b in zip(before, steps[-1], strict=True)]),
+        simulators[-1],
     )
 
 

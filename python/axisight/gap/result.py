@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.gap.faults import Finding
 from axisight.gap.separate.experiment import Experiment
 from axisight.storage import write_whole
@@ -124,6 +125,11 @@ class Cause:
         """``effect@axis``, or the effect alone when it belongs to the whole arm."""
         return label(self.effect, self.axis, self.axes)
 
+    def as_effect(self) -> Effect:
+        """Return the effect with the values that were found."""
+        values = {name: p.value for name, p in self.parameters.items()}
+        return Effect(self.effect, None if self.axes else self.axis, values, self.axes)
+
 
 @dataclass(frozen=True)
 class AxisVerdict:
@@ -209,6 +215,12 @@ class Diagnosis:
     ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
     parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
     causes apart that stay open, where it was asked for.
+    ``signals``: where they were asked for, of each log, estimation logs first, a Dataset with the dims (time_s,
+    axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
+    simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
+    ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
+    less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
+    ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
     """
 
     name: str
@@ -236,6 +248,7 @@ class Diagnosis:
     settings: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     experiment: Experiment | None = None
+    signals: tuple[xr.Dataset, ...] = ()
 
     def to_verdict(self) -> dict[str, Any]:
         """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.

@@ -76,7 +76,8 @@ class Drive:
 
     ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
     ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero; ``servo``
-    of an actuator that is told positions, its gains of position [Nm/rad] and speed [Nm s/rad], motor side.
+    of an actuator that is told positions, its gains of position [Nm/rad] and speed [Nm s/rad], motor side;
+    ``gain`` is a motor's torque per command.
     """
 
     gear_ratio: float = 1.0
@@ -85,6 +86,7 @@ class Drive:
     friction: float = 0.0
     spring: float = 0.0
     servo: tuple[float, float] | None = None
+    gain: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

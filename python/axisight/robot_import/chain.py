@@ -20,13 +20,14 @@ class ChainJoint:
     """A joint of the chain, in frames that are parallel to the base's at zero angle.
 
     ``origin_m`` and ``axis`` (3,) stand in the parent's frame, ``mass`` in its own; ``body`` is what the
-    file has.
+    file has, whose frame is turned by ``rotation`` (3, 3) in the joint's.
     """
 
     body: Body
     origin_m: Array
     axis: Array
     mass: Mass | None
+    rotation: Array
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,9 @@ def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, l
     for body, at, masses in moving:
         mass = joined(m.at(Pose(np.eye(3), -at.origin)) for m in masses)
         _check(body, mass)
-        joints.append(ChainJoint(body, at.origin - before, at.rotation @ body.axis, mass))
+        joints.append(
+            ChainJoint(body, at.origin - before, at.rotation @ body.axis, mass, at.rotation)
+        )
         before = at.origin
     notes = [f"locked at zero, masses carried along: {_listed(locked)}"] if locked else []
     return joints, Pose(here.rotation, here.origin - before), notes

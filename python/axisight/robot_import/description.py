@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING
+from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING, TORQUE_CONSTANT
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Mass, Pose, joined
 from axisight.robot_import.chain import Chain, ChainJoint
@@ -48,6 +48,10 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
                     JOINT_SPRING[1]: joint.body.drive.spring,
                 }
             )
+        if joint.body.drive.gain != 1:
+            constant, share = TORQUE_CONSTANT
+            gain = joint.body.drive.gain - 1
+            effects.append({"name": constant, "axis": number, share: gain})
         if dry > 0:
             effects.append(
                 {

@@ -10,7 +10,7 @@ import numpy as np
 from axisight.errors import RobotError
 from axisight.robot.robot import MODEL_SUFFIXES, Robot
 from axisight.robot_import.bodies import Tree
-from axisight.robot_import.chain import chain_of
+from axisight.robot_import.chain import Chain, chain_of
 from axisight.robot_import.description import description
 from axisight.robot_import.dh import read_dh
 from axisight.robot_import.drives import DriveData, read_drives
@@ -67,10 +67,9 @@ def import_robot(
 
     """
     is_file = isinstance(source, str | Path)
-    tree = _tree(Path(source)) if is_file else tree_of(source)
     if not isinstance(drives, DriveData):
         drives = drive_data(source, drives)
-    chain = chain_of(tree, base or drives.base, tip or drives.tip)
+    tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
     named = Path(source).name if is_file else "a pinocchio.Model"
 
     def built(step_s: float | None) -> Robot:
@@ -108,6 +107,14 @@ def step_of_servos(robot: Robot) -> float:
     felt = robot.gear_ratio**2 / np.diag(np.linalg.inv(inertia))[robot.axis_joints]
     slowing_s = float(np.min(felt / np.maximum(robot.controller_gains["kd"], 1e-300)))
     return float(time / np.ceil(time / min(_SERVO_STEP_S, _SLOWED * slowing_s)))
+
+
+def bodies_and_chain(
+    source: Path | str | Any, drives: DriveData, *, base: str | None = None, tip: str | None = None
+) -> tuple[Tree, Chain]:
+    """Return what a model has, and the chain that is made of it; arguments as for `import_robot`."""
+    tree = _tree(Path(source)) if isinstance(source, str | Path) else tree_of(source)
+    return tree, chain_of(tree, base or drives.base, tip or drives.tip)
 
 
 def _tree(path: Path) -> Tree:

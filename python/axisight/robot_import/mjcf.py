@@ -137,6 +137,7 @@ class _Compiled:
                 float(model.dof_frictionloss[dof]),
                 float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
                 self.servos.get(j),
+                self._gains().get(j, 1.0),
             )
         else:
             drive = Drive()
@@ -171,15 +172,23 @@ class _Compiled:
 
     def _ratios(self) -> dict[int, float]:
         """Return the gear ratio of joints that one motor drives: one over its gear."""
+        found = self._of_one(self.model.actuator_gear[:, 0])
+        return {j: 1.0 / g for j, g in found.items() if g != 0}
+
+    def _gains(self) -> dict[int, float]:
+        """Return the torque per command of joints that one motor drives."""
+        found = self._of_one(self.model.actuator_gainprm[:, 0])
+        return {j: gain for j, gain in found.items() if j not in self.servos}
+
+    def _of_one(self, values: Array) -> dict[int, float]:
+        """Return values of actuators by joint, of joints that one motor or servo drives."""
         model, kinds = self.model, self.mujoco.mjtTrn
         found: dict[int, list[float]] = {}
         for i in range(model.nu):
             known = _is_motor(model, i) or _is_servo(model, i)
             if int(model.actuator_trntype[i]) == int(kinds.mjTRN_JOINT) and known:
-                found.setdefault(int(model.actuator_trnid[i, 0]), []).append(
-                    float(model.actuator_gear[i, 0])
-                )
-        return {j: 1.0 / g[0] for j, g in found.items() if len(g) == 1 and g[0] != 0}
+                found.setdefault(int(model.actuator_trnid[i, 0]), []).append(float(values[i]))
+        return {j: x[0] for j, x in found.items() if len(x) == 1}
 
     def _servos(self) -> dict[int, tuple[float, float]]:
         """Return the gains of position and speed of joints whose only actuator is told positions."""
@@ -237,10 +246,20 @@ class _Compiled:
         return self.lines.get((tag, name), f"{self.path}, <{tag} {name!r}>")
 
 
+# Torque per command of what may still be a motor: others have commands that are no torques.
+_GAINS = (0.2, 3.0)
+
+
+def is_gain(value: float) -> bool:
+    """Whether a gain of an actuator may be that of a motor: torque per torque that is commanded."""
+    return _GAINS[0] <= value <= _GAINS[1]
+
+
 def _is_motor(model: Any, i: int) -> bool:
-    """Whether an actuator is a source of torque: gain one, no bias, no state of its own."""
+    """Whether an actuator is a source of torque: a gain about one, no bias, no state of its own."""
     plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
-    return bool(plain and model.actuator_dyntype[i] == 0 and model.actuator_gainprm[i, 0] == 1)
+    torque = is_gain(float(model.actuator_gainprm[i, 0]))
+    return bool(plain and torque and model.actuator_dyntype[i] == 0)
 
 
 def _is_servo(model: Any, i: int) -> bool:

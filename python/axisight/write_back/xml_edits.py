@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from axisight.errors import RobotError
 from axisight.robot_import.xml_tree import Element
+
+Numbers = float | Sequence[float] | str
 
 # A start tag, or an element without content.
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
@@ -21,16 +23,36 @@ class Edits:
     name: str
     _changes: list[tuple[int, int, bytes]] = field(default_factory=list)
 
-    def set(self, element: Element, attributes: Mapping[str, float], comment: str) -> None:
-        """Set attributes of an element, with a comment on a line above it."""
-        start, tag = self._tag(element)
+    def set(
+        self,
+        element: Element,
+        attributes: Mapping[str, Numbers],
+        comment: str = "",
+        *,
+        without: Collection[str] = (),
+        tag: str = "",
+    ) -> None:
+        """Set attributes of an element, with a comment on a line above it.
+
+        ``without``: attributes that go; ``tag``: another name of an element without content.
+        """
+        start, old = self._tag(element)
+        made = old
+        for name in without:
+            made = _attribute(name).sub(b"", made, count=1)
         for name, value in attributes.items():
-            tag = _with(tag, name, value)
-        lead = self._indent(start)
-        self._replace(start, start + len(self._tag(element)[1]), _comment(comment) + lead + tag)
+            made = _with(made, name, value)
+        end = start + len(old)
+        if tag:
+            made = b"<" + tag.encode() + made[1 + len(element.tag.encode()) :]
+            if not old.endswith(b"/>"):
+                blanks, end = self._closed(element, end)
+                made += blanks + b"</" + tag.encode() + b">"
+        lead = _comment(comment) + self._indent(start) if comment else b""
+        self._replace(start, end, lead + made)
 
     def add(
-        self, element: Element, child: str, attributes: Mapping[str, float], comment: str
+        self, element: Element, child: str, attributes: Mapping[str, Numbers], comment: str = ""
     ) -> None:
         """Put a child with attributes first in an element, with a comment above it."""
         start, tag = self._tag(element)
@@ -38,7 +60,7 @@ class Edits:
         made = f"<{child}/>".encode()
         for name, value in attributes.items():
             made = _with(made, name, value)
-        more = inner + _comment(comment) + inner + made
+        more = (inner + _comment(comment) if comment else b"") + inner + made
         end = start + len(tag)
         if not tag.endswith(b"/>"):
             self._replace(end, end, more)
@@ -65,6 +87,13 @@ class Edits:
             raise RobotError(f"{element.where}: its text cannot be edited")
         return found.start(), found.group()
 
+    def _closed(self, element: Element, start: int) -> tuple[bytes, int]:
+        """Return the text of an element without content, which begins at ``start``, and where it ends."""
+        found = re.compile(rb"([^<]*)</[^>]*>").match(self.text, start)
+        if found is None:
+            raise RobotError(f"{element.where}: expected no content, its text cannot be edited")
+        return found.group(1), found.end()
+
     def _indent(self, start: int) -> bytes:
         """Return the line break and the blanks before an element; nothing where it follows another."""
         line = self.text.rfind(b"\n", 0, start) + 1
@@ -72,10 +101,17 @@ class Edits:
         return b"\n" + lead if line and not lead.strip() else b"\n"
 
 
-def _with(tag: bytes, name: str, value: float) -> bytes:
+def _attribute(name: str) -> re.Pattern[bytes]:
+    """Return what finds an attribute with the blanks before it: its name and sign, and its value."""
+    return re.compile(rb"(\s+" + re.escape(name.encode()) + rb"\s*=\s*)(?:\"[^\"]*\"|'[^']*')")
+
+
+def _with(tag: bytes, name: str, value: Numbers) -> bytes:
     """Return a start tag with an attribute set."""
-    said = f'"{value:.10g}"'.encode()
-    known = re.compile(rb"(\s" + re.escape(name.encode()) + rb"\s*=\s*)(?:\"[^\"]*\"|'[^']*')")
+    numbers = [value] if isinstance(value, int | float) else value
+    text = value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in numbers)
+    said = f'"{text}"'.encode()
+    known = _attribute(name)
     if known.search(tag):
         return known.sub(lambda m: m.group(1) + said, tag, count=1)
     end = b"/>" if tag.endswith(b"/>") else b">"

@@ -1,0 +1,156 @@
+"""Torques of effects at one moment, by the formulas of the package's core."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import tomlkit
+from numpy.typing import ArrayLike, NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects, effect_info
+from axisight.effects.stated import WITH_MEMORY
+from axisight.errors import InputError
+from axisight.fitting import FitOptions, Weighting
+from axisight.robot import Robot
+from axisight.simulation import Integrator
+
+Array = NDArray[np.float64]
+
+_INSTEAD = {
+    "transmission": "it acts inside the gear, which the model has no joint of its own for",
+    "sensor": "it changes what is measured: change what your controller reads",
+    "controller": "it belongs to the controller: change your own",
+    "arm": "it changes masses or lengths: write it into the model, write_back.write_model",
+    "base": "it moves the base: turn gravity, or let the base give way, in the model",
+}
+
+
+def is_torque(effect: Effect) -> bool:
+    """Whether an effect is a torque of the angle, speed, load and command of one joint."""
+    return not _why_none(effect)
+
+
+def check_applicable(effects: Sequence[Effect], n_axes: int) -> None:
+    """Raise InputError naming the first effect that is no torque of angle, speed, load and command.
+
+    ``n_axes``: how many there are.
+    """
+    for effect in effects:
+        why = _why_none(effect)
+        if why:
+            raise InputError(
+                f"effect {effect.label!r}: expected one that is a torque of the joint's angle, speed, load "
+                f"and command, got one that is none: {why}"
+            )
+        if effect.axis is None or effect.axis > n_axes:
+            raise InputError(
+                f"effect {effect.label!r}: axis: expected one from 1 to {n_axes}, got {effect.axis}"
+            )
+
+
+def _why_none(effect: Effect) -> str:
+    """Return why an effect is no such torque, nothing where it is one."""
+    info = effect_info(effect.name)
+    if info.scope == "axes":
+        return "it acts between two axes"
+    if effect.name in WITH_MEMORY:
+        return "it has a memory, and a torque of the moment has none"
+    if (info.stands_for or ("",))[0] == "motor_inertia":
+        return "it is an armature: write it into the model, write_back.write_model"
+    return _INSTEAD.get(info.acts, "")
+
+
+class EffectTorques:
+    """Torques that effects add to joints, joint side, evaluated by the core.
+
+    The core knows effects of a robot. The one here has wheels on a common axis without weight: its
+    links take any forces one likes, whatever the speeds, and what is off them is the effects'.
+    """
+
+    def __init__(self, effects: Sequence[Effect], gear_ratio: ArrayLike) -> None:
+        self.ratio = np.asarray(gear_ratio, np.float64)
+        self.n = len(self.ratio)
+        self._robot = Robot.from_toml(_wheels(self.ratio))
+        path = [e for e in effects if effect_info(e.name).acts == "torque_path"]
+        self._path = core_effects(path)
+        self._others = core_effects([e for e in effects if e not in path])
+        self._weighting, self._options = Weighting.flat(self.n).core(), FitOptions()
+
+    def __call__(self, angle: Array, speeds: Array, load: Array, command: Array) -> Array:
+        """Return the torques (m, n_axes) [Nm] of effects that are not on the way of the command.
+
+        At ``angle`` [rad] and ``load`` [Nm] of the joints and ``command`` [Nm] of the motors, (n_axes,), at
+        several ``speeds`` (m, n_axes) [rad/s] of the joints.
+        """
+        # The wheel k turns by the sum of all angles up to it, and its torque is felt by all of them.
+        wheels = load - np.append(load[1:], 0.0)
+        acceleration = np.diff(wheels, prepend=0.0)
+        every = np.ones((len(speeds), 1))
+        record = (
+            every * (angle / self.ratio),
+            np.ascontiguousarray(speeds / self.ratio),
+            every * (acceleration / self.ratio),
+            every * command,
+            np.ones_like(speeds),
+        )
+        found = _core.evaluate_inverse_dynamics(
+            self._robot.core,
+            self._others,
+            [],
+            [record],
+            self._weighting,
+            self._options,
+        )
+        # Of motors that move such a load, less what it needs without effects.
+        asked = found.residual.reshape(self.n, -1).T + command
+        return np.asarray(load - asked / self.ratio)
+
+    def of_command(self, command: Array) -> Array:
+        """Return what the way of the command adds to joints (n_axes,) [Nm]: delivered less commanded."""
+        if not self._path:
+            return np.zeros(self.n)
+        step = self._robot.sample_time_s
+        run = _core.simulate_batch(
+            self._robot.core,
+            self._path,
+            np.tile(command, (1, 2, 1)),
+            reference=False,
+            integrator=Integrator("rk4"),
+            threads=1,
+        )
+        # From rest a constant torque moves by half its acceleration times the square of the time.
+        moved = 2 * run["joint_position_rad"][0, 1] / step**2
+        turned = np.cumsum(moved)
+        delivered = np.cumsum(turned[::-1])[::-1]
+        return np.asarray(delivered - command / self.ratio)
+
+
+def _wheels(ratio: Array) -> str:
+    """Return the robot file of wheels of 1 kg m^2 on one axis, each on the one before."""
+    joints = [
+        {
+            "name": f"wheel{i}",
+            "kind": "driven",
+            "origin": [0.0, 0.0, 0.0],
+            "axis": [0.0, 0.0, 1.0],
+            "link": {
+                "mass": 1.0,
+                "com": [0.0, 0.0, 0.0],
+                "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+            },
+            "drive": {"gear_ratio": float(r), "motor_inertia": 0.0, "viscous_friction": 0.0},
+        }
+        for i, r in enumerate(ratio, 1)
+    ]
+    return tomlkit.dumps(
+        {
+            "schema": "axisight.robot/2",
+            "name": "wheels",
+            "gravity": [0.0, 0.0, 0.0],
+            "sample_time": 1e-3,
+            "joint": joints,
+            "operating_point": {"joint_angle": [0.0] * len(ratio)},
+        }
+    )

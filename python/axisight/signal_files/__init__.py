@@ -1,0 +1,6 @@
+"""Signals of a diagnosis as files that plotting tools open: Parquet, MCAP."""
+
+from axisight.signal_files.target import check_target
+from axisight.signal_files.write import write_signals
+
+__all__ = ["check_target", "write_signals"]

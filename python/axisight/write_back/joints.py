@@ -1,0 +1,92 @@
+"""Numbers of joints: friction, damping, armature, springs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from axisight.effects import effect_info
+from axisight.effects.stated import (
+    DRY_FRICTION,
+    JOINT_SPRING,
+    MOTOR_INERTIA,
+    ROTOR,
+    VISCOUS_FRICTION,
+)
+from axisight.robot import Robot
+from axisight.robot_import.xml_tree import Element
+from axisight.write_back.placed import Placed, said
+from axisight.write_back.xml_edits import Edits
+
+if TYPE_CHECKING:
+    from axisight.gap.result import Cause
+
+JOINT_NUMBERS = {
+    "robot": {DRY_FRICTION[0]: "friction", VISCOUS_FRICTION: "damping"},
+    "mujoco": {
+        DRY_FRICTION[0]: "frictionloss",
+        VISCOUS_FRICTION: "damping",
+        ROTOR: "armature",
+        MOTOR_INERTIA: "armature",
+        JOINT_SPRING[0]: "stiffness",
+    },
+}
+"""What a model has a number for on its joints, by its root and by effect."""
+
+
+def write_joint(
+    edits: Edits, root: str, joint: Element, robot: Robot, axis: int, causes: Sequence[Cause]
+) -> Placed:
+    """Write the causes of one axis (from 0) that are numbers of its joint, with one comment."""
+    placed = Placed()
+    by_number: dict[str, list[Cause]] = {}
+    for cause in causes:
+        by_number.setdefault(JOINT_NUMBERS[root][cause.effect], []).append(cause)
+    numbers: dict[str, float] = {}
+    for name, mine in by_number.items():
+        value = _number(robot, axis, mine)
+        if value < 0:
+            placed.refuse(mine, f"{name} would be {value:.4g}, and models have none below zero")
+        elif name == "stiffness" and _pulls_elsewhere(joint):
+            placed.refuse(mine, "the joint's spring pulls to another place than zero")
+        else:
+            numbers[name] = value
+            placed.take(mine)
+    there = [cause for cause in causes if cause.label in placed.there]
+    if there:
+        _edit(edits, root, joint, numbers, said(there))
+    return placed
+
+
+def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
+    """Return what causes of one number make of it: of the joint."""
+    ratio = abs(float(robot.gear_ratio[axis]))
+    first = effect_info(causes[0].effect)
+    if first.stands_for is None:
+        # It has taken the place of what the simulator had.
+        value = next(iter(causes[-1].parameters.values())).value
+        return value / ratio if first.acts == "motor" else value
+    name = robot.axis_parameter(axis + 1, first.stands_for[0])
+    value = 0.0 if name is None else robot.parameters()[name]
+    for cause in causes:
+        change = next(iter(cause.parameters.values())).value
+        of = effect_info(cause.effect).stands_for
+        value = value * (1 + change) if of is not None and of[1] == "relative" else value + change
+    return value / ratio**2
+
+
+def _pulls_elsewhere(joint: Element) -> bool:
+    return joint.numbers("springref", 1, (0.0,)) != (0.0,)
+
+
+def _edit(
+    edits: Edits, root: str, joint: Element, numbers: Mapping[str, float], comment: str
+) -> None:
+    if root == "mujoco":
+        edits.set(joint, numbers, comment)
+        return
+    dynamics = joint.find("dynamics")
+    if dynamics is not None:
+        edits.set(dynamics, numbers, comment)
+    else:
+        edits.add(joint, "dynamics", numbers, comment)

@@ -1,0 +1,45 @@
+"""What became of causes: where they stand in a model, or why they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from axisight.effects import effect_info
+
+if TYPE_CHECKING:
+    from axisight.gap.result import Cause
+
+
+@dataclass
+class Placed:
+    """Labels of the causes that stand in the model, and why the others do not, by label."""
+
+    there: set[str] = field(default_factory=set)
+    why_not: dict[str, str] = field(default_factory=dict)
+
+    def refuse(self, causes: Sequence[Cause], why: str) -> None:
+        """Say why causes do not stand in the model."""
+        self.why_not |= {cause.label: why for cause in causes}
+
+    def take(self, causes: Sequence[Cause]) -> None:
+        """Say that causes stand in the model."""
+        self.there |= {cause.label for cause in causes}
+
+
+def said(causes: Sequence[Cause]) -> str:
+    """Return what a comment says of causes: values with intervals, probabilities, as the diagnosis does."""
+    return "axisight: " + "; ".join(_cause(cause) for cause in causes)
+
+
+def _cause(cause: Cause) -> str:
+    info = effect_info(cause.effect)
+    side = " on the motor" if info.acts in ("motor", "torque_path") else ""
+    values = []
+    for name in (p.name for p in info.parameters if p.role == "amplitude"):
+        value, unit = cause.parameters.get(name), cause.units.get(name, "")
+        if value is not None:
+            text = f"{name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})"
+            values.append(text if unit in ("", "1") else f"{text} {unit}{side}")
+    return f"{cause.label}: {', '.join(values)}, probability {cause.probability:.2f}"

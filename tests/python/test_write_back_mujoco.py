@@ -1,0 +1,31 @@
+"""What a verdict promises holds in MuJoCo: machines, models and figures of benches/write_back.py."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.parametrize("name", ["dry friction", "load", "torque constant", "Stribeck"])
+def test_the_gap_in_mujoco_is_the_promised_one(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+):
+    """Within a point by inverse dynamics; a simulation does not lose a low-passed reversal of dry friction."""
+    monkeypatch.syspath_prepend(repository / "benches")
+    bench = import_module("write_back")
+    machine = bench.MACHINES[name]
+    out = bench.outcome(machine, tmp_path, simulated_s=5.0)
+    assert [cause.label for cause in out.found.causes] == [machine.effect]
+    promised = out.found.gap
+    assert promised.after < 0.2 * promised.before
+    assert out.inverse[0] == pytest.approx(promised.before, abs=0.001)
+    assert out.inverse[1] == pytest.approx(promised.after, abs=0.01)
+    assert out.run[0] == pytest.approx(promised.before, abs=0.05)
+    assert promised.after - 0.05 < out.run[1] < promised.after + 0.01
+    assert (out.made.remaining == ()) == (name != "Stribeck")
+    # Quotes, comments and all that is no number of the cause.
+    text = out.made.path.read_text()
+    assert "<!-- as drawn -->" in text
+    assert "axis='0 1 0'" in text
