@@ -75,7 +75,8 @@ def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
         "rigid_body/estimate.py": {"coulomb_friction"},
         "rigid_body/checks.py": {"coulomb_friction"},
         "graybox/robot_values.py": {"torque_offset", "backlash"},
-        "reader.rs": set(),
+        # A key of controllers that are told positions.
+        "robot_file/reader.rs": {"gravity_compensation"},
         # A load that is mounted, as drive data state it.
         "cli/robot_files.py": {"payload"},
     }

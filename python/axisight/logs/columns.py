@@ -108,8 +108,9 @@ class TemperatureColumn(_Signal):
 
 
 class AxisColumns(_Strict):
-    """The signals of one driven axis. A log is read only where all axes have a torque, or targets of their positions;
-    a check needs neither.
+    """The signals of one driven axis.
+
+    A log is read only where all axes have a torque, or targets of their positions; a check needs neither.
     """
 
     position: PositionColumn

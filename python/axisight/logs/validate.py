@@ -28,7 +28,9 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
     else:
         findings += _partly(found, "torque", "a torque", "torque_missing")
     findings += _partly(found, "velocity_ref", "a velocity reference", "reference_missing")
-    return findings + _partly(found, "position_ref", "a target of the position", "reference_missing")
+    return findings + _partly(
+        found, "position_ref", "a target of the position", "reference_missing"
+    )
 
 
 def _no_torque(found: Gathered) -> list[Finding]:

@@ -14,8 +14,8 @@ from axisight.logs.guessing.families import Family, families_of
 from axisight.logs.guessing.named import Fit, named_map
 from axisight.logs.guessing.others import (
     take_joint_positions,
-    take_temperature,
     take_targets,
+    take_temperature,
     take_torque,
     take_velocity,
 )
