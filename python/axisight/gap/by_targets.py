@@ -23,15 +23,16 @@ from axisight.gap.targets import Commanded
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.tracking_weights import shortest
 from axisight.gap.view import View
-from axisight.logs import Log
+from axisight.logs import Log, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Of the rate of the logs: what is compared lies below, where a spline between samples is a motion.
-_BAND = 0.35
+# Of the rate of the logs: what is compared lies below, where a spline between samples is a motion, and
+# noise, which gains of speed make the more of the faster it is, does not drown it.
+_BAND = 0.2
 # Samples of a segment of a density, at the rate of the logs.
 _SEGMENT = 256
 # Of the slowest frequency that a log holds, half a wave of it: what is slower is constant.
@@ -120,9 +121,14 @@ class TargetsView(View):
 
         Without its mean: a log's first position is as noisy as the others, and a run begins there.
         """
-        step = self._commanded.step
-        logged = error_rad[::step]
-        return self._commanded.of_error(self._commanded.fine(logged - logged.mean(axis=0)))
+        logged = error_rad[:: self._commanded.step]
+        return self._as_torque(logged - logged.mean(axis=0))
+
+    def _as_torque(self, logged_rad: Array) -> Array:
+        """Return an error at the rate of the logs (n, n_axes) [rad] as torque, what is compared of it."""
+        time = self.robot.sample_time_s * self._commanded.step
+        passed = lowpass(np.ascontiguousarray(logged_rad), time, _BAND / time)
+        return self._commanded.of_error(self._commanded.fine(passed))
 
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
@@ -134,7 +140,7 @@ class TargetsView(View):
             white_noise(self.settings.seed, run, len(log.time_s[::step]), self.robot.n_axes)
             for run, log in enumerate(logs, start=first_run)
         ]
-        return [self._commanded.of_error(self._commanded.fine(x * self._std_rad)) for x in noise]
+        return [self._as_torque(x * self._std_rad) for x in noise]
 
     def remarks(self) -> tuple[str, ...]:
         """Say what was compared."""

@@ -317,7 +317,7 @@ def _assemble(
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     judged = gap_figures(reach.judged)
     names = [log.name for log in held_logs]
-    nominal, tolerances = robot_parameters(robot), settings.tolerances_of(robot)
+    nominal, tolerances = robot_parameters(robot), view.fitter.tolerances
     share = bent_for(view.fitter, found)
     conclusion = carried_over(conclusion, reach.judged, judged, names, settings, own, share)
     measured = [view.measured(log) for log in held_logs]

@@ -511,11 +511,17 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
 # within a sample chatters.
 _TURNS_SLOWLY = 0.05
 
+
+def _gain_of_position(trial: Trial) -> FreeEffect:
+    """Begin at the neutral values; another gain of speed is viscous friction, which is tried as such."""
+    return replace(_neutral(trial), free=(trial.info.parameters[0].name,))
+
+
 TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "coulomb_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "asymmetric_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "load_dependent_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     # No logged torque tells a controller: a fit has to.
-    "controller_gain": _neutral,
+    "controller_gain": _gain_of_position,
 }
 """Of those that begin otherwise where positions are compared under the same targets."""

@@ -49,7 +49,14 @@ def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str]
     return tuple((c.label, Effect(TORQUE_SENSOR[0], c.axis).label) for c in alone)
 
 
+def _has_both(gains: NamedCause) -> bool:
+    """Whether both gains were found: to positions one alone is fitted, and there is no torque sensor."""
+    return gains.parameters.keys() >= set(OTHER_GAINS[1])
+
+
 def _small_and_one(gains: NamedCause, unseen: float) -> bool:
+    if not _has_both(gains):
+        return False
     proportional, integral = (gains.parameters[name].value for name in OTHER_GAINS[1])
     size = max(abs(proportional), abs(integral))
     return abs(proportional - integral) < _ALONE * size < _ALONE * unseen
@@ -57,6 +64,8 @@ def _small_and_one(gains: NamedCause, unseen: float) -> bool:
 
 def _agree(gains: NamedCause, constant: NamedCause) -> bool:
     """Whether both gains are off by one share, and the torque constant by its inverse."""
+    if not _has_both(gains):
+        return False
     proportional, integral = (gains.parameters[name] for name in OTHER_GAINS[1])
     error = constant.parameters[TORQUE_CONSTANT[1]]
     doubt = max(_INVERSE, error.high - error.value)
