@@ -1,7 +1,7 @@
 //! The sampled loop around the linear plant.
 
 use super::harmonics::Ripple;
-use super::plant::LinearPlant;
+use super::plant::{LinearAxis, LinearPlant};
 use super::propagator::Propagator;
 use super::tiles::Tiles;
 use axisight_plant::simulation::{
@@ -92,7 +92,7 @@ fn own_laws<S: Scalar>(
         return Ok(Vec::new());
     }
     let of_axis = |kernels: Vec<_>| OwnLaw::of_axis(&kernels, run.sample_time);
-    let each = plant.axes.iter().map(|axis| axis.path_kernels());
+    let each = plant.axes.iter().map(LinearAxis::path_kernels);
     Ok(each
         .map(|kernels| kernels.map(of_axis))
         .collect::<Result<_, _>>()?)
