@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 Array = NDArray[np.float64]
 ROS2, ROS1 = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
@@ -64,3 +64,40 @@ def written_states(
         if more is not None:
             more(writer, types)
     return next(path.glob("*.mcap")) if kind == "mcap file" else path
+
+
+CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
+_POINTS = {"new": ("reference", "feedback"), "old": ("desired", "actual")}
+
+
+def controller_states(
+    names: Sequence[str], time_s: Array, told: Array, done: Array, age: str
+) -> Callable[[Any, Any], None]:
+    """Return what writes states of a trajectory controller, targets and positions (n, n_joints).
+
+    ``age``: ``new`` or ``old`` names of their points.
+    """
+    points = _POINTS[age]
+    fields = [f"trajectory_msgs/JointTrajectoryPoint {point}" for point in (*points, "error")]
+    text = "\n".join(["std_msgs/Header header", "string[] joint_names", *fields])
+
+    def write(writer: Any, types: Any) -> None:
+        types = get_typestore(Stores.ROS2_JAZZY)
+        types.register(get_types_from_msg(text, CONTROLLER_STATE))
+        known = types.types
+        connection = writer.add_connection("/arm/state", CONTROLLER_STATE, typestore=types)
+        for k, time in enumerate(time_s):
+            stamp = START_NS + round(time * 1e9)
+            when = known["builtin_interfaces/msg/Time"](*divmod(stamp, 1_000_000_000))
+            still = known["builtin_interfaces/msg/Duration"](0, 0)
+            none = np.zeros(0)
+            rows = [
+                known["trajectory_msgs/msg/JointTrajectoryPoint"](row, none, none, none, still)
+                for row in (told[k], done[k], told[k] - done[k])
+            ]
+            message = known[CONTROLLER_STATE](
+                known["std_msgs/msg/Header"](when, ""), list(names), *rows
+            )
+            writer.write(connection, stamp, types.serialize_cdr(message, CONTROLLER_STATE))
+
+    return write

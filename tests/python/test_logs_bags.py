@@ -11,7 +11,7 @@ from axisight import Robot, read_log
 from axisight.errors import LogError, MissingExtraError
 from axisight.logs import check_log, parse_column_map
 from axisight.robot_import import import_robot
-from bag_data import START_NS, written_states
+from bag_data import START_NS, controller_states, written_states
 from import_data import URDF, written
 
 TIME = np.arange(300) / 100.0
@@ -74,7 +74,9 @@ def test_a_hole_is_not_bridged_unasked(tmp_path: Path, robot: Robot):
 def test_joints_are_found_by_name(tmp_path: Path, robot: Robot):
     """A gripper on the same topic is another series; one of other names is no arm."""
     path = written_states(tmp_path / "run", "mcap", TIME, ["a", "b"], STATES)
-    with pytest.raises(LogError, match=r"effort of shoulder, elbow, got none.*joint_states: a, b"):
+    with pytest.raises(
+        LogError, match=r"effort of shoulder, elbow, or.*got none.*joint_states: a, b"
+    ):
         read_log(path, robot=robot)
     no_effort = written_states(tmp_path / "bare", "mcap", TIME, NAMES, (POSITION, VELOCITY, []))
     with pytest.raises(LogError, match=r"got none \(topics that have both: none\)"):
@@ -95,6 +97,26 @@ def test_joints_are_found_by_name(tmp_path: Path, robot: Robot):
 
     both = written_states(tmp_path / "both", "mcap", TIME, NAMES, STATES, more=gripper)
     assert read_log(both, robot=robot).n_samples == len(TIME)
+
+
+@pytest.mark.parametrize("age", ["new", "old"])
+def test_states_of_a_trajectory_controller_are_targets_and_positions(
+    tmp_path: Path, robot: Robot, age: str
+):
+    """They stand in where joint states have no effort, and do not where they have."""
+    told = POSITION + 0.01
+    more = controller_states(NAMES, TIME, told, POSITION, age)
+    path = written_states(
+        tmp_path / "run", "mcap", TIME, NAMES, (POSITION, VELOCITY, []), more=more
+    )
+    log = read_log(path, robot=robot)
+    ratio = np.array([1 / 50, 1.0])
+    assert not log.has_torque
+    assert log.position_ref_rad is not None
+    np.testing.assert_allclose(log.position_ref_rad, told[:, ::-1] / ratio, rtol=1e-12)
+    np.testing.assert_allclose(log.position_rad, POSITION[:, ::-1] / ratio, rtol=1e-12)
+    whole = written_states(tmp_path / "whole", "mcap", TIME, NAMES, STATES, more=more)
+    assert read_log(whole, robot=robot).has_torque
 
 
 def test_two_topics_of_the_same_joints_need_a_map(tmp_path: Path, robot: Robot):

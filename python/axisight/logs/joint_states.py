@@ -14,60 +14,93 @@ from axisight.logs.columns import ColumnMap
 if TYPE_CHECKING:
     from axisight.robot import Robot
 
-_REQUIRED = ("position", "effort")
+# Signals of an axis and the fields of a topic that hold them, the first two needed: joint states, and what
+# controllers of trajectories say of themselves, by the names of their newer and older messages.
+_LAYOUTS: tuple[dict[str, str], ...] = (
+    {"position": "position", "torque": "effort", "velocity": "velocity"},
+    *(
+        {
+            "position": f"{done}.positions",
+            "position_ref": f"{told}.positions",
+            "velocity": f"{done}.velocities",
+            "velocity_ref": f"{told}.velocities",
+            "torque": f"{done}.effort",
+        }
+        for done, told in (("feedback", "reference"), ("actual", "desired"))
+    ),
+)
+_UNITS = {
+    "position": ("rad", "m"),
+    "position_ref": ("rad", "m"),
+    "velocity": ("rad/s", "m/s"),
+    "velocity_ref": ("rad/s", "m/s"),
+    "torque": ("Nm", "N"),
+}
 
 
 def joint_state_map(
     arrays: Mapping[str, NDArray[Any]], robot: Robot | None, where: Path
 ) -> ColumnMap:
-    """Return the column map of the topic that has position and effort of joints, joint side.
+    """Return the column map, joint side, of the topic with position and effort of joints, or targets of theirs.
 
     Axes stand in the order of ``robot``, found by the names of its joints, or as the topic has them without
-    one. Stamps that are not uniform are resampled at their usual rate, which the log's notes say. Raises
-    LogError where no topic, or more than one, has what is needed.
+    one. Targets, of the state of a trajectory controller, are looked for where no topic has efforts. Stamps
+    that are not uniform are resampled at their usual rate, which the log's notes say. Raises LogError where
+    no topic, or more than one, has what is needed.
     """
-    topics = _topics(arrays)
     wanted = None if robot is None else robot.axis_names
-    usable = {
-        t: joints for t, joints in topics.items() if wanted is None or set(wanted) <= set(joints)
-    }
+    shown_topics: list[str] = []
+    usable: dict[str, list[str]] = {}
+    layout = _LAYOUTS[0]
+    for layout in _LAYOUTS:
+        topics = _topics(arrays, layout)
+        shown_topics += [f"{t}: {', '.join(joints)}" for t, joints in topics.items()]
+        usable = {
+            t: joints
+            for t, joints in topics.items()
+            if wanted is None or set(wanted) <= set(joints)
+        }
+        if usable:
+            break
     if len(usable) != 1:
-        shown = "; ".join(f"{t}: {', '.join(joints)}" for t, joints in topics.items()) or "none"
+        shown = "; ".join(shown_topics) or "none"
         joints = "joints" if wanted is None else ", ".join(wanted)
         raise LogError(
-            f"{where}: expected one topic with position and effort of {joints}, got "
-            f"{'several' if len(usable) > 1 else 'none'} (topics that have both: {shown}); name the joints "
+            f"{where}: expected one topic with position and effort of {joints}, or with targets of their "
+            f"positions, got {'several' if len(usable) > 1 else 'none'} (topics that have both: {shown}); name the joints "
             f"of the model as the recording does, or give a column map"
         )
     ((topic, found),) = usable.items()
     slides = [False] * len(found) if robot is None else robot.axis_is_prismatic
     axes = [
-        _axis(arrays, topic, joint, prismatic)
+        _axis(arrays, topic, joint, layout, slides=prismatic)
         for joint, prismatic in zip(wanted or found, slides, strict=True)
     ]
     time = {"name": f"{topic}.time_s", "unit": "s", "resample_hz": "mean"}
     return ColumnMap.model_validate({"time": time, "axis": axes, "side": "joint"})
 
 
-def _topics(arrays: Mapping[str, NDArray[Any]]) -> dict[str, list[str]]:
-    """Return the joints of every topic that has position and effort of some."""
+def _topics(arrays: Mapping[str, NDArray[Any]], layout: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the joints of every topic that has what a layout needs of some."""
+    first, second, *_ = layout.values()
     out: dict[str, list[str]] = {}
     for name in arrays:
-        topic, mark, joint = name.partition(".position.")
-        if mark and all(f"{topic}.{field}.{joint}" in arrays for field in _REQUIRED):
+        topic, mark, joint = name.partition(f".{first}.")
+        if mark and f"{topic}.{second}.{joint}" in arrays:
             out.setdefault(topic, []).append(joint)
     return out
 
 
 def _axis(
-    arrays: Mapping[str, NDArray[Any]], topic: str, joint: str, prismatic: bool
+    arrays: Mapping[str, NDArray[Any]],
+    topic: str,
+    joint: str,
+    layout: Mapping[str, str],
+    *,
+    slides: bool,
 ) -> dict[str, Any]:
-    units = ("m", "N", "m/s") if prismatic else ("rad", "Nm", "rad/s")
-    fields = zip(
-        ("position", "torque", "velocity"), ("position", "effort", "velocity"), units, strict=True
-    )
     return {
-        key: {"name": f"{topic}.{field}.{joint}", "unit": unit}
-        for key, field, unit in fields
+        key: {"name": f"{topic}.{field}.{joint}", "unit": _UNITS[key][slides]}
+        for key, field in layout.items()
         if f"{topic}.{field}.{joint}" in arrays
     }
