@@ -25,7 +25,7 @@ def main(seed: int, step_s: float) -> None:
     """Print a line for every machine, and the counts."""
     first, invented = 0, 0
     with tempfile.TemporaryDirectory() as folder:
-        robot = simulator(Path(folder))
+        robot = simulator(Path(folder), replace(NOMINAL, step_s=step_s))
         complete = {f"nothing, run {i + 1}": NOMINAL for i in range(5)}
         for number, (lacks, arm) in enumerate({**MACHINES, **complete}.items()):
             machine: ServoArm = replace(arm, step_s=step_s)

@@ -67,8 +67,8 @@ def joint_state_map(
         joints = "joints" if wanted is None else ", ".join(wanted)
         raise LogError(
             f"{where}: expected one topic with position and effort of {joints}, or with targets of their "
-            f"positions, got {'several' if len(usable) > 1 else 'none'} (topics that have both: {shown}); name the joints "
-            f"of the model as the recording does, or give a column map"
+            f"positions, got {'several' if len(usable) > 1 else 'none'} (topics that have both: {shown}); name the "
+            f"joints of the model as the recording does, or give a column map"
         )
     ((topic, found),) = usable.items()
     slides = [False] * len(found) if robot is None else robot.axis_is_prismatic
