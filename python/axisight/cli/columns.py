@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, errors
-from axisight.errors import InputError
+from axisight.cli.common import OUT, check_new, errors
 from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
 from axisight.robot import load_robot
@@ -54,8 +53,7 @@ def guess_command(
 ) -> None:
     """Propose a column map from names and numbers, with the reason of every choice beside it."""
     with errors():
-        if out is not None and out.exists() and not overwrite:
-            raise InputError(f"{out} exists: choose another name or pass --overwrite")
+        check_new(out, overwrite=overwrite)
         found = guess_columns(log, None if robot is None else load_robot(robot))
         if out is None:
             typer.echo(found.text, nl=False)

@@ -74,3 +74,9 @@ def numbers(option: str, text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
+
+
+def check_new(target: Path | None, *, overwrite: bool) -> None:
+    """Refuse a file to write that exists, unless it may be replaced; None is the screen."""
+    if target is not None and target.exists() and not overwrite:
+        raise InputError(f"{target} exists: choose another name or pass --overwrite")

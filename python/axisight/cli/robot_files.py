@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, errors
+from axisight.cli.common import OUT, check_new, errors
 from axisight.cli.robot import say_import
 from axisight.errors import InputError
 from axisight.robot_import import import_robot
@@ -59,8 +59,7 @@ def import_command(
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
     with errors():
-        if out is not None and out.exists() and not overwrite:
-            raise InputError(f"{out} exists: choose another name or pass --overwrite")
+        check_new(out, overwrite=overwrite)
         data = drive_data(model, drives)
         if payload is not None:
             data = data.model_copy(update={"payload": _payload(payload)})

@@ -6,7 +6,7 @@ whole band, comparable with torques of causes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.fitting import Weighting
 from axisight.gap.closed_loop import ClosedLoopFitter
-from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.feedback import controller_response, loop_responses
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.settings import Settings
@@ -41,6 +40,8 @@ _WHOLE_LOG = 0.5
 
 class TargetsView(View):
     """Simulator and machine driven by the same targets, positions compared."""
+
+    by_targets = True
 
     def __init__(self, commanded: Commanded, logs: list[Log], settings: Settings) -> None:
         self._commanded = commanded
@@ -89,12 +90,6 @@ class TargetsView(View):
         f = np.maximum(frequency_hz, frequency_hz[1])
         response = controller_response(self._commanded.robot, f)
         return np.asarray(np.abs(np.einsum("fii->if", response)))
-
-    def candidates(
-        self, model: Evidence, *, axes: Collection[int] | None = None
-    ) -> list[FreeEffect]:
-        """Return the candidates; gains of the controller are among them, for no torque tells them."""
-        return self._candidates(model, axes, by_targets=True)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the answer of the loop's position to an effect (n_freq,)."""

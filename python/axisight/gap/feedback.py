@@ -34,9 +34,14 @@ def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) 
 def gain_shares(
     robot: Robot, speed: Array, angle: Array, axis: int | None = None
 ) -> tuple[Array, Array]:
-    """Return what the proportional and the integral gain make of the errors, as in `feedback`."""
+    """Return what the proportional and the integral gain make of the errors, as in `feedback`.
+
+    Of a controller that is told positions those are the gains of position and of speed.
+    """
     gains = {k: v if axis is None else v[axis] for k, v in robot.controller_gains.items()}
     kp, ki = gains["kp"], gains.get("ki", 0.0)
+    if "kd" in gains:
+        return np.asarray(kp * angle), np.asarray(gains["kd"] * speed)
     if "kv" not in gains:
         return np.asarray(kp * speed), np.asarray(ki * angle)
     error = speed + gains["kv"] * angle
@@ -49,7 +54,7 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
     kp, ki = gains["kp"], gains.get("ki", 0.0)
     back = np.exp(-2j * np.pi * frequency_hz * time)[:, None]
     out = (1 - back) / time
-    if robot.controller_kind == "pd_position":
+    if "kd" in gains:
         out = gains["kd"] * out + kp
         return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
     # The error of a cascade is summed up to the sample before.

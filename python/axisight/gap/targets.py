@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from axisight.errors import InputError
+from axisight.gap.feedback import feedback
 from axisight.gap.noise import position_noise_std
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -53,9 +54,7 @@ class Commanded:
 
     def of_error(self, error_rad: Array) -> Array:
         """Return the torque (n, n_axes) [Nm] that the gains make of an error of positions, at the controller's rate."""
-        gains, time = self.robot.controller_gains, self.robot.sample_time_s
-        speed = np.diff(error_rad, axis=0, prepend=error_rad[:1]) / time
-        return np.asarray(-(gains["kp"] * error_rad + gains["kd"] * speed))
+        return -feedback(self.robot, _speed(self.robot, error_rad), error_rad)
 
 
 def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
@@ -131,6 +130,11 @@ def _check_start(robot: Robot, log: Log, first: Log) -> None:
         )
 
 
+def _speed(robot: Robot, angle: Array) -> Array:
+    """Return the speed that a controller takes of angles (n, n_axes): none at the first."""
+    return np.asarray(np.diff(angle, axis=0, prepend=angle[:1]) / robot.sample_time_s)
+
+
 def _commanded(robot: Robot, log: Log, step: int) -> Log:
     """Return a log at the controller's rate, with its command."""
     assert log.position_ref_rad is not None  # checked before
@@ -142,10 +146,8 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
     if robot.velocity_feedforward and log.velocity_ref_rad_s is not None:
         rate = np.repeat(log.velocity_ref_rad_s, step, axis=0)[:n]
         target = target[0] + (np.cumsum(rate, axis=0) - rate) * time
-    gains = robot.controller_gains
-    speed = np.diff(position, axis=0, prepend=position[:1]) / time
     fed = rate if robot.velocity_feedforward else 0.0
-    torque = gains["kp"] * (target - position) + gains["kd"] * (fed - speed)
+    torque = feedback(robot, fed - _speed(robot, position), target - position)
     return replace(
         log,
         sample_time_s=time,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ Complex = NDArray[np.complex128]
 class View(ABC):
     """One way of comparing simulator and logs: what to fit, what error it leaves, what floor."""
 
+    by_targets: ClassVar[bool] = False
+    """Whether positions are compared under the same targets, not torques."""
+
     mode: Mode
     robot: Robot
     logs: list[Log]
@@ -56,12 +60,6 @@ class View(ABC):
 
         On ``axes`` (from 1), by default those where it leaves something worth a cause.
         """
-        return self._candidates(model, axes)
-
-    def _candidates(
-        self, model: Evidence, axes: Collection[int] | None, *, by_targets: bool = False
-    ) -> list[FreeEffect]:
-        """Return them; ``by_targets``: where positions are compared, not torques."""
         enough = self.floor.expected + self.settings.smallest_gain
         if axes is not None:
             # A square is more than less than nothing, and less than infinity.
@@ -80,7 +78,7 @@ class View(ABC):
             self.logs,
             at,
             inverse_dynamics=self.mode == "inverse_dynamics",
-            by_targets=by_targets,
+            by_targets=self.by_targets,
             threads=self.settings.threads,
         )
         return [f for f in found if f.effect.label not in self.not_offered]
