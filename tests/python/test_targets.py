@@ -16,7 +16,7 @@ from axisight.gap.targets import between, with_commands
 from axisight.logs.log import not_logged
 from servo_arm import HOME_RAD, MACHINES, NOMINAL, RATE_HZ, ServoArm, simulator, targets
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
 
 Array = NDArray[np.float64]
 ROUNDING_NM = 1e-9
