@@ -106,7 +106,7 @@ fn through_plant<S: Scalar>(robot: &RobotDescription, torque: &[f64]) -> Respons
     let run = Run {
         controller: &robot.controller,
         sample_time: SAMPLE_TIME,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive: Drive::Torque(&inputs),
         noise: &[],
         resolution: 0.0,

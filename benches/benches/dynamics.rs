@@ -28,7 +28,7 @@ fn right_hand_side<S: Scalar>(c: &mut Criterion, label: &str) {
     let Ok(plant) = assemble::<S>(&robot, &[], &[]) else {
         return;
     };
-    let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5]) else {
+    let Ok(rest) = equilibrium(&plant, &[0.3, -0.4, 0.5].map(S::constant)) else {
         return;
     };
     let mut x = plant.state_at_rest(&rest);
@@ -71,7 +71,7 @@ fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
     let run = Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive: Drive::Reference(&inputs),
         noise: &[],
         resolution: 0.0,

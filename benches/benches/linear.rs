@@ -54,7 +54,7 @@ impl Case {
         let run = Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,
-            start: &self.robot.operating_point,
+            start: &[&self.robot.operating_point],
             drive: Drive::Reference(&inputs),
             noise: &noise,
             resolution: 0.0,

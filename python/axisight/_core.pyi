@@ -700,7 +700,7 @@ def simulate_batch(
     reference: bool,
     integrator: IntegratorSpec,
     noise: _Array | None = None,
-    start: _Numbers | None = None,
+    start: Sequence[_Numbers] | None = None,
     model: _Model | str = "nonlinear",
     resolution: float = 0.0,
     threads: int = 0,
@@ -710,7 +710,7 @@ def simulate_batch(
 
     ``input`` (n_runs, n_samples, n_axes) are motor-side velocity references [rad/s] through the
     controller if ``reference``, else commanded torques [Nm]. ``noise`` [rad], of the same
-    shape, is added to the measured position. ``start`` (n_axes,) [rad] are the driven joint
+    shape, is added to the measured position. ``start`` (1 or n_runs, n_axes) [rad] are the driven joint
     angles at rest, None the operating point. ``resolution`` [rad] is the step of the position
     sensor, 0 for none. ``threads`` 0 takes every core; results do not depend on it.
     """
@@ -736,7 +736,7 @@ def fit_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -748,12 +748,13 @@ def fit_simulation(
 ) -> FitResult:
     """Fit a free-running simulation to logs.
 
-    ``records`` are (input, target, certainty) of shape (n_samples, n_axes), one per log: a velocity
-    reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or measured motor
-    position [rad], as ``input`` and ``output`` say; the certainty, from 0 to 1, is a factor on the
-    weighted error of its sample, None for one everywhere. Every log starts at rest at the operating
-    point. ``weighting`` has one entry per axis. ``warm`` gives Jacobian columns (n_residuals,)
-    of nuisance parameters from an earlier fit, by parameter index (from 0).
+    ``records`` are (input, target, certainty, start), the first three of shape (n_samples, n_axes), one
+    per log: a velocity reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or
+    measured motor position [rad], as ``input`` and ``output`` say; the certainty, from 0 to 1, is a
+    factor on the weighted error of its sample, None for one everywhere. Every log begins at rest, at
+    ``start`` (n_axes,) [rad], None for the operating point. ``weighting`` has one entry per axis.
+    ``warm`` gives Jacobian columns (n_residuals,) of nuisance parameters from an earlier fit, by
+    parameter index (from 0).
     """
 
 def fit_inverse_dynamics(
@@ -780,7 +781,7 @@ def evaluate_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -799,7 +800,7 @@ def courses(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,

@@ -84,14 +84,14 @@ class ServoArm:
 </mujoco>
 """
 
-    def log(self, run: int, noise_rad: float = NOISE_RAD) -> Log:
+    def log(self, run: int, noise_rad: float = NOISE_RAD, home_rad: Array = HOME_RAD) -> Log:
         """Return targets and positions of one run, from where the arm has settled."""
         import mujoco  # noqa: PLC0415 - an extra
 
         model = mujoco.MjModel.from_xml_string(self.mjcf())
         data = mujoco.MjData(model)
-        wanted = targets(run)
-        data.qpos[:] = HOME_RAD
+        wanted = targets(run, home_rad)
+        data.qpos[:] = home_rad
         data.ctrl[:] = wanted[0]
         mujoco.mj_step(model, data, round(SETTLED_S / self.step_s))
         steps, late = round(1 / RATE_HZ / self.step_s), round(self.late_s / self.step_s)
@@ -116,7 +116,7 @@ class ServoArm:
         )
 
 
-def targets(run: int) -> Array:
+def targets(run: int, home_rad: Array = HOME_RAD) -> Array:
     """Return sums of sines up to 2.2 Hz (n, 3) [rad] that begin and end at home."""
     rng = np.random.default_rng(run)
     t = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
@@ -127,7 +127,7 @@ def targets(run: int) -> Array:
         for f in rng.uniform(0.1, 2.2, 7):
             wave = np.sin(2 * np.pi * (f * t + rng.uniform()))
             out[:, axis] += reach / np.sqrt(7) * wave / max(f, 0.4) ** 0.7
-    return np.asarray(HOME_RAD + out * fade[:, None])
+    return np.asarray(home_rad + out * fade[:, None])
 
 
 def simulator(folder: Path, arm: ServoArm | None = None) -> Robot:

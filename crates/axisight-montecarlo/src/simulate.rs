@@ -153,7 +153,7 @@ fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>,
     let run = Run {
         controller: &settings.robot.controller,
         sample_time: settings.robot.sample_time,
-        start: &settings.start,
+        start: &[&settings.start],
         drive: Drive::Reference(&references),
         noise: &noises,
         resolution: settings.resolution,

@@ -171,11 +171,13 @@ fn linearize<P: Problem + Send>(
     })
 }
 
-/// Input, target and certainty of a record, arrays `(n, n_axes)`.
+/// Input, target and certainty of a record, arrays `(n, n_axes)`, and driven joint angles where it
+/// begins.
 type RecordTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     Option<PyReadonlyArray2<'py, f64>>,
+    Option<Vec<f64>>,
 );
 
 /// What an error of simulation is made of, as Python hands it over.
@@ -202,12 +204,13 @@ impl SimulationSpec<'_, '_> {
     fn problem(self, cancel: &Arc<AtomicBool>) -> PyResult<SimulationErrorProblem> {
         let (robot, options) = (&self.robot.description, self.options);
         let n_axes = robot.n_axes();
-        let record = |(i, t, c): &RecordTuple<'_>| {
+        let record = |(i, t, c, start): &RecordTuple<'_>| {
             let certainty = c.as_ref().map(|c| rows(c, "certainty", n_axes));
             Ok(Record {
                 input: rows(i, "input", n_axes)?,
                 target: rows(t, "target", n_axes)?,
                 certainty: certainty.transpose()?,
+                start: start.clone(),
             })
         };
         let problem = SimulationErrorProblem {

@@ -101,7 +101,7 @@ pub fn measurement_noise(
 /// How to simulate, apart from inputs.
 struct Options {
     reference: bool,
-    start: Option<Vec<f64>>,
+    start: Option<Vec<Vec<f64>>>,
     method: Method,
     model: Model,
     resolution: f64,
@@ -120,7 +120,7 @@ pub fn simulate_batch<'py>(
     reference: bool,
     integrator: IntegratorSpec,
     noise: Option<PyReadonlyArray3<'py, f64>>,
-    start: Option<Vec<f64>>,
+    start: Option<Vec<Vec<f64>>>,
     model: &str,
     resolution: f64,
     threads: usize,
@@ -159,8 +159,8 @@ fn run(
     }
     let cancel = flag(cancel);
     let settings = settings(effects);
-    let operating_point = robot.description.operating_point.clone();
-    let start = options.start.unwrap_or(operating_point);
+    let operating_point = || vec![robot.description.operating_point.clone()];
+    let start = options.start.unwrap_or_else(operating_point);
     let batch = Batch {
         robot: &robot.description,
         settings: &settings,

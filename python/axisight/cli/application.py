@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 from importlib import import_module
 from typing import Annotated, Any
@@ -68,10 +70,20 @@ _COMMANDS = {
 }
 
 
+# Their matrices are small and their threads many: those of the linear algebra would spin beside them.
+_THREADED = ("blind", "demo", "diagnose")
+
+
 def load_command(name: str) -> Any:
     """Return the command of a name as click knows it."""
+    if name in _THREADED:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     module, attribute = _COMMANDS[name][0].split(":")
+    # What is imported stays: it need not be looked through for what can go, now or later.
+    gc.disable()
     found = getattr(import_module(f"axisight.cli.{module}"), attribute)
+    gc.freeze()
+    gc.enable()
     if not isinstance(found, typer.Typer):
         alone = typer.Typer(add_completion=False)
         alone.command(name)(found)

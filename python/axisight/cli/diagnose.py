@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+import axisight
 from axisight import report as pages
-from axisight import signal_files, write_back
 from axisight.cli.common import OUT, Columns, From, To, bars, errors
-from axisight.cli.fleet import run_fleet
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
@@ -138,6 +138,8 @@ def diagnose_command(
             "--to": stop_s,
         }
         settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
+        # Brings what tables and schedulers need: only for those who have a fleet.
+        run_fleet = import_module("axisight.cli.fleet").run_fleet
         run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
         return
     with errors():
@@ -149,9 +151,9 @@ def diagnose_command(
         part = (start_s, stop_s)
         inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
         if write_model is not None:
-            write_back.check_target(inputs.robot_source, write_model)
+            axisight.write_back.check_target(inputs.robot_source, write_model)
         if signals is not None:
-            signal_files.check_target(signals, inputs=inputs.files())
+            axisight.signal_files.check_target(signals, inputs=inputs.files())
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -177,7 +179,7 @@ def diagnose_command(
         if write_model is not None:
             _write_model(found, inputs.robot_source, inputs.robot, write_model)
         if signals is not None:
-            path = signal_files.write_signals(found.signals, signals)
+            path = axisight.signal_files.write_signals(found.signals, signals)
             OUT.print(f"signals: {path}", soft_wrap=True)
 
 
@@ -186,7 +188,7 @@ def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Pat
     if not found.causes:
         OUT.print("no model was written: no cause was named")
         return
-    made = write_back.write_model(source, robot, found.causes, target)
+    made = axisight.write_back.write_model(source, robot, found.causes, target)
     OUT.print(f"model: {made.path}, with {', '.join(made.placed) or 'none'}", soft_wrap=True)
     for label in made.left_out:
         OUT.print(f"no place in it for {label}: {made.why[label]}", soft_wrap=True)

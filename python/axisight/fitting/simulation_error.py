@@ -288,8 +288,8 @@ def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
     )
 
 
-def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, None]]:
-    """Return (input, target, no certainty) of logs, in closed loop or driven by torque."""
+def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, None, Array | None]]:
+    """Return (input, target, no certainty, start) of logs, in closed loop or driven by torque."""
     out = []
     for log in logs:
         reference = log.velocity_ref_rad_s
@@ -299,7 +299,7 @@ def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, No
             )
         pair = (reference, log.torque_nm) if closed else (log.torque_nm, log.position_rad)
         first, second = (np.ascontiguousarray(x, dtype=np.float64) for x in pair)
-        out.append((first, second, None))
+        out.append((first, second, None, log.start_rad))
     return out
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
+from axisight.statistics.tails import log_fisher_tail
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def amplitude_significance(evidence: Evidence, stretch: NDArray[np.int64]) -> fl
     # As good as singular where two amplitudes are one: the ridge then takes them as one.
     normal = scatter / np.outer(scale, scale) + 1e-9 * np.eye(len(columns))
     square = float((size / scale) @ np.linalg.solve(normal, size / scale))
-    tail = scipy.stats.f.logsf(square * left / (freedom * len(columns)), len(columns), left)
+    tail = log_fisher_tail(square * left / (freedom * len(columns)), len(columns), left)
     # Of a single size both signs are in the tail; a normal deviate has one.
     return max(0.0, float(-scipy.special.ndtri_exp(tail))) if tail > -700 else 37.0
 

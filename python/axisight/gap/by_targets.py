@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.fitting import Weighting
-from axisight.gap.closed_loop import ClosedLoopFitter
+from axisight.gap.closed_loop import ClosedLoopFitter, Record
 from axisight.gap.feedback import controller_response, loop_responses
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.settings import Settings
@@ -167,14 +167,16 @@ def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
     return out
 
 
-def _records(logs: Sequence[Log]) -> list[tuple[Array, Array, Array]]:
-    """Return references, positions and how far each sample counts."""
+def _records(logs: Sequence[Log]) -> list[Record]:
+    """Return references, positions, how far each sample counts, and where each log begins."""
     out = []
     for log in logs:
         assert log.velocity_ref_rad_s is not None  # logs with commands have them
-        parts = (log.velocity_ref_rad_s, log.position_rad, np.ones_like(log.position_rad))
-        out.append(tuple(np.ascontiguousarray(x, np.float64) for x in parts))
-    return out  # type: ignore[return-value]
+        reference, position = (
+            np.ascontiguousarray(x, np.float64) for x in (log.velocity_ref_rad_s, log.position_rad)
+        )
+        out.append((reference, position, np.ones_like(position), log.start_rad))
+    return out
 
 
 class TargetsFitter(ClosedLoopFitter):

@@ -43,8 +43,9 @@ Complex = NDArray[np.complex128]
 # the log by more than waves of a ripple are long.
 TRACKING_SPEED = 1 / 3
 
-# Position [rad], torque [Nm] and certainty of a log, (n, n_axes).
-Record = tuple[Array, Array, Array]
+# Position [rad], torque [Nm] and certainty of a log, (n, n_axes), and the joint angles where it
+# begins [rad], (n_axes,); None at the operating point.
+Record = tuple[Array, Array, Array, Array | None]
 # Robot, effects, parameters, records and weights, as the core takes them.
 _Problem = tuple[
     _core.Robot,
@@ -186,7 +187,7 @@ def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> li
     """Return what a simulator that is kept on logs is compared with."""
     certain = certainties(tracking, logs, weighting)
     return [
-        (_contiguous(log.position_rad), _contiguous(log.torque_nm), c)
+        (_contiguous(log.position_rad), _contiguous(log.torque_nm), c, log.start_rad)
         for log, c in zip(logs, certain, strict=True)
     ]
 
@@ -203,7 +204,7 @@ class ClosedLoopFitter(ModelFitter):
     log, without which lost motion and stiction have no smooth error to fit. The controller is
     that of ``robot``, which need not be the machine's.
     ``records``: position [rad] and torque [Nm] of each log, and how far a simulator can be asked to
-    follow it, (n, n_axes).
+    follow it, (n, n_axes), and where it begins.
     """
 
     driven_by: ClassVar[Literal["tracking", "reference"]] = "tracking"
@@ -233,7 +234,7 @@ class ClosedLoopFitter(ModelFitter):
 
     def _counted_by_log(self) -> list[Array]:
         step = self.weighting.decimation
-        return [c[: len(c) // step * step : step] ** 2 for *_, c in self.records]
+        return [c[: len(c) // step * step : step] ** 2 for _, _, c, _ in self.records]
 
     def along(self, records: list[Record]) -> ClosedLoopFitter:
         """Return the same for other runs, as ``records`` are."""
@@ -247,7 +248,10 @@ class ClosedLoopFitter(ModelFitter):
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None
         return self.along(
-            [(p[:n], t[:n], c[:n]) for n, (p, t, c) in zip(halves, self.records, strict=True)]
+            [
+                (p[:n], t[:n], c[:n], start)
+                for n, (p, t, c, start) in zip(halves, self.records, strict=True)
+            ]
         )
 
     def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:

@@ -21,6 +21,7 @@ from axisight.gap.screening import Bench, thinned
 from axisight.gap.search import Search
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.view import View
+from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def detection_limits(found: Search, view: View) -> tuple[DetectionLimit, ...]:
     limits = []
     for s in sorted(kept, key=_order):
         needed = np.maximum(least, smallest_likely_fall(loss, numbers(s.option)))
-        sure = float(scipy.stats.norm.ppf(_POWER)) * np.sqrt(noise)
+        sure = normal_deviate(1.0 - _POWER) * np.sqrt(noise)
         shows = (sure + np.sqrt(sure**2 + needed)) ** 2
         limits.append(_limit(s, shows, view.fitter.tolerated(s.option.effect)))
     return tuple(limits)

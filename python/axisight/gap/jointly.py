@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
@@ -22,6 +21,7 @@ from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
 from axisight.gap.settings import Settings
+from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 Found = tuple[Ranked, Standing]
@@ -33,7 +33,7 @@ _PARTNERS = 4
 _HINT = 0.2
 # What each of a pair that is a cause together has to show beside the other: the pair has passed
 # the test of the whole family, its two members are held against one another.
-_OF_TWO = float(scipy.stats.norm.isf(0.025))
+_OF_TWO = normal_deviate(0.025)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Pairs:
         )
         # As many pairs as there could have been, were all candidates tried.
         level = self.settings.false_alarms / max(tried * len(mine), 1)
-        needed = max(self.settings.significance, float(scipy.stats.norm.isf(level)))
+        needed = max(self.settings.significance, normal_deviate(level))
         if not worth or self.layout.significance(self.current, both.held_out, axis) <= needed:
             return None
         one = self._beside(best[0], best[1], mine, axis)

@@ -9,6 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.gap.evidence import Evidence
+from axisight.statistics.tails import log_student_tail
 
 Array = NDArray[np.float64]
 
@@ -110,5 +111,5 @@ def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:
     mean = float(x.mean())
     t = mean / max(float(np.sqrt(pooled / len(x))), 1e-12 * abs(mean), 1e-300)
     # The scatter is known from these few only; beyond what floating point holds, it is sure.
-    tail = float(scipy.stats.t.logsf(t, freedom))
+    tail = log_student_tail(t, freedom)
     return float(-scipy.special.ndtri_exp(tail)) if tail > -700 else 37.0

@@ -28,6 +28,8 @@ from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
 from axisight.gap.modes import view_of
+from axisight.gap.poses import SAYS as FROM_OWN_POSES
+from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
 from axisight.gap.remainder import refit_worse, remainder_of
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
@@ -104,6 +106,8 @@ def diagnose(
         noted = pass_gate_by_targets(machine, logs[:n_fit], logs[n_fit:])
         fit_logs, held_logs = list(commanded.logs[:n_fit]), list(commanded.logs[n_fit:])
     else:
+        logs = at_their_poses(machine, [*fit_logs, *held_logs])
+        fit_logs, held_logs = logs[:n_fit], logs[n_fit:]
         noted = pass_gate(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
     recovered = with_references(machine, [*fit_logs, *held_logs])
@@ -128,6 +132,8 @@ def diagnose(
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
     out.provenance["references"] = "logged" if view.mode == "closed_loop" else None
+    if view.mode == "closed_loop" and any(log.start_rad is not None for log in fit_logs):
+        out = replace(out, checks=(*out.checks, FROM_OWN_POSES))
     if recovered is not None:
         out = replace(out, checks=(*out.checks, SAYS))
         out.provenance["references"] = "recovered"

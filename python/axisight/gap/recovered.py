@@ -85,7 +85,8 @@ def _holding_nm(robot: Robot, log: Log) -> Array:
 
     The first one, or the simulator's where that would make the first one a step of the reference.
     """
-    simulated = simulate(robot, np.zeros((1, log.n_axes)))["torque_cmd_nm"].values[0]
+    run = simulate(robot, np.zeros((1, log.n_axes)), start_rad=log.start_rad)
+    simulated = run["torque_cmd_nm"].values[0]
     speed = np.abs(np.diff(log.position_rad, axis=0)).max(axis=0) / log.sample_time_s
     first, slight = log.torque_nm[0], _STEP * robot.controller_gains["kp"] * speed
     return np.asarray(np.where(np.abs(first - simulated) < slight, first, simulated))

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
@@ -35,6 +34,7 @@ from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 from axisight.gap.swaps import straightened, weighed_again
 from axisight.gap.trials import Progress, Trials, fresh, interact, settled
+from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 
@@ -364,7 +364,7 @@ def _is_cause(
     """
     needed = max(
         settings.significance,
-        float(scipy.stats.norm.isf(settings.false_alarms / max(2 * tried, 1))),
+        normal_deviate(settings.false_alarms / max(2 * tried, 1)),
     )
     fall = best.gain * float(state.layout.samples()[standing.axis])
     least = float(state.least_falls(settings)[standing.axis])

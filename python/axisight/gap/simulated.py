@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import InputError
+from axisight.gap.poses import starts_of
 from axisight.gap.torques import Variant
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -53,6 +54,7 @@ def _along(
         effects=effects,
         method="rk4",
         noise=None if noise is None else _padded(noise),
+        start_rad=starts_of(robot, logs),
         threads=threads,
     )
     values = out[signal].values

@@ -16,6 +16,7 @@ from scipy.interpolate import make_interp_spline
 from axisight.errors import InputError
 from axisight.gap.feedback import feedback
 from axisight.gap.noise import position_noise_std
+from axisight.gap.poses import at_their_poses
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -23,9 +24,6 @@ Array = NDArray[np.float64]
 
 # By how much a sample time may be off a whole number of the controller's.
 _CLOCK = 0.01
-# Joint angle between the starts of logs below which they start alike [rad, m]: gravity differs by a few
-# per cent beyond.
-_SAME_START = 0.02
 # Share of the top speed with which a log may begin; noise of speeds besides, so many times over.
 _AT_REST = 0.02
 _NOISES = 6.0
@@ -62,7 +60,7 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
 
     Raises InputError where only some logs have torque, where the robot has no controller of targets or a
     log no targets, for sample times that are no multiple of the controller's, and for logs that
-    begin in motion or at different poses.
+    begin in motion.
     """
     if all(log.has_torque for log in logs):
         return None
@@ -72,7 +70,8 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     start = np.mean([log.position_rad[0] for log in logs], axis=0)
     fed = robot.velocity_feedforward and all(x.velocity_ref_rad_s is not None for x in logs)
     machine = robot.with_operating_point(start * robot.gear_ratio).with_velocity_feedforward(fed)
-    return Commanded(machine, tuple(_commanded(machine, log, step) for log in logs), step)
+    begun = at_their_poses(machine, logs)
+    return Commanded(machine, tuple(_commanded(machine, log, step) for log in begun), step)
 
 
 def between(values: Array, step: int) -> Array:
@@ -107,17 +106,11 @@ def _check(robot: Robot, logs: Sequence[Log]) -> None:
                 f"sample_time: expected a multiple of the controller's {robot.sample_time_s:g} s, got "
                 f"{log.sample_time_s:g} s in log {log.name!r}"
             )
-        _check_start(robot, log, logs[0])
+        _check_rest(log)
 
 
-def _check_start(robot: Robot, log: Log, first: Log) -> None:
-    """Refuse a log that begins in motion, or elsewhere than the first one."""
-    off = np.abs(log.position_rad[0] - first.position_rad[0]) * np.abs(robot.gear_ratio)
-    if off.max() > _SAME_START:
-        raise InputError(
-            f"log {log.name!r}: expected a start where log {first.name!r} starts, got one "
-            f"{off.max():.3g} rad off (axis {int(off.argmax()) + 1}, joint side)"
-        )
+def _check_rest(log: Log) -> None:
+    """Refuse a log that begins in motion."""
     speed = np.gradient(log.position_rad, log.sample_time_s, axis=0)
     noise = position_noise_std([log]) / log.sample_time_s
     allowed = _AT_REST * np.abs(speed).max(axis=0) + _NOISES * noise

@@ -52,6 +52,9 @@ class Log:
     the columns of axes without that sensor. On an axis whose `axis_kinds` entry is "prismatic", rad
     reads m and Nm reads N.
 
+    `start_rad` (axes,) (rad) are the driven joint angles at which a simulation of this run starts, at
+    rest; None is the robot's operating point.
+
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
     (time grid replaced, resampled). Raises InputError when shapes disagree.
     """
@@ -67,6 +70,7 @@ class Log:
     velocity_rad_s: Floats | None = None
     joint_position_rad: Floats | None = None
     temperature_c: Floats | None = None
+    start_rad: Floats | None = None
     excitation: str | None = None
     period_s: float | None = None
     axis_kinds: tuple[AxisKind, ...] = ()
@@ -85,6 +89,8 @@ class Log:
             values = getattr(self, field)
             if values is not None and values.shape != shape:
                 raise InputError(f"{field}: expected shape {shape}, got {values.shape}")
+        if self.start_rad is not None and self.start_rad.shape != shape[1:]:
+            raise InputError(f"start_rad: expected shape {shape[1:]}, got {self.start_rad.shape}")
         if not self.axis_kinds:
             object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
         if len(self.axis_kinds) != shape[1]:
@@ -151,6 +157,7 @@ class Log:
             self,
             **kept,
             time_s=self.time_s[: last - first],
+            start_rad=self.start_rad if first == 0 else None,
             period_s=self.period_s if periodic else None,
             notes=(*self.notes, note),
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-import scipy.io
+import scipy
 from numpy.typing import NDArray
 
 from axisight.logs.sources_hdf5 import load_hdf5

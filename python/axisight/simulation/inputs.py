@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -64,12 +62,15 @@ def given_noise(
     return data
 
 
-def start_angles(robot: Robot, start_rad: Sequence[float] | None) -> list[float] | None:
-    """Return the driven joint angles at rest, None for the operating point."""
+def start_angles(
+    robot: Robot, start_rad: ArrayLike | None, n_runs: int
+) -> list[list[float]] | None:
+    """Return the driven joint angles at rest, of all runs or run by run; None for the operating point."""
     if start_rad is None:
         return None
     start = np.asarray(start_rad)
     numbers = start.dtype.kind in "biuf" and np.isfinite(start).all()
-    if start.shape != (robot.n_axes,) or not numbers:
-        raise InputError(f"start_rad: expected {robot.n_axes} finite angles, got {start_rad}")
-    return [float(a) for a in start]
+    if start.shape not in ((robot.n_axes,), (n_runs, robot.n_axes)) or not numbers:
+        each = f", or those of each of {n_runs} runs" if n_runs > 1 else ""
+        raise InputError(f"start_rad: expected {robot.n_axes} finite angles{each}, got {start_rad}")
+    return [[float(a) for a in row] for row in np.atleast_2d(start)]

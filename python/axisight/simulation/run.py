@@ -34,7 +34,7 @@ def simulate(
     noise: ArrayLike | None = None,
     noise_cutoff_hz: float | None = None,
     position_resolution_rad: float = 0.0,
-    start_rad: Sequence[float] | None = None,
+    start_rad: ArrayLike | None = None,
     model: Model = "nonlinear",
     method: Method = "dopri5",
     tolerance: float = 1e-7,
@@ -109,7 +109,7 @@ def simulate_batch(
     noise: ArrayLike | None = None,
     noise_cutoff_hz: float | None = None,
     position_resolution_rad: float = 0.0,
-    start_rad: Sequence[float] | None = None,
+    start_rad: ArrayLike | None = None,
     model: Model = "nonlinear",
     method: Method = "dopri5",
     tolerance: float = 1e-7,
@@ -130,8 +130,10 @@ def simulate_batch(
     noise_seed, first_run : the noise of run ``i`` is that of ``run=first_run + i``.
     noise : (n_runs, n, n_axes) position noise [rad] instead of a seeded one.
     threads : 0 takes every core. The result does not depend on it.
-    effects, noise_cutoff_hz, position_resolution_rad, start_rad, model, method, tolerance,
-    substeps : as in :func:`simulate`, the same for all runs.
+    start_rad : (n_axes,) driven joint angles at rest, or (n_runs, n_axes), each run at its own; the
+        linear model has one start. Default the operating point.
+    effects, noise_cutoff_hz, position_resolution_rad, model, method, tolerance, substeps : as in
+    :func:`simulate`, the same for all runs.
 
     Returns
     -------
@@ -180,7 +182,7 @@ def _simulated(
     noise_seed: int | None,
     noise_cutoff_hz: float | None,
     resolution_rad: float,
-    start_rad: Sequence[float] | None,
+    start_rad: ArrayLike | None,
     model: Model,
     integrator: Integrator,
     threads: int,
@@ -205,7 +207,7 @@ def _simulated(
         reference=reference,
         integrator=integrator,
         noise=None if error is None else error.reshape(shape),
-        start=start_angles(robot, start_rad),
+        start=start_angles(robot, start_rad, len(runs)),
         model=model,
         resolution=resolution_rad,
         threads=threads,

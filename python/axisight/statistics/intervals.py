@@ -20,7 +20,7 @@ def student_factor(level: float, degrees_of_freedom: ArrayLike) -> Real:
     if not 0 < level < 1:
         raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
     freedom = np.asarray(degrees_of_freedom, np.float64)
-    return np.asarray(scipy.stats.t.ppf(0.5 + 0.5 * level, freedom))
+    return np.asarray(scipy.special.stdtrit(freedom, 0.5 + 0.5 * level))
 
 
 def student_interval(

@@ -193,7 +193,7 @@ pub fn trace<S: Scalar>(
     let run = Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive,
         noise,
         resolution: 0.0,

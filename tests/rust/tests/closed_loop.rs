@@ -189,11 +189,16 @@ fn absurd_stiffness_collapses_the_step() {
     }
 }
 
-fn run_of<'a>(robot: &'a RobotDescription, drive: Drive<'a>, noise: &'a [&'a [f64]]) -> Run<'a> {
+fn run_of<'a>(
+    robot: &'a RobotDescription,
+    start: &'a [&'a [f64]],
+    drive: Drive<'a>,
+    noise: &'a [&'a [f64]],
+) -> Run<'a> {
     Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &robot.operating_point,
+        start,
         drive,
         noise,
         resolution: 0.0,
@@ -212,7 +217,8 @@ fn outcome(robot: &RobotDescription, run: &Run<'_>) -> Result<Status, Simulation
 fn cancelled_run_stops_before_its_sample() {
     let robot = robot(ARM);
     let flag = AtomicBool::new(true);
-    let mut run = run_of(&robot, Drive::Reference(&[&[0.0; 5]]), &[]);
+    let start = [&robot.operating_point[..]];
+    let mut run = run_of(&robot, &start, Drive::Reference(&[&[0.0; 5]]), &[]);
     run.cancel = Some(&flag);
     assert_eq!(outcome(&robot, &run), Ok(Status::Cancelled(0)));
 }
@@ -265,11 +271,13 @@ fn misuse_is_refused_by_name() {
         ),
     ];
     for (robot, drive, noise, message) in cases {
-        let error = outcome(robot, &run_of(robot, drive, noise)).expect_err(message);
+        let start = [&robot.operating_point[..]];
+        let error = outcome(robot, &run_of(robot, &start, drive, noise)).expect_err(message);
         assert_eq!(error.to_string(), message);
     }
     let lanes: [&[f64]; 1] = [&good];
-    let mut run = run_of(&robot, Drive::Reference(&lanes), &[]);
+    let start = [&robot.operating_point[..]];
+    let mut run = run_of(&robot, &start, Drive::Reference(&lanes), &[]);
     run.sample_time = 0.0;
     let error = outcome(&robot, &run)
         .expect_err("zero sample time")
@@ -279,9 +287,15 @@ fn misuse_is_refused_by_name() {
         "sample_time: expected a positive time in seconds, got 0"
     );
     run.sample_time = 1e-3;
-    run.start = &[0.0];
+    run.start = &[&[0.0]];
     let error = outcome(&robot, &run).expect_err("short start").to_string();
-    assert_eq!(error, "joint_angle: expected 3 driven joint angles, got 1");
+    assert_eq!(error, "start: expected 3 driven joint angles, got 1");
+    run.start = &[&[0.0; 3], &[0.0; 3]];
+    let error = outcome(&robot, &run).expect_err("two starts").to_string();
+    assert_eq!(
+        error,
+        "start: expected one set of angles, or one for each of 1 runs, got 2"
+    );
 }
 
 /// A delay of whole samples is the torque list shifted, after the torque at rest. The sample

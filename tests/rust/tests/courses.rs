@@ -75,6 +75,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
             input,
             target: run.command,
             certainty: None,
+            start: None,
         }
     };
     let records = LOGS.iter().map(record).collect();
@@ -307,6 +308,7 @@ fn courses_that_do_not_serve_are_left_alone() {
                 input: vec![0.0; n],
                 target: vec![0.0; n],
                 certainty: None,
+                start: None,
             })
             .collect(),
         weighting: vec![flat(1.0)],
@@ -370,7 +372,7 @@ fn a_course_that_does_not_fit_a_run_is_refused() {
         let run = Run {
             controller: &robot.controller,
             sample_time: robot.sample_time,
-            start: &robot.operating_point,
+            start: &[&robot.operating_point],
             drive: Drive::Reference(&[&reference]),
             noise: &[],
             resolution: 0.0,

@@ -43,6 +43,7 @@ fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Record> {
             input,
             target,
             certainty: None,
+            start: None,
         }
     };
     [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)]
@@ -175,6 +176,7 @@ fn three_axes_come_back_from_reference_driven_torque() {
             input,
             target,
             certainty: None,
+            start: None,
         }],
         robot,
         effects: Vec::new(),

@@ -355,7 +355,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
     let run = Run {
         controller: &robot.controller,
         sample_time: SAMPLE_TIME,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive: Drive::Torque(&[torque]),
         noise: &[],
         resolution: 0.0,

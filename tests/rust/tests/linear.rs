@@ -62,7 +62,7 @@ fn linear_trace<S: Scalar>(
     let run = Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive,
         noise,
         resolution: 0.0,
@@ -318,7 +318,7 @@ fn samples_show_ripple_at_the_true_angle() {
     let run = Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &robot.operating_point,
+        start: &[&robot.operating_point],
         drive: Drive::Reference(&[&reference]),
         noise: &[&noise],
         resolution: 0.0,
@@ -466,7 +466,7 @@ fn misuse_is_refused_by_name() {
     let mut run = Run {
         controller: &robot.controller,
         sample_time: robot.sample_time,
-        start: &[0.0, 0.0, 0.1],
+        start: &[&[0.0, 0.0, 0.1]],
         drive: Drive::Torque(&[&torque]),
         noise: &[],
         resolution: 0.0,
@@ -479,7 +479,8 @@ fn misuse_is_refused_by_name() {
     let want =
         "start: expected [0.0, 0.0, 0.0], where the plant was linearized, got [0.0, 0.0, 0.1]";
     assert_eq!(error, want);
-    run.start = &robot.operating_point;
+    let rest = [&robot.operating_point[..]];
+    run.start = &rest;
     assert_eq!(outcome(&run), Ok(Status::Cancelled(0)));
     let short = [&torque[..5]];
     run.drive = Drive::Torque(&short);

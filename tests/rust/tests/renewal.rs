@@ -17,10 +17,10 @@ impl Problem for Rough {
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
         self.evaluations.fetch_add(1, Ordering::Relaxed);
         let at_start = (theta[0] - 2.0).abs() < f64::EPSILON;
-        Ok(Evaluation {
-            residual: vec![theta[0], if at_start { 0.0 } else { 5.0 }],
-            columns: columns.iter().map(|_| vec![1.0, 0.0]).collect(),
-        })
+        Ok(Evaluation::new(
+            vec![theta[0], if at_start { 0.0 } else { 5.0 }],
+            columns.iter().map(|_| vec![1.0, 0.0]).collect(),
+        ))
     }
 
     fn blocks(&self) -> Vec<Block> {

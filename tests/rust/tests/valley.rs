@@ -20,7 +20,7 @@ impl Problem for Load {
         ];
         let all = [vec![KNOWN[0], KNOWN[1] * x], vec![0.0, KNOWN[1] * m]];
         let columns = columns.iter().map(|i| all[*i].clone()).collect();
-        Ok(Evaluation { residual, columns })
+        Ok(Evaluation::new(residual, columns))
     }
 
     fn blocks(&self) -> Vec<Block> {

@@ -53,8 +53,9 @@ pub struct Batch<'a> {
     pub robot: &'a RobotDescription,
     /// Effects.
     pub settings: &'a [EffectSetting<f64>],
-    /// Driven joint angles at the start [rad].
-    pub start: &'a [f64],
+    /// Driven joint angles at the start [rad]: one set for all runs, or one per run. The linear
+    /// plant has one, where it is linearized.
+    pub start: &'a [Vec<f64>],
     /// Inputs by run.
     pub input: BatchInput<'a>,
     /// Position noise by run, shaped like the inputs; empty for none [rad].
@@ -118,7 +119,10 @@ pub enum BatchError {
 /// [`BatchError`] for misuse; trouble of a run is its status.
 pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), BatchError> {
     let linear = match batch.model {
-        Model::Linear => Some(LinearPlant::new(batch.robot, batch.settings, batch.start)?),
+        Model::Linear => {
+            let start = batch.start.first().map_or(&[][..], Vec::as_slice);
+            Some(LinearPlant::new(batch.robot, batch.settings, start)?)
+        }
         Model::Nonlinear => None,
     };
     let runs = batch.input.runs();
@@ -139,6 +143,14 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
     } else {
         LANES
     };
+    if batch.start.len() != 1 && batch.start.len() != runs.len() {
+        return Err(SimulationError::Shape {
+            field: "start",
+            expected: format!("one set of angles, or one for each of {} runs", runs.len()),
+            got: batch.start.len().to_string(),
+        }
+        .into());
+    }
     let size = n_samples * n_axes;
     let zeros = |columns: usize| vec![0.0; runs.len() * n_samples * columns];
     let mut traces = Traces {
@@ -333,10 +345,14 @@ impl Batch<'_> {
             .iter()
             .map(|r| &self.noise[*r][..])
             .collect();
+        let mut starts: Vec<&[f64]> = self.start.iter().map(Vec::as_slice).collect();
+        if starts.len() > 1 {
+            starts = runs.iter().map(|r| starts[*r]).collect();
+        }
         simulate(&Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,
-            start: self.start,
+            start: &starts,
             drive: match self.input {
                 BatchInput::Reference(_) => Drive::Reference(&inputs),
                 BatchInput::Torque(_) => Drive::Torque(&inputs),

@@ -1,10 +1,11 @@
 //! Fits with bounds, priors, robust loss and lazy nuisance columns.
 //!
-//! A trial point costs a plain simulation; only an accepted one gets its derivatives, unless
-//! they are few: then most trials are accepted and one simulation serves both. Derivatives of
+//! A trial point costs a plain simulation; only an accepted one gets its derivatives, along that
+//! simulation where it can, unless they are few: then most trials are accepted. Derivatives of
 //! nuisance parameters are kept from point to point, so that promises of the linear model are
 //! not relied on.
 
+use super::courses::Runs;
 use super::gram::BlockGram;
 use super::linearize::{Column, Linearization, at_bound, grams, limits};
 use super::loss::Loss;
@@ -162,6 +163,8 @@ struct Search<'a, P: Problem> {
     fresh: Vec<usize>,
     columns: Vec<Column>,
     residual: Vec<f64>,
+    /// What derivatives at the present point can be taken along.
+    runs: Runs,
     blocks: Vec<BlockGram>,
     /// Loss of the residuals.
     plain: f64,
@@ -237,6 +240,7 @@ impl<'a, P: Problem> Search<'a, P> {
             free,
             columns: start.columns,
             residual: start.residual,
+            runs: Vec::new(),
             blocks: start.blocks,
             plain: start.loss,
             evaluations: 1,
@@ -297,15 +301,29 @@ impl<'a, P: Problem> Search<'a, P> {
     /// All columns anew.
     fn refresh(&mut self) -> Result<(), ProblemError> {
         let all: Vec<usize> = (0..self.free.len()).collect();
-        let evaluation = self.evaluate(&self.theta.clone(), &all)?;
+        let runs = std::mem::take(&mut self.runs);
+        let evaluation = self.differentiate(&all, &runs)?;
         self.take(evaluation, &all);
         Ok(())
     }
 
     fn evaluate(&mut self, theta: &[f64], slots: &[usize]) -> Result<Evaluation, ProblemError> {
         self.evaluations += 1;
-        let wanted: Vec<usize> = slots.iter().map(|s| self.free[*s]).collect();
+        let wanted = self.numbers(slots);
         self.problem.evaluate(theta, &wanted)?.finite()
+    }
+
+    /// The present point with columns `slots`; `runs` of an evaluation there.
+    fn differentiate(&mut self, slots: &[usize], runs: &Runs) -> Result<Evaluation, ProblemError> {
+        self.evaluations += 1;
+        let wanted = self.numbers(slots);
+        let found = self.problem.differentiate(&self.theta, &wanted, runs)?;
+        found.finite()
+    }
+
+    /// Numbers of the free parameters `slots`.
+    fn numbers(&self, slots: &[usize]) -> Vec<usize> {
+        slots.iter().map(|s| self.free[*s]).collect()
     }
 
     /// Residuals and columns `slots` at the present point.
@@ -314,6 +332,7 @@ impl<'a, P: Problem> Search<'a, P> {
             self.columns[*slot] = Column::new(column);
         }
         self.residual = evaluation.residual;
+        self.runs = evaluation.runs;
         (self.plain, self.blocks) = grams(
             self.problem,
             self.parameters,
@@ -463,7 +482,7 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
         let evaluation = if trial.columns.len() == fresh.len() {
             trial
         } else {
-            self.evaluate(&self.theta.clone(), &fresh)?
+            self.differentiate(&fresh, &trial.runs)?
         };
         self.take(evaluation, &fresh);
         self.fresh = fresh;

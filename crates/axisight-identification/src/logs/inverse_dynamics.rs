@@ -328,10 +328,7 @@ impl Problem for InverseDynamics {
                 derivatives[chunk * SEEDS + i].extend(column);
             }
         }
-        Ok(Evaluation {
-            residual,
-            columns: derivatives,
-        })
+        Ok(Evaluation::new(residual, derivatives))
     }
 
     fn blocks(&self) -> Vec<Block> {

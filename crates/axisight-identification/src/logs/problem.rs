@@ -1,5 +1,6 @@
 //! What a fit needs to know of a problem.
 
+use super::courses::Runs;
 use super::gram::Block;
 use axisight_core::robot::{EffectSetting, Parameter};
 use axisight_numerics::Weighting;
@@ -45,9 +46,20 @@ pub struct Evaluation {
     pub residual: Vec<f64>,
     /// Derivatives of the residuals, one vector per requested parameter.
     pub columns: Vec<Vec<f64>>,
+    /// Runs that further derivatives at the same point can be taken along; of some problems.
+    pub(super) runs: Runs,
 }
 
 impl Evaluation {
+    /// Residuals and columns of a problem without runs.
+    pub fn new(residual: Vec<f64>, columns: Vec<Vec<f64>>) -> Self {
+        Self {
+            residual,
+            columns,
+            runs: Vec::new(),
+        }
+    }
+
     /// Itself, if all residuals are finite.
     pub(super) fn finite(self) -> Result<Self, ProblemError> {
         if self.residual.iter().all(|r| r.is_finite()) {
@@ -116,6 +128,19 @@ pub trait Problem: Sync {
     /// # Errors
     /// [`ProblemError::Failed`] where the model does not hold.
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError>;
+    /// The same where an evaluation at `theta` is known, whose `runs` may save a simulation.
+    ///
+    /// # Errors
+    /// [`ProblemError::Failed`] where the model does not hold.
+    fn differentiate(
+        &self,
+        theta: &[f64],
+        columns: &[usize],
+        runs: &Runs,
+    ) -> Result<Evaluation, ProblemError> {
+        let _ = runs;
+        self.evaluate(theta, columns)
+    }
     /// How the residual vector is cut into blocks.
     fn blocks(&self) -> Vec<Block>;
 }

@@ -7,7 +7,7 @@
 //! over `n` samples takes about `4 n (1 + 2 d)` right-hand sides for a batch of logs, of which
 //! the linearised arm leaves a sixth.
 
-use super::courses::{Batch, Courses};
+use super::courses::{Batch, Courses, OwnRun, Runs};
 use super::gram::{Block, blocks};
 use super::packing::{LANES, PARTIALS, Packing};
 use super::problem::{
@@ -33,6 +33,8 @@ pub struct Record {
     /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
     /// follow there. `None`: one everywhere.
     pub certainty: Option<Vec<f64>>,
+    /// Driven joint angles where the log begins, at rest [rad]. `None`: the operating point.
+    pub start: Option<Vec<f64>>,
 }
 
 /// What drives the simulation.
@@ -170,12 +172,8 @@ impl SimulationErrorProblem {
         Ok(self.method.has_fixed_steps() && self.bare::<f64>(theta)?.follows_courses())
     }
 
-    /// Output of the logs `records`, and the run it comes from.
-    pub(super) fn exact_run(
-        &self,
-        records: &[usize],
-        theta: &[f64],
-    ) -> Result<(Vec<Vec<f64>>, SharedCourse), ProblemError> {
+    /// The run of the model over the logs `records`.
+    pub(super) fn own_run(&self, records: &[usize], theta: &[f64]) -> Result<OwnRun, ProblemError> {
         let plant = self.bare::<Lanes<LANES>>(theta)?;
         let joints = plant.joint_slots();
         let rates = plant.n_angles() + joints.start..plant.n_angles() + joints.end;
@@ -186,8 +184,9 @@ impl SimulationErrorProblem {
         };
         let mut stepper = Stepper::new(&plant);
         let traces = self.traces(records, &plant, &mut stepper, 0, Some(&mut keep))?;
-        let course = Course::new(&plant.chain, self.robot.sample_time, &states);
-        Ok((traces.into_iter().flatten().collect(), Arc::new(course)))
+        let output = traces.into_iter().flatten().collect();
+        let time = self.robot.sample_time;
+        Ok(OwnRun::new(output, plant.chain, time, states))
     }
 
     /// Model output of the logs `records` with the first `n_seeds` derivatives; `keep` sees
@@ -211,6 +210,9 @@ impl SimulationErrorProblem {
             .iter()
             .map(|r| &self.records[*r].target[..])
             .collect();
+        let own = |r: &usize| self.records[*r].start.as_deref();
+        let rest = &self.robot.operating_point[..];
+        let starts: Vec<&[f64]> = in_lanes.iter().map(|r| own(r).unwrap_or(rest)).collect();
         let n_samples = records
             .iter()
             .map(|r| self.n_samples(*r))
@@ -221,7 +223,7 @@ impl SimulationErrorProblem {
         let run = Run {
             controller: &self.robot.controller,
             sample_time: self.robot.sample_time,
-            start: &self.robot.operating_point,
+            start: &starts,
             drive: match self.input {
                 SimulationInput::Reference => Drive::Reference(&inputs),
                 SimulationInput::Torque => Drive::Torque(&inputs),
@@ -355,8 +357,8 @@ enum Prepared<'a> {
     Exact,
     /// Along runs of a model nearby.
     Near(&'a Batch),
-    /// Along its own run, of which the output is known.
-    Own(Vec<Vec<f64>>, SharedCourse),
+    /// Along its own run.
+    Own(Arc<OwnRun>),
 }
 
 impl SimulationErrorProblem {
@@ -368,7 +370,8 @@ impl SimulationErrorProblem {
         n_columns: usize,
     ) -> Result<Vec<Prepared<'_>>, ProblemError> {
         let exact = || batches.iter().map(|_| Prepared::Exact).collect();
-        if self.courses.is_none() && n_columns < WORTH_A_COURSE || !self.follows_courses(theta)? {
+        let few = 0 < n_columns && n_columns < WORTH_A_COURSE;
+        if self.courses.is_none() && few || !self.follows_courses(theta)? {
             return Ok(exact());
         }
         if let Some(courses) = &self.courses {
@@ -381,8 +384,8 @@ impl SimulationErrorProblem {
             return Ok(numbers.map(batch).collect());
         }
         let run = |records: &Vec<usize>| {
-            let (output, course) = self.exact_run(records, theta)?;
-            Ok(Prepared::Own(output, course))
+            let run = self.own_run(records, theta)?;
+            Ok(Prepared::Own(Arc::new(run)))
         };
         batches.par_iter().map(run).collect()
     }
@@ -402,24 +405,28 @@ impl SimulationErrorProblem {
                 batch.correct(&mut traces);
                 Ok(traces)
             }
-            Prepared::Own(output, course) => {
-                let mut traces = self.pass(records, theta, seeds, &Arm::Along(course))?;
+            Prepared::Own(run) if seeds.is_empty() => Ok(vec![run.output.clone()]),
+            Prepared::Own(run) => {
+                let mut traces = self.pass(records, theta, seeds, &Arm::Along(run.course()))?;
                 if let Some(first) = traces.first_mut() {
-                    first.clone_from(output);
+                    first.clone_from(&run.output);
                 }
                 Ok(traces)
             }
         }
     }
-}
 
-impl Problem for SimulationErrorProblem {
-    fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
-        let batches = self.batches();
-        let prepared = self.prepared(&batches, theta, columns.len())?;
+    /// Residuals and derivatives, each batch as it is prepared.
+    fn evaluated(
+        &self,
+        theta: &[f64],
+        columns: &[usize],
+        batches: &[Vec<usize>],
+        prepared: &[Prepared<'_>],
+    ) -> Result<Evaluation, ProblemError> {
         let tasks: Vec<_> = batches
             .iter()
-            .zip(&prepared)
+            .zip(prepared)
             .flat_map(|(batch, prepared)| {
                 let passes = Packing::of(batch.len()).passes(columns.len());
                 passes.map(move |range| (batch, prepared, range))
@@ -444,10 +451,37 @@ impl Problem for SimulationErrorProblem {
                 column.extend(values.into_iter().flatten());
             }
         }
+        let own = prepared.iter().filter_map(|batch| match batch {
+            Prepared::Own(run) => Some(Arc::clone(run)),
+            _ => None,
+        });
         Ok(Evaluation {
             residual,
             columns: derivatives,
+            runs: own.collect(),
         })
+    }
+}
+
+impl Problem for SimulationErrorProblem {
+    fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
+        let batches = self.batches();
+        let prepared = self.prepared(&batches, theta, columns.len())?;
+        self.evaluated(theta, columns, &batches, &prepared)
+    }
+
+    fn differentiate(
+        &self,
+        theta: &[f64],
+        columns: &[usize],
+        runs: &Runs,
+    ) -> Result<Evaluation, ProblemError> {
+        let batches = self.batches();
+        if runs.len() != batches.len() {
+            return self.evaluate(theta, columns);
+        }
+        let own = runs.iter().map(|run| Prepared::Own(Arc::clone(run)));
+        self.evaluated(theta, columns, &batches, &own.collect::<Vec<_>>())
     }
 
     fn blocks(&self) -> Vec<Block> {

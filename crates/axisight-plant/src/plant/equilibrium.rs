@@ -76,7 +76,7 @@ const MAX_ITERATIONS: usize = 200;
 #[inline(never)]
 pub fn equilibrium<S: Scalar>(
     plant: &Plant<S>,
-    driven: &[f64],
+    driven: &[S],
 ) -> Result<Equilibrium<S>, EquilibriumError> {
     if driven.len() != plant.axes.len() {
         return Err(EquilibriumError::Shape {
@@ -88,7 +88,7 @@ pub fn equilibrium<S: Scalar>(
     let rest = vec![S::zero(); n];
     let mut q = rest.clone();
     for (axis, angle) in plant.axes.iter().zip(driven) {
-        q[axis.joint] = S::constant(*angle);
+        q[axis.joint] = *angle;
     }
     let mut settled_for = 0;
     let mut change = 0.0;

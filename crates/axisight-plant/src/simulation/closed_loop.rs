@@ -36,8 +36,8 @@ pub struct Run<'a> {
     pub controller: &'a Controller,
     /// Sample time [s].
     pub sample_time: f64,
-    /// Driven joint angles at the start [rad].
-    pub start: &'a [f64],
+    /// Driven joint angles at the start [rad]: one set for all lanes, or one per lane.
+    pub start: &'a [&'a [f64]],
     /// References or torques; a lane shorter than the longest is held at zero.
     pub drive: Drive<'a>,
     /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
@@ -56,6 +56,13 @@ impl Run<'_> {
     /// Whether delays are those of targets, not of torques.
     pub fn has_late_targets(&self) -> bool {
         matches!(self.drive, Drive::Reference(_)) && self.controller.has_targets()
+    }
+
+    /// Driven joint angles at the start, each lane at its own.
+    pub fn start_angles<S: Scalar>(&self, n_axes: usize) -> Vec<S> {
+        (0..n_axes)
+            .map(|axis| lane_value(self.start, 0, axis, n_axes))
+            .collect()
     }
 }
 
@@ -161,7 +168,7 @@ pub fn simulate<S: Scalar>(
             method: run.method,
         });
     }
-    let rest = equilibrium(plant, run.start)?;
+    let rest = equilibrium(plant, &run.start_angles(n_axes))?;
     stepper.begin();
     let mut x = plant.state_at_rest(&rest);
     let mut controller = ControlLoop::new(
@@ -516,6 +523,18 @@ pub fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simula
             format!("1 to {lanes} runs"),
             arrays.len().to_string(),
         ));
+    }
+    let starts = run.start.len();
+    if starts != 1 && starts != arrays.len() {
+        let expected = format!(
+            "one set of angles, or one for each of {} runs",
+            arrays.len()
+        );
+        return Err(shape("start", expected, starts.to_string()));
+    }
+    if let Some(start) = run.start.iter().find(|s| s.len() != n_axes) {
+        let expected = format!("{n_axes} driven joint angles");
+        return Err(shape("start", expected, start.len().to_string()));
     }
     let positions = match run.drive {
         Drive::Tracking { position, .. } => position,

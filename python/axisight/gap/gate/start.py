@@ -7,13 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from axisight.gap.faults import Finding
+from axisight.gap.poses import OFFSET_RAD
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate
 
-# Joint angle between the start of a log and the operating point that changes gravity by a few per
-# cent; a tenth of it is elastic deflection under another load.
-_OFFSET_RAD = 0.02
 # The mean torque of an axis counts as gravity's where it exceeds this share of the torque's rms;
 # turned round, it is that of the simulator within a factor of two (a payload, its absence).
 _GRAVITY_SHARE = 0.5
@@ -26,7 +24,9 @@ def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     rest = robot.equilibrium()["motor_angle_rad"].values
     for log in logs:
         off = (log.position_rad[0] - rest) * robot.gear_ratio
-        for axis in np.flatnonzero(np.abs(off) > _OFFSET_RAD):
+        if log.start_rad is not None:
+            continue
+        for axis in np.flatnonzero(np.abs(off) > OFFSET_RAD):
             message = (
                 f"expected a log that starts at the robot's operating point, got a start "
                 f"{off[axis]:.4g} rad (joint side) beside it: the simulator starts at the operating "
@@ -39,7 +39,8 @@ def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 def _gravity(robot: Robot, log: Log) -> list[Finding]:
     """Compare mean torques: friction and motion leave little in a mean, gravity all it has."""
-    simulated = simulate(robot, log.velocity_ref_rad_s, method="rk4")["torque_cmd_nm"].values
+    run = simulate(robot, log.velocity_ref_rad_s, method="rk4", start_rad=log.start_rad)
+    simulated = run["torque_cmd_nm"].values
     if len(simulated) < log.n_samples or not np.isfinite(simulated).all():
         return []
     mean, expected = log.torque_nm.mean(axis=0), simulated.mean(axis=0)

@@ -130,8 +130,8 @@ def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most
     angle, torque = out["position_rad"].values, out["torque_cmd_nm"].values
     # One that broke off is NaN, and larger than anything.
     size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
-    records = [
-        (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u))
+    records: list[Record] = [
+        (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u), None)
         for q, u in zip(angle, torque, strict=True)
     ]
     return _Runs(records, (size <= _MARGIN * most).all(axis=1))

@@ -32,11 +32,12 @@ pub fn simulate_linear<S: Scalar>(
 ) -> Result<Status, SimulationError> {
     let n_samples = check(run, plant.n_axes(), S::LANES)?;
     #[allow(clippy::float_cmp)] // the same numbers, not nearby ones
-    if run.start != plant.start {
+    let elsewhere = run.start.iter().find(|start| **start != plant.start);
+    if let Some(start) = elsewhere {
         return Err(SimulationError::Shape {
             field: "start",
             expected: format!("{:?}, where the plant was linearized", plant.start),
-            got: format!("{:?}", run.start),
+            got: format!("{start:?}"),
         });
     }
     let mut state = LinearLoop::<S>::new(plant, run)?;
