@@ -83,6 +83,13 @@ def diagnose_command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
     effect: GivenEffects = None,
+    simulated: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Log of your own simulator under the references of a log: one for each estimation log, "
+            "then each validation log (repeatable)."
+        ),
+    ] = None,
     next_experiment: Annotated[
         Path | None,
         typer.Option(
@@ -134,6 +141,7 @@ def diagnose_command(
             "--next-experiment": next_experiment,
             "--write-model": write_model,
             "--signals": signals,
+            "--simulated": simulated,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -149,7 +157,9 @@ def diagnose_command(
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
-        inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
+        inputs = read_inputs(
+            case_or_logs, model, validation or [], columns, load, part, simulated or []
+        )
         if write_model is not None:
             axisight.write_back.check_target(inputs.robot_source, write_model)
         if signals is not None:
@@ -172,6 +182,7 @@ def diagnose_command(
                 progress=progress,
                 separate=next_experiment is not None,
                 signals=signals is not None,
+                simulated=inputs.simulated,
             )
         write_diagnosis(found, json, report)
         if next_experiment is not None:

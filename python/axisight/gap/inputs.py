@@ -21,17 +21,22 @@ _MODELS = (".urdf", ".xml", ".mjcf", ".toml")
 
 @dataclass(frozen=True)
 class Inputs:
-    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures."""
+    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures.
+
+    ``simulated``: logs of the user's own simulator, beside these in this order.
+    """
 
     name: str
     robot: Robot
     robot_source: Path | str
     estimation: tuple[Log, ...]
     validation: tuple[Log, ...]
+    simulated: tuple[Log, ...] = ()
 
     def files(self) -> list[Path]:
         """Return the files that simulator and logs were read from."""
-        return [Path(self.robot_source), *(x.source for x in (*self.estimation, *self.validation))]
+        logs = (*self.estimation, *self.validation, *self.simulated)
+        return [Path(self.robot_source), *(log.source for log in logs)]
 
 
 def read_inputs(
@@ -41,14 +46,17 @@ def read_inputs(
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
     part: tuple[float, float | None] = (0.0, None),
+    simulated: Sequence[Path] = (),
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
-    ``part``: from and to which time [s] each log is used. Raises InputError when nothing is left to hold
-    out, the model is missing, or the part cannot be used.
+    ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator.
+    Raises InputError when nothing is left to hold out, the model is missing, or the part cannot be used.
     """
     read = _read(paths, model, validation, columns, load)
+    own = tuple(read_log(p, columns, robot=read.robot) for p in simulated)
+    read = replace(read, simulated=own)
     if part == (0.0, None):
         return read
     logs = (*read.estimation, *read.validation)
@@ -57,7 +65,8 @@ def read_inputs(
         for log in logs:
             _check_at_rest(log, part[0])
     n = len(read.estimation)
-    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]))
+    own = tuple(part_of(log, *part) for log in read.simulated)
+    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]), simulated=own)
 
 
 def part_of(log: Log, start_s: float, stop_s: float | None) -> Log:
