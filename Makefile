@@ -69,6 +69,7 @@ format: $(STAMPS)/test-tools
 
 docs: $(STAMPS)/installed
 	$(BIN)/python docs/make_effects.py
+	$(BIN)/python docs/make_verdict.py
 
 bench: $(STAMPS)/bench-tools
 	$(CARGO) bench --locked -p axisight-benches

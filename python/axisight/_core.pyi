@@ -331,6 +331,10 @@ class Robot:
     @property
     def velocity_feedforward(self) -> bool:
         """Whether a controller with targets of positions takes their rate as its speed reference."""
+    @property
+    def stepped(self) -> tuple[float, list[float]] | None:
+        """Step of the simulator that holds the controller's law [s], and inertia that it adds [kg m^2]."""
+
     def with_velocity_feedforward(self, on: bool) -> Robot:
         """Return the same robot with or without it; raises InputError for another controller."""
     @property

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from axisight import Effect, Log, Robot, diagnose, load_robot, read_log, simulate
 from axisight.errors import InputError, LogError
-from axisight.gap.targets import between, with_commands
+from axisight.gap.simulated import simulated_positions
+from axisight.gap.targets import _earlier, between, with_commands
+from axisight.gap.torques import AS_GIVEN
 from axisight.logs.log import not_logged
 from servo_arm import HOME_RAD, MACHINES, NOMINAL, RATE_HZ, ServoArm, simulator, targets
 
@@ -126,6 +128,47 @@ def test_nothing_is_named_where_nothing_lacks(robot: Robot) -> None:
     found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
     assert found.verdict == "none"
     assert not found.causes
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
+@pytest.mark.parametrize("step_s", [0.0005, 0.002, 0.004])
+def test_steps_of_mujoco_are_in_the_model(tmp_path: Path, integrator: str, step_s: float) -> None:
+    """To the square of the share of a step in the fastest motion, well below the noise of an encoder."""
+    arm = replace(NOMINAL, integrator=integrator, step_s=step_s)
+    robot = simulator(tmp_path, arm)
+    log = arm.log(1, noise_rad=0.0)
+    found = with_commands(robot, [log])
+    assert found is not None
+    (angle,) = simulated_positions(found.robot, AS_GIVEN, found.logs)
+    error = angle[:: found.step] - log.position_rad
+    assert (error - error.mean(axis=0)).std(axis=0).max() < 1e-4
+    if integrator == "RK4":
+        assert robot.stepped is None
+        return
+    assert robot.stepped is not None
+    step, inertia = robot.stepped
+    assert step == step_s
+    gains = -1 if integrator == "Euler" else 1
+    damping = np.array(arm.damping) + gains * np.array(arm.kd)
+    assert inertia == pytest.approx(0.5 * step_s * damping)
+
+
+def test_a_machine_in_steps_of_2_ms_is_diagnosed(tmp_path: Path) -> None:
+    """MuJoCo's usual step; friction came out as unknown without what its steps do."""
+    robot = simulator(tmp_path, replace(NOMINAL, step_s=0.002))
+    for lacks in ("coulomb_friction@2", ""):
+        arm = replace(MACHINES[lacks] if lacks else NOMINAL, step_s=0.002)
+        logs = [arm.log(run) for run in (1, 2, 3)]
+        found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+        assert found.verdict == ("explained" if lacks else "none")
+        assert [c.label for c in found.causes] == ([lacks] if lacks else [])
+
+
+def test_targets_that_act_earlier_are_means_of_what_holds() -> None:
+    target = np.arange(6.0)[:, None]
+    assert np.array_equal(_earlier(target, 0.0), target)
+    assert _earlier(target, 2.0)[:, 0].tolist() == [2, 3, 4, 5, 5, 5]
+    assert _earlier(target, 0.25)[:, 0].tolist() == [0.25, 1.25, 2.25, 3.25, 4.25, 5]
 
 
 def test_slow_logs_of_a_complete_simulator_name_nothing(tmp_path: Path) -> None:

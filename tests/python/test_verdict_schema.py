@@ -1,9 +1,11 @@
 """The JSON of a verdict: every key described, none unknown, and what the contract asks for there."""
 
+import importlib.util
 import json
 import re
 from collections.abc import Iterator
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -199,3 +201,18 @@ def test_the_command_line_prints_the_schema():
     result = CliRunner().invoke(app, ["schema"])
     assert result.exit_code == 0
     assert json.loads(result.output) == SCHEMA
+
+
+def test_the_page_of_the_verdict_is_that_of_the_schema(repository: Path, tmp_path: Path) -> None:
+    page = (repository / "docs" / "verdict.md").read_text(encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("page", repository / "docs" / "make_verdict.py")
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert page == script.page(SCHEMA), "run `make docs`"
+    # Every key of a verdict has its line.
+    for key in explained().to_verdict():
+        assert f"| `{key}` |" in page
+    explained().save_verdict(tmp_path / "verdict.json")
+    (snippet,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(snippet.replace('"verdict.json"', repr(str(tmp_path / "verdict.json"))), {})

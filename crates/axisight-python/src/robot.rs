@@ -202,6 +202,18 @@ impl Robot {
         )
     }
 
+    /// Step of the simulator that holds the controller's law [s], and what it adds to the inertia of each
+    /// motor [kg m^2]; nothing where it is a machine.
+    #[getter]
+    fn stepped(&self) -> Option<(f64, Vec<f64>)> {
+        match &self.description.controller {
+            Controller::PdPosition { stepped, .. } => {
+                stepped.as_ref().map(|s| (s.step, s.inertia.clone()))
+            }
+            _ => None,
+        }
+    }
+
     /// The same robot whose controller with targets of positions has none of speed, or their rate.
     fn with_velocity_feedforward(&self, on: bool) -> PyResult<Self> {
         let mut out = self.clone();

@@ -73,9 +73,37 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     step = round(logs[0].sample_time_s / time)
     start = np.mean([log.position_rad[0] for log in logs], axis=0)
     fed = robot.velocity_feedforward and all(x.velocity_ref_rad_s is not None for x in logs)
-    machine = robot.with_operating_point(start * robot.gear_ratio).with_velocity_feedforward(fed)
+    at_start = robot.with_operating_point(start * robot.gear_ratio)
+    machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
     begun = at_their_poses(machine, logs)
     return Commanded(machine, tuple(_commanded(machine, log, step) for log in begun), step)
+
+
+def _as_its_steps_make_it(robot: Robot) -> Robot:
+    """Return a robot with the inertia that a simulator's steps give it; a machine as it is."""
+    if robot.stepped is None:
+        return robot
+    own, added = robot.parameters(), robot.stepped[1]
+    names = [robot.axis_parameter(axis, "motor_inertia") for axis in robot.axis_numbers()]
+    # Explicit damping takes inertia away, which is the motor's as long as it has any.
+    changed = {
+        name: max(own[name] + float(more), 0.0)
+        for name, more in zip(names, added, strict=True)
+        if name is not None
+    }
+    return robot.with_parameters(changed)
+
+
+def _earlier(target: Array, samples: float) -> Array:
+    """Return targets (n, n_axes) that act so many samples earlier, the last one held.
+
+    Within a sample the law gets the mean of what holds there.
+    """
+    whole = int(samples)
+    part = samples - whole
+    longer = np.vstack([target, np.repeat(target[-1:], whole + 1, axis=0)])
+    n = len(target)
+    return np.asarray((1 - part) * longer[whole : whole + n] + part * longer[whole + 1 :][:n])
 
 
 def between(values: Array, step: int) -> Array:
@@ -139,6 +167,8 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
     n, time = len(position), robot.sample_time_s
     # A target is held until the next one.
     target = np.repeat(log.position_ref_rad, step, axis=0)[:n]
+    if robot.stepped is not None:
+        target = _earlier(target, 0.5 * robot.stepped[0] / time)
     rate = np.diff(target, axis=0, append=target[-1:]) / time
     if robot.velocity_feedforward and log.velocity_ref_rad_s is not None:
         rate = np.repeat(log.velocity_ref_rad_s, step, axis=0)[:n]

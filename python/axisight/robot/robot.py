@@ -184,6 +184,16 @@ class Robot:
         """
         return self.core.velocity_feedforward
 
+    @property
+    def stepped(self) -> tuple[float, Array] | None:
+        """Steps of the simulator that holds the law of targets; None where it is a machine.
+
+        The step [s], from half of which before a target acts, and what the simulator's treatment of damping
+        adds to the inertia of each motor (n_axes,) [kg m^2].
+        """
+        found = self.core.stepped
+        return None if found is None else (found[0], np.array(found[1]))
+
     def with_velocity_feedforward(self, on: bool) -> Robot:
         """Return the same robot with its speed reference switched on or off.
 

@@ -89,6 +89,24 @@ class Drive:
     gain: float = 1.0
 
 
+@dataclass(frozen=True)
+class Steps:
+    """The steps of a simulator whose file a model is: speeds it computes are those of the middle of steps.
+
+    Forces act around the beginning of a step of ``step_s``, so that a target acts from half of it before.
+    ``gains`` and ``damping`` say where speeds are taken that those of actuators and of joints act on: at
+    the end of a step (1) or before it (-1). Half a step late, a damping is also an inertia.
+    """
+
+    step_s: float
+    gains: int
+    damping: int
+
+    def added_inertia(self, gain_nm_s_rad: float, damping_nm_s_rad: float) -> float:
+        """Return what both add to the inertia [kg m^2] of a motor, on whose side they are."""
+        return 0.5 * self.step_s * (self.gains * gain_nm_s_rad + self.damping * damping_nm_s_rad)
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body and the joint that moves it.
@@ -115,13 +133,17 @@ class Body:
 
 @dataclass
 class Tree:
-    """All bodies of a file by name, parents before children; ``notes``: what a chain cannot say of it."""
+    """All bodies of a file by name, parents before children; ``notes``: what a chain cannot say of it.
+
+    ``steps`` of the simulator whose file it is, where they show.
+    """
 
     name: str
     bodies: dict[str, Body]
     file: str
     gravity_m_s2: Array | None = None
     notes: list[str] = field(default_factory=list)
+    steps: Steps | None = None
 
     def children(self, name: str) -> list[Body]:
         """Return the bodies that hang on one."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import RobotError
-from axisight.robot_import.bodies import Body, Mass, Pose, Tree, joined, still
+from axisight.robot_import.bodies import Body, Mass, Pose, Steps, Tree, joined, still
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,8 @@ class ChainJoint:
 class Chain:
     """A serial chain from a model file, and what is to be said of how it came about.
 
-    ``end``: the frame of the last link, as the file has it, in that of the last joint.
+    ``end``: the frame of the last link, as the file has it, in that of the last joint; ``steps`` of the
+    simulator whose file it is.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Chain:
     end: Pose
     gravity_m_s2: Array
     notes: tuple[str, ...]
+    steps: Steps | None = None
 
 
 STANDARD_GRAVITY_M_S2 = 9.81
@@ -76,7 +78,7 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-    return Chain(tree.name, tuple(joints), end, gravity, (*tree.notes, *notes))
+    return Chain(tree.name, tuple(joints), end, gravity, (*tree.notes, *notes), tree.steps)
 
 
 def _listed(names: Sequence[str] | dict[str, Body]) -> str:

@@ -101,7 +101,21 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
         "kd": [kd for _, kd in gains],
         "velocity_feedforward": False,
         "continuous": True,
+        **_steps(chain),
     }
+
+
+def _steps(chain: Chain) -> dict[str, Any]:
+    """Return what the steps of the simulator make of its actuators; nothing of one that has none."""
+    if chain.steps is None:
+        return {}
+    drives = [joint.body.drive for joint in chain.joints]
+    added = [
+        chain.steps.added_inertia(drive.servo[1], drive.damping * drive.gear_ratio**2)
+        for drive in drives
+        if drive.servo is not None
+    ]
+    return {"step": chain.steps.step_s, "step_inertia": added}
 
 
 def _defaults(

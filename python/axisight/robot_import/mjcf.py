@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from axisight.errors import MissingExtraError, RobotError
-from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Steps, Tree, still
 from axisight.robot_import.outside import with_includes
 from axisight.robot_import.xml_tree import Element
 
@@ -94,8 +94,19 @@ class _Compiled:
             str(self.path),
             np.array(model.opt.gravity),
             self._notes(ratios),
+            self._steps(),
         )
         return tree
+
+    def _steps(self) -> Steps | None:
+        """Return the steps of the integrator; none of Runge-Kutta's, which are too exact to show."""
+        kinds, option = self.mujoco.mjtIntegrator, self.model.opt
+        if option.integrator == kinds.mjINT_RK4:
+            return None
+        if option.integrator != kinds.mjINT_EULER:
+            return Steps(option.timestep, 1, 1)
+        explicit = option.disableflags & self.mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        return Steps(option.timestep, -1, -1 if explicit else 1)
 
     def _model_name(self) -> str:
         """Return the name of the model, that of the file without one."""

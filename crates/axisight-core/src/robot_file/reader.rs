@@ -10,7 +10,7 @@ use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
 use crate::robot::MOST_JOINTS;
 use crate::robot::description::{
-    Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, check_unit,
+    Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, Stepped, check_unit,
     is_positive_definite,
 };
 use std::sync::Arc;
@@ -343,7 +343,15 @@ fn read_controller(
         }
         ControllerKind::PdPosition => {
             let switches = ["velocity_feedforward", "gravity_compensation", "continuous"];
-            section.only(&[&["kind", "kp", "kd"][..], &switches].concat())?;
+            let steps = ["step", "step_inertia"];
+            section.only(&[&["kind", "kp", "kd"][..], &switches, &steps].concat())?;
+            let stepped = match section.find(steps[0]) {
+                None => None,
+                Some(_) => Some(Stepped {
+                    step: section.number(steps[0], Bound::Positive, "s")?,
+                    inertia: section.per_axis(steps[1], n_axes, "kg m^2")?,
+                }),
+            };
             let known = section.flag(switches[1], false)?;
             Ok(Controller::PdPosition {
                 kp: gains("kp", "Nm/rad")?,
@@ -351,6 +359,7 @@ fn read_controller(
                 feeds_speed: section.flag(switches[0], true)?,
                 continuous: section.flag(switches[2], false)?,
                 gravity: known.then(|| Arc::new(robot.clone())),
+                stepped,
             })
         }
         ControllerKind::None => {

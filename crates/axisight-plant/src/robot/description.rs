@@ -106,9 +106,20 @@ pub enum Controller {
         /// The robot as the controller knows it, whose gravity torque at the measured pose `u_ff`
         /// follows; constant without one. What is fitted of a machine changes nothing of it.
         gravity: Option<Arc<RobotDescription>>,
+        /// The simulator that holds the law; none where it is a machine.
+        stepped: Option<Stepped>,
     },
     /// No controller: logs are torque-driven only.
     None,
+}
+
+/// What the steps of a simulator make of a law that it holds: forces act around the beginning of a step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stepped {
+    /// Step [s]: a target acts from half of it before.
+    pub step: f64,
+    /// What its treatment of damping adds to the inertia of each motor [kg m^2].
+    pub inertia: Vec<f64>,
 }
 
 impl Controller {
@@ -141,12 +152,14 @@ impl Controller {
                 feeds_speed,
                 continuous,
                 gravity,
+                stepped,
             } => Self::PdPosition {
                 kp: scaled(kp, factor * factor),
                 kd: scaled(kd, factor),
                 feeds_speed: *feeds_speed,
                 continuous: *continuous,
                 gravity: gravity.clone(),
+                stepped: stepped.clone(),
             },
             Self::None => Self::None,
         }
