@@ -25,11 +25,12 @@ not exist (the gap of a simulation that broke off) are `null`. The JSON Schema i
 
 ```python
 import json
+from pathlib import Path
 
 import jsonschema
 from axisight.gap import verdict_schema
 
-verdict = json.loads(open("verdict.json").read())
+verdict = json.loads(Path("verdict.json").read_text())
 jsonschema.validate(verdict, verdict_schema())
 for cause in verdict["causes"]:
     print(cause["effect"], cause["axis"], cause["probability"])
