@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bars
 from rich.table import Table
 
 from axisight import montecarlo
-from axisight.cli.common import ERR, OUT, errors
+from axisight.cli.common import ERR, OUT, errors, say
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects
 from axisight.effects import Effect
 from axisight.montecarlo.progress import Progress, Report
@@ -61,10 +62,10 @@ def montecarlo_command(
         if len(failed):
             table = Table("run", "seed", "experiment", "kind", "detail", title="failed runs")
             for row in failed.head(10).itertuples(index=False):
-                table.add_row(*(str(cell) for cell in row))
+                table.add_row(*(escape(str(cell)) for cell in row))
             OUT.print(table)
         runs_failed = failed["run"].nunique()
-        OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
+        say(f"{counted} runs counted, {runs_failed} with failures: {out}")
         if counted == 0:
             raise typer.Exit(1)
 
@@ -95,7 +96,7 @@ def _bar() -> Iterator[Report]:
 
         def report(state: Progress) -> None:
             if state.message:
-                bars.console.print(state.message, highlight=False, soft_wrap=True)
+                bars.console.print(state.message, markup=False, highlight=False, soft_wrap=True)
             pace = f"{state.rate_hz:.3g} runs/s, {state.remaining_s:.0f} s left"
             if state.failed:
                 pace += f", {state.failed} failed"
