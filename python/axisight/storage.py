@@ -98,7 +98,7 @@ def check_target(
             raise OutputError(f"{target} exists: choose another name")
         if there is not None and not os.access(path, os.W_OK):
             raise OutputError(f"{target}: expected a file that may be written, got a read-only one")
-        _try_folder(path.parent)
+        _try_folder(path.parent, target)
     except OutputError:
         raise
     except OSError as error:
@@ -108,7 +108,9 @@ def check_target(
 def check_folder(folder: Path | str) -> None:
     """Raise OutputError for a folder that is none, or that could not be made or written to."""
     try:
-        _try_folder(_followed(folder))
+        _try_folder(_followed(folder), folder)
+    except OutputError:
+        raise
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written to: {_reason(error)}") from None
 
@@ -125,7 +127,8 @@ def _in_the_way(path: Path, said: Path | str) -> os.stat_result | None:
     """Return what is known of a file that is there, None of nothing; raises OutputError for what is no file."""
     try:
         there = path.stat()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
+        # What lies above it is looked at with its folder.
         return None
     if not stat.S_ISREG(there.st_mode):
         kind = _KINDS.get(stat.S_IFMT(there.st_mode), "something else")
@@ -141,10 +144,12 @@ def _same(path: Path, there: os.stat_result) -> bool:
         return False
 
 
-def _try_folder(folder: Path) -> None:
+def _try_folder(folder: Path, said: Path | str) -> None:
     """Raise OSError unless files can be made in a folder, or in the nearest above it that is there."""
     while not os.path.lexists(folder):
         folder = folder.parent
+    if not folder.is_dir():
+        raise OutputError(f"{said}: expected a folder to write into, got {folder}")
     # Tried and not asked for: permissions do not say all of what a file system refuses.
     with tempfile.TemporaryFile(dir=folder):
         pass

@@ -61,9 +61,9 @@ def test_only_files_are_replaced(tmp_path):
 
 def test_folders_that_cannot_be_written_to(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
-    assert "Not a directory" in refused(tmp_path / "file" / "a.json")
-    assert "Not a directory" in refused(tmp_path / "file" / "deep" / "a.json")
-    with pytest.raises(InputError, match="Not a directory"):
+    assert "expected a folder" in refused(tmp_path / "file" / "a.json")
+    assert "expected a folder" in refused(tmp_path / "file" / "deep" / "a.json")
+    with pytest.raises(InputError, match="expected a folder"):
         storage.check_folder(tmp_path / "file")
     assert "too long" in refused(tmp_path / ("x" * 300))
 

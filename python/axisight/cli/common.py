@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from axisight.errors import AxisightError, InputError, OutputError
+from axisight.stopping import exit_status
 from axisight.storage import check_target
 
 OUT = Console()
@@ -38,15 +39,15 @@ Columns = Annotated[
 
 @contextmanager
 def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
-    """Turn our errors into a message and exit status 2, Ctrl-C into ``stopped`` and status 130."""
+    """Turn our errors into a message and exit status 2, Ctrl-C and SIGTERM into ``stopped``."""
     try:
         yield
     except AxisightError as error:
         ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
         raise typer.Exit(2) from None
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         ERR.print(stopped, markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(130) from None
+        raise typer.Exit(exit_status(stop)) from None
 
 
 @contextmanager
