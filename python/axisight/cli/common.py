@@ -37,6 +37,15 @@ Columns = Annotated[
 ]
 
 
+Untrusted = Annotated[
+    bool,
+    typer.Option(
+        "--untrusted",
+        help="What is read is somebody else's: refuse what leads out of its folder.",
+    ),
+]
+
+
 @contextmanager
 def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
     """Turn our errors into a message and exit status 2, Ctrl-C and SIGTERM into ``stopped``."""

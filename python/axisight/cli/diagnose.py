@@ -13,7 +13,7 @@ import typer
 
 import axisight
 from axisight import report as pages
-from axisight.cli.common import Columns, From, To, bars, errors, say, write_each
+from axisight.cli.common import Columns, From, To, Untrusted, bars, errors, say, write_each
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
@@ -106,6 +106,7 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
         ),
     ] = None,
+    untrusted: Untrusted = False,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -137,6 +138,7 @@ def diagnose_command(
             "--next-experiment": next_experiment,
             "--write-model": write_model,
             "--signals": signals,
+            "--untrusted": untrusted,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -152,7 +154,9 @@ def diagnose_command(
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
-        inputs = read_inputs(case_or_logs, model, validation or [], columns, load, part)
+        inputs = read_inputs(
+            case_or_logs, model, validation or [], columns, load, part, untrusted=untrusted
+        )
         targets = {
             "--json": json,
             "--report": report,

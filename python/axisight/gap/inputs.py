@@ -12,6 +12,7 @@ from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
 from axisight.logs.sources import is_folder_log
+from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
 
@@ -41,14 +42,17 @@ def read_inputs(
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
     part: tuple[float, float | None] = (0.0, None),
+    *,
+    untrusted: bool = False,
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
     ``part``: from and to which time [s] each log is used. Raises InputError when nothing is left to hold
-    out, the model is missing, or the part cannot be used.
+    out, the model is missing, or the part cannot be used. ``untrusted`` as in `read_case`, and for logs as in
+    `check_log_inside`.
     """
-    read = _read(paths, model, validation, columns, load)
+    read = _read(paths, model, validation, columns, load, untrusted=untrusted)
     if part == (0.0, None):
         return read
     logs = (*read.estimation, *read.validation)
@@ -110,13 +114,18 @@ def _read(
     validation: Sequence[Path],
     columns: Path | None,
     load: Callable[..., Robot],
+    *,
+    untrusted: bool,
 ) -> Inputs:
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
+    for path in (*paths, *validation) if untrusted else ():
+        if not path.is_dir() or is_folder_log(path):
+            check_log_inside(path)
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
-        case = read_case(paths[0], columns)
+        case = read_case(paths[0], columns, untrusted=untrusted)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
         extra = tuple(read_log(p, columns, robot=robot) for p in validation)
