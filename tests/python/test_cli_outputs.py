@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from axisight import Diagnosis
 from axisight.cli import app
 from axisight.cli import diagnose as command
 from axisight.cli.demo import write_demo_case
@@ -143,3 +147,16 @@ def test_every_command_tries_its_outputs(case, arguments):
     assert any(s in said for s in ("expected a folder", "cannot be written", "got an input"))
     assert log.read_bytes() == before
     assert (case / "file").read_text() == "file"
+
+
+def test_what_numpy_warns_of_is_not_shown(case, monkeypatch):
+    def work(**_more: object) -> Diagnosis:
+        with ThreadPoolExecutor() as pool:
+            pool.submit(lambda: np.zeros(1) / np.zeros(1)).result()
+        return explained()
+
+    monkeypatch.setattr(command, "diagnose", work)
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        run("diagnose", case)
+    assert seen == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -50,7 +51,11 @@ Untrusted = Annotated[
 def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
     """Turn our errors into a message and exit status 2, Ctrl-C and SIGTERM into ``stopped``."""
     try:
-        yield
+        with warnings.catch_warnings():
+            # What NumPy says of a division in the middle of the work is no news of the result: that has findings.
+            # Of all threads, as `numpy.errstate` is not.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            yield
     except AxisightError as error:
         ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
         raise typer.Exit(2) from None
