@@ -35,6 +35,7 @@ class ServoArm:
     load_kg: float = 0.0
     late_s: float = 0.0
     step_s: float = 5e-4
+    rate_hz: float = RATE_HZ
     integrator: str = "implicitfast"
 
     def with_changed(self, field: str, joint: int, value: float) -> ServoArm:
@@ -90,11 +91,11 @@ class ServoArm:
 
         model = mujoco.MjModel.from_xml_string(self.mjcf())
         data = mujoco.MjData(model)
-        wanted = targets(run, home_rad)
+        wanted = targets(run, home_rad, self.rate_hz)
         data.qpos[:] = home_rad
         data.ctrl[:] = wanted[0]
         mujoco.mj_step(model, data, round(SETTLED_S / self.step_s))
-        steps, late = round(1 / RATE_HZ / self.step_s), round(self.late_s / self.step_s)
+        steps, late = round(1 / self.rate_hz / self.step_s), round(self.late_s / self.step_s)
         told = np.concatenate(
             [np.repeat(wanted[:1], late, axis=0), np.repeat(wanted, steps, axis=0)]
         )
@@ -107,8 +108,8 @@ class ServoArm:
         noise = np.random.default_rng(1000 + run).normal(size=position.shape)
         return Log(
             name=f"run{run}",
-            sample_time_s=1 / RATE_HZ,
-            time_s=np.arange(len(wanted)) / RATE_HZ,
+            sample_time_s=1 / self.rate_hz,
+            time_s=np.arange(len(wanted)) / self.rate_hz,
             torque_nm=not_logged(position.shape),
             position_rad=position + noise_rad * noise,
             position_ref_rad=wanted,
@@ -116,10 +117,10 @@ class ServoArm:
         )
 
 
-def targets(run: int, home_rad: Array = HOME_RAD) -> Array:
+def targets(run: int, home_rad: Array = HOME_RAD, rate_hz: float = RATE_HZ) -> Array:
     """Return sums of sines up to 2.2 Hz (n, 3) [rad] that begin and end at home."""
     rng = np.random.default_rng(run)
-    t = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    t = np.arange(round(SECONDS * rate_hz)) / rate_hz
     fade = np.clip(t / 2, 0, 1) * np.clip(t[-1] - t, 0, 1)
     fade = fade**2 * (3 - 2 * fade)
     out = np.zeros((len(t), 3))
@@ -132,9 +133,9 @@ def targets(run: int, home_rad: Array = HOME_RAD) -> Array:
 
 def simulator(folder: Path, arm: ServoArm | None = None) -> Robot:
     """Return the robot of the MJCF of an arm, for logs of its rate."""
-    path = folder / "arm.xml"
-    path.write_text((arm or ServoArm()).mjcf(), "utf-8")
-    return load_robot(path, sample_time_s=1 / RATE_HZ)
+    path, own = folder / "arm.xml", arm or ServoArm()
+    path.write_text(own.mjcf(), "utf-8")
+    return load_robot(path, sample_time_s=1 / own.rate_hz)
 
 
 NOMINAL = ServoArm()

@@ -128,6 +128,15 @@ def test_nothing_is_named_where_nothing_lacks(robot: Robot) -> None:
     assert not found.causes
 
 
+def test_slow_logs_of_a_complete_simulator_name_nothing(tmp_path: Path) -> None:
+    """At 25 Hz a joint answers a step of its target within a sample: a spline does not know that."""
+    slow = replace(NOMINAL, rate_hz=25.0)
+    logs = [slow.log(run) for run in (1, 2, 3)]
+    found = diagnose(robot=simulator(tmp_path, slow), estimation=logs[:2], validation=logs[2:])
+    assert found.verdict == "none"
+    assert not found.findings
+
+
 def test_positions_between_samples_lie_on_a_cubic() -> None:
     k = np.arange(12.0)
     fine = np.arange(0, 11.01, 0.25)

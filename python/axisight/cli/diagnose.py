@@ -86,6 +86,13 @@ def diagnose_command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
     effect: GivenEffects = None,
+    simulated: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Log of your own simulator under the references of a log: one for each estimation log, "
+            "then each validation log (repeatable)."
+        ),
+    ] = None,
     next_experiment: Annotated[
         Path | None,
         typer.Option(
@@ -138,6 +145,7 @@ def diagnose_command(
             "--next-experiment": next_experiment,
             "--write-model": write_model,
             "--signals": signals,
+            "--simulated": simulated,
             "--untrusted": untrusted,
             "--from": start_s,
             "--to": stop_s,
@@ -155,7 +163,14 @@ def diagnose_command(
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(
-            case_or_logs, model, validation or [], columns, load, part, untrusted=untrusted
+            case_or_logs,
+            model,
+            validation or [],
+            columns,
+            load,
+            part,
+            simulated or [],
+            untrusted=untrusted,
         )
         targets = {
             "--json": json,
@@ -188,6 +203,7 @@ def diagnose_command(
                 progress=progress,
                 separate=next_experiment is not None,
                 signals=signals is not None,
+                simulated=inputs.simulated,
             )
         show_diagnosis(found)
         writes = diagnosis_writes(found, json, report)

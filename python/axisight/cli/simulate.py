@@ -16,6 +16,7 @@ from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.gap.inputs import part_of
 from axisight.logs import Log, read_log
+from axisight.logs.sources import files_of
 from axisight.robot import Robot
 from axisight.simulation import Method, Model, simulate
 from axisight.storage import check_targets, write_bytes
@@ -65,7 +66,7 @@ def simulate_command(
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
-        given = [log, Path(robot), *(x for x in (columns,) if x)]
+        given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
         check_targets({"--out": out}, inputs=given)
         machine = load_simulator(robot, parse_effects(effect))
         used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)

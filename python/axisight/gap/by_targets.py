@@ -49,10 +49,21 @@ class TargetsView(View):
         std = np.maximum(position_noise_std(commanded.as_logged()), robot.position_noise_std)
         self._std_rad = std
         floor = self._floor(robot, logs, settings)
+        records = _records(logs, self._between_samples(logs, settings))
         fitter = TargetsFitter(
-            robot, _records(logs), floor.weighting, _tolerances(robot, settings), settings.block_s
+            robot, records, floor.weighting, _tolerances(robot, settings), settings.block_s
         )
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+
+    def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:
+        """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator as given.
+
+        Targets are steps, and a joint answers each of them within a sample: a spline through positions
+        that were logged just before the next step knows nothing of it, and lags the motion.
+        """
+        of, step = self._commanded, self._commanded.step
+        positions = simulated_positions(of.robot, AS_GIVEN, logs, threads=settings.threads)
+        return [x - of.fine(x[::step]) for x in positions]
 
     def _floor(self, robot: Robot, logs: list[Log], settings: Settings) -> Floor:
         """Return the floor: noise of the sensors as the gains take it, and errors of formulas.
@@ -167,13 +178,17 @@ def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
     return out
 
 
-def _records(logs: Sequence[Log]) -> list[Record]:
-    """Return references, positions, how far each sample counts, and where each log begins."""
+def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
+    """Return references, positions, how far each sample counts, and where each log begins.
+
+    ``between``: what the motion does between samples that were logged.
+    """
     out = []
-    for log in logs:
+    for log, off in zip(logs, between, strict=True):
         assert log.velocity_ref_rad_s is not None  # logs with commands have them
         reference, position = (
-            np.ascontiguousarray(x, np.float64) for x in (log.velocity_ref_rad_s, log.position_rad)
+            np.ascontiguousarray(x, np.float64)
+            for x in (log.velocity_ref_rad_s, log.position_rad + off)
         )
         out.append((reference, position, np.ones_like(position), log.start_rad))
     return out

@@ -11,6 +11,7 @@ from axisight.errors import CaseError, LogError
 GateSeverity = Literal["refuse", "flag"]
 
 MEANINGS: dict[str, str] = {
+    "simulator_differs": "a model that does not reproduce the user's own simulator",
     "axes_differ": "another number of axes than the robot, or than the other logs",
     "sample_time_differs": "another sample time than the robot's",
     "rates_differ": "another sample rate than the other logs",

@@ -11,7 +11,7 @@ import numpy as np
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
-from axisight.logs.sources import is_folder_log
+from axisight.logs.sources import files_of, is_folder_log
 from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
@@ -22,17 +22,23 @@ _MODELS = (".urdf", ".xml", ".mjcf", ".toml")
 
 @dataclass(frozen=True)
 class Inputs:
-    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures."""
+    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures.
+
+    ``simulated``: logs of the user's own simulator, beside these in this order.
+    """
 
     name: str
     robot: Robot
     robot_source: Path | str
     estimation: tuple[Log, ...]
     validation: tuple[Log, ...]
+    simulated: tuple[Log, ...] = ()
 
     def files(self) -> list[Path]:
         """Return the files that simulator and logs were read from."""
-        return [Path(self.robot_source), *(x.source for x in (*self.estimation, *self.validation))]
+        logs = (*self.estimation, *self.validation, *self.simulated)
+        parts = [part for log in logs for part in files_of(log.source)]
+        return [Path(self.robot_source), *parts]
 
 
 def read_inputs(
@@ -42,17 +48,23 @@ def read_inputs(
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
     part: tuple[float, float | None] = (0.0, None),
+    simulated: Sequence[Path] = (),
     *,
     untrusted: bool = False,
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
-    ``part``: from and to which time [s] each log is used. Raises InputError when nothing is left to hold
-    out, the model is missing, or the part cannot be used. ``untrusted`` as in `read_case`, and for logs as in
-    `check_log_inside`.
+    ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator;
+    ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`. Raises InputError when nothing is
+    left to hold out, the model is missing, or the part cannot be used.
     """
+    for path in (*paths, *validation, *simulated) if untrusted else ():
+        if not path.is_dir() or is_folder_log(path):
+            check_log_inside(path)
     read = _read(paths, model, validation, columns, load, untrusted=untrusted)
+    own = tuple(read_log(p, columns, robot=read.robot) for p in simulated)
+    read = replace(read, simulated=own)
     if part == (0.0, None):
         return read
     logs = (*read.estimation, *read.validation)
@@ -61,7 +73,8 @@ def read_inputs(
         for log in logs:
             _check_at_rest(log, part[0])
     n = len(read.estimation)
-    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]))
+    own = tuple(part_of(log, *part) for log in read.simulated)
+    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]), simulated=own)
 
 
 def part_of(log: Log, start_s: float, stop_s: float | None) -> Log:
@@ -121,9 +134,6 @@ def _read(
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
-    for path in (*paths, *validation) if untrusted else ():
-        if not path.is_dir() or is_folder_log(path):
-            check_log_inside(path)
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
         case = read_case(paths[0], columns, untrusted=untrusted)
         source = model if model is not None else case.robot_path

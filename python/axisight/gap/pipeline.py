@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
+from axisight.gap import own_simulator
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
 from axisight.gap.chatter import chance_check, with_chance
@@ -32,13 +33,13 @@ from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
 from axisight.gap.remainder import refit_worse, remainder_of
-from axisight.gap.result import Cause, Diagnosis, Interval, Overlay
+from axisight.gap.result import Cause, Diagnosis, Interval, Overlay, Reproduction
 from axisight.gap.search import Search, search
 from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.straight import bent_for
-from axisight.gap.targets import with_commands
+from axisight.gap.targets import Commanded, with_commands
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
@@ -66,6 +67,7 @@ def diagnose(
     progress: Progress = _silent,
     separate: bool = False,
     signals: bool = False,
+    simulated: Sequence[Log] = (),
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
@@ -80,6 +82,9 @@ def diagnose(
     separate : also design the experiment that tells the causes apart which stay open,
         ``Diagnosis.experiment`` (closed loop only).
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
+    simulated : logs of one's own simulator under the same references, one for each estimation log and
+        then each validation log: how far the model reproduces it, ``Diagnosis.simulator``; in closed
+        loop the gap is then that of this simulator.
 
     Returns
     -------
@@ -99,28 +104,22 @@ def diagnose(
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
-    n_fit = len(fit_logs)
-    commanded = with_commands(machine, [*fit_logs, *held_logs])
-    if commanded is not None:
-        machine, logs = commanded.robot, commanded.as_logged()
-        noted = pass_gate_by_targets(machine, logs[:n_fit], logs[n_fit:])
-        fit_logs, held_logs = list(commanded.logs[:n_fit]), list(commanded.logs[n_fit:])
-    else:
-        logs = at_their_poses(machine, [*fit_logs, *held_logs])
-        fit_logs, held_logs = logs[:n_fit], logs[n_fit:]
-        noted = pass_gate(machine, fit_logs, held_logs)
+    inputs = _passed(machine, fit_logs, held_logs)
     progress("looking at the logs", 1, 1)
-    recovered = with_references(machine, [*fit_logs, *held_logs])
-    if recovered is not None:
-        fit_logs, held_logs = recovered[:n_fit], recovered[n_fit:]
-    view = view_of(machine, fit_logs, held_logs, chosen, commanded)
+    view = inputs.view(chosen)
+    if simulated:
+        inputs = inputs.against(view, simulated, chosen)
+        view = inputs.view(chosen)
+    machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     found = believed_by_axis(found, view.fitter, chosen)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
     seen = _seen(view, held_logs, found, said, chosen)
-    out = _assemble(name or found_name, machine, view, held_logs, seen, error_logs, chosen, noted)
+    out = _assemble(
+        name or found_name, machine, view, held_logs, seen, error_logs, chosen, inputs.noted
+    )
     progress("measuring the gap", 1, 1)
     if separate:
         progress("designing an experiment", 0, 1)
@@ -131,14 +130,77 @@ def diagnose(
     if signals:
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
-    out.provenance["references"] = "logged" if view.mode == "closed_loop" else None
-    if view.mode == "closed_loop" and any(log.start_rad is not None for log in fit_logs):
-        out = replace(out, checks=(*out.checks, FROM_OWN_POSES))
-    if recovered is not None:
-        out = replace(out, checks=(*out.checks, SAYS))
-        out.provenance["references"] = "recovered"
+    checks = (*out.checks, *inputs.says(view.mode))
+    out = replace(out, simulator=inputs.simulator, checks=checks)
+    logged = "recovered" if inputs.recovered else "logged"
+    out.provenance["references"] = logged if view.mode == "closed_loop" else None
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """A simulator and logs that passed the gate, as they are compared.
+
+    ``commanded``: logs without torque with what the controller commands along them, where they have none;
+    ``recovered``: whether the references are those that the controller must have had; ``simulator``: how
+    far the robot reproduces the user's own simulator, where its logs were given.
+    """
+
+    robot: Robot
+    estimation: list[Log]
+    validation: list[Log]
+    noted: tuple[Finding, ...]
+    commanded: Commanded | None
+    recovered: bool
+    simulator: Reproduction | None = None
+
+    def view(self, settings: Settings) -> View:
+        """Return how simulator and logs are compared."""
+        return view_of(self.robot, self.estimation, self.validation, settings, self.commanded)
+
+    def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> _Inputs:
+        """Return the same against the user's own simulator, by its logs."""
+        logs, n = [*self.estimation, *self.validation], len(self.estimation)
+        if self.commanded is None:
+            beside = own_simulator.paired(logs, simulated)
+        else:
+            as_logged = own_simulator.paired(self.commanded.as_logged(), simulated)
+            beside = self.commanded.commanded(as_logged)
+        found, left = own_simulator.reproduction(view, logs, beside, settings)
+        return replace(
+            self,
+            estimation=left[:n],
+            validation=left[n:],
+            noted=(*self.noted, *own_simulator.noted(found)),
+            simulator=found,
+        )
+
+    def says(self, mode: str) -> tuple[str, ...]:
+        """Return what is to be known of the logs."""
+        own_poses = any(log.start_rad is not None for log in self.estimation)
+        said = [
+            "" if self.simulator is None else own_simulator.said(self.simulator),
+            FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
+            SAYS if self.recovered else "",
+        ]
+        return tuple(filter(None, said))
+
+
+def _passed(robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]) -> _Inputs:
+    """Return simulator and logs behind the gate, with commands and references where none were logged."""
+    logs, n = [*estimation, *validation], len(estimation)
+    commanded = with_commands(robot, logs)
+    if commanded is not None:
+        logged = commanded.as_logged()
+        noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:])
+        robot, logs = commanded.robot, list(commanded.logs)
+    else:
+        logs = at_their_poses(robot, logs)
+        noted = pass_gate(robot, logs[:n], logs[n:])
+    recovered = with_references(robot, logs)
+    logs = logs if recovered is None else recovered
+    return _Inputs(robot, logs[:n], logs[n:], noted, commanded, recovered is not None)
 
 
 def _inputs(

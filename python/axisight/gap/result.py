@@ -95,6 +95,30 @@ class Remainder:
     varies_with: str | None = None
 
 
+@dataclass(frozen=True)
+class Reproduction:
+    """How far the model reproduces the user's own simulator along the same references.
+
+    ``per_axis`` (n_axes,): rms of the difference of torques over the rms of the user's about its mean
+    [1]; ``of_gap`` (n_axes,): the same over the rms of the error of the user's simulator, of the model
+    where nothing was ``taken_off``: whether the differences were taken off the logs, so that the gap is
+    that of the user's simulator. ``where`` they lie, of what exceeds the noise of the logs.
+    """
+
+    per_axis: Array
+    of_gap: Array
+    taken_off: bool
+    where: tuple[Where, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what stands in the verdict."""
+        return {
+            "per_axis": self.per_axis.tolist(),
+            "of_gap": self.of_gap.tolist(),
+            "taken_off": self.taken_off,
+        }
+
+
 def label(effect: str, axis: int | None, axes: tuple[int, int] | None = None) -> str:
     """Return ``effect@axis`` or ``effect@5,6``; the effect alone when it belongs to the whole arm."""
     if axes is not None:
@@ -214,7 +238,8 @@ class Diagnosis:
     the names of `Settings`.
     ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
     parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
-    causes apart that stay open, where it was asked for.
+    causes apart that stay open, where it was asked for. ``simulator``: how far the model reproduces the
+    user's own, where its logs were given.
     ``signals``: where they were asked for, of each log, estimation logs first, a Dataset with the dims (time_s,
     axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
     simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
@@ -248,6 +273,7 @@ class Diagnosis:
     settings: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     experiment: Experiment | None = None
+    simulator: Reproduction | None = None
     signals: tuple[xr.Dataset, ...] = ()
 
     def to_verdict(self) -> dict[str, Any]:
@@ -277,6 +303,7 @@ class Diagnosis:
             "detection_limits": [_limit(limit) for limit in self.detection_limits],
             "refit": {name: _interval(change) for name, change in self.refit.items()},
             "ranking": [_ranked(c) for c in self.ranking],
+            "simulator": None if self.simulator is None else self.simulator.to_dict(),
             "checks": list(self.checks),
             "findings": [f.to_dict() for f in self.findings],
             "settings": self.settings,

@@ -46,6 +46,10 @@ class Commanded:
         """Return the logs at their own rate."""
         return [_every(log, self.step) for log in self.logs]
 
+    def commanded(self, logs: Sequence[Log]) -> list[Log]:
+        """Return other logs of the logs' own rate as these are."""
+        return [_commanded(self.robot, log, self.step) for log in logs]
+
     def fine(self, values: Array) -> Array:
         """Return samples (n, n_axes) of the logs' rate at that of the controller, as positions are."""
         return between(values, self.step)

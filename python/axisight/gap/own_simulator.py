@@ -1,0 +1,153 @@
+"""The user's own simulator: how far the model here stands for it, and its gap in the place of the model's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.faults import Finding
+from axisight.gap.result import Reproduction
+from axisight.gap.settings import Settings
+from axisight.gap.simulated import simulated_positions
+from axisight.gap.torques import AS_GIVEN
+from axisight.gap.view import View
+from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.logs import Log
+
+Array = NDArray[np.float64]
+
+# Share of the gap of the user's simulator below which it does not matter what the model leaves out of
+# it: a tenth of the squared gap.
+_HARMLESS = 0.1**0.5
+# Of references and sample times that are the same but for rounding.
+_SAME = 1e-3
+
+
+def differs(found: Reproduction) -> NDArray[np.int64]:
+    """Return the axes (from 0) where the difference matters, and is more than noise."""
+    places = [w.axis - 1 for w in found.where]
+    large = found.of_gap > _HARMLESS
+    return np.flatnonzero(large & np.isin(np.arange(len(large)), places))
+
+
+def said(found: Reproduction) -> str:
+    """Return a sentence about how far the model reproduces the user's simulator."""
+    axes = ", ".join(f"axis {i + 1}: {100 * x:.2g} %" for i, x in enumerate(found.per_axis))
+    whose = (
+        "the gap is that of your simulator, from the logs less this difference"
+        if found.taken_off
+        else "the gap is that of the model"
+    )
+    return f"The model differs from your simulator by {axes} of its torque; {whose}."
+
+
+def noted(found: Reproduction) -> list[Finding]:
+    """Return a finding for every axis where the difference matters."""
+    return [_finding(found, int(axis)) for axis in differs(found)]
+
+
+def _finding(found: Reproduction, axis: int) -> Finding:
+    place = next(w for w in found.where if w.axis == axis + 1)
+    band = (
+        "" if place.band_hz is None else f", mostly at {place.band_hz[0]:g}-{place.band_hz[1]:g} Hz"
+    )
+    regime = "" if place.regime is None else f", {place.regime}"
+    message = (
+        f"expected a model that reproduces your simulator, got one that differs from it on axis "
+        f"{axis + 1} by {100 * found.of_gap[axis]:.3g} % of the gap{band}{regime}; diagnose the "
+        "simulated logs themselves to see what the model lacks of it"
+    )
+    return Finding("simulator_differs", "flag", message, None, axis + 1, "simulated")
+
+
+def paired(logs: Sequence[Log], simulated: Sequence[Log]) -> list[Log]:
+    """Return the logs of the user's simulator, each with what drove the log beside it.
+
+    Raises InputError where they are not runs of the same motions: another number of logs or axes,
+    another rate or length, other references.
+    """
+    if len(simulated) != len(logs):
+        raise InputError(
+            f"simulated: expected one for each of {len(logs)} logs, estimation logs first, "
+            f"got {len(simulated)}"
+        )
+    return [_paired(log, own) for log, own in zip(logs, simulated, strict=True)]
+
+
+def _paired(log: Log, own: Log) -> Log:
+    field = f"simulated log {own.name!r}"
+    if own.position_rad.shape != log.position_rad.shape:
+        raise InputError(
+            f"{field}: expected {log.n_samples} samples of {log.n_axes} axes as in log {log.name!r}, "
+            f"got {own.n_samples} of {own.n_axes}"
+        )
+    if abs(own.sample_time_s / log.sample_time_s - 1) > _SAME:
+        raise InputError(
+            f"{field}: expected a sample time of {log.sample_time_s:g} s as in log {log.name!r}, "
+            f"got {own.sample_time_s:g} s"
+        )
+    given = {}
+    for name in ("velocity_ref_rad_s", "position_ref_rad"):
+        real, mine = getattr(log, name), getattr(own, name)
+        if real is not None and mine is not None:
+            off = np.abs(real - mine).max(axis=0)
+            axis = int(np.argmax(off - _SAME * np.ptp(real, axis=0)))
+            if off[axis] > _SAME * np.ptp(real[:, axis]):
+                raise InputError(
+                    f"{field}: expected the references of log {log.name!r}, got others on axis "
+                    f"{axis + 1} (by up to {off[axis]:.3g} {'rad/s' if 'velocity' in name else 'rad'})"
+                )
+        given[name] = real
+    return replace(own, **given, sample_time_s=log.sample_time_s, start_rad=log.start_rad)
+
+
+def reproduction(
+    view: View, logs: Sequence[Log], simulated: Sequence[Log], settings: Settings
+) -> tuple[Reproduction, list[Log]]:
+    """Return how far the model of ``view`` reproduces ``simulated``, and the logs to diagnose.
+
+    In closed loop these are ``logs`` with the differences taken off their torques and positions: what is
+    left to the model is then the gap of the user's simulator, to first order of the difference. By
+    inverse dynamics the two go other ways, and with targets nothing but positions is compared: logs stay
+    as they are.
+    """
+    theirs = [view.measured(own) for own in simulated]
+    ours = view.torques(AS_GIVEN, simulated)
+    differences = [their - our for their, our in zip(theirs, ours, strict=True)]
+    real = [view.measured(log) for log in logs]
+    taken_off = isinstance(view, ClosedLoopView)
+    model = theirs if taken_off else view.torques(AS_GIVEN, logs)
+    errors = [a - b for a, b in zip(real, model, strict=True)]
+    about_mean = [their - their.mean(axis=0) for their in theirs]
+    noises = view.noises(logs, 0)
+    items = [ErrorLog(*each) for each in zip(logs, differences, noises, strict=True)]
+    bands = band_map(items, settings.block_s)
+    regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
+    found = Reproduction(
+        _rms(differences) / np.maximum(_rms(about_mean), 1e-300),
+        _rms(differences) / np.maximum(_rms(errors), 1e-300),
+        taken_off,
+        findings(bands, regimes, settings.significance),
+    )
+    if not taken_off:
+        return found, list(logs)
+    moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
+    each = zip(logs, simulated, differences, moved, strict=True)
+    return found, [
+        replace(
+            log,
+            torque_nm=log.torque_nm - torque,
+            position_rad=log.position_rad - (own.position_rad - position),
+        )
+        for log, own, torque, position in each
+    ]
+
+
+def _rms(parts: Sequence[Array]) -> Array:
+    """Return the root mean square (n_axes,) of all samples."""
+    return np.asarray(np.sqrt(np.mean(np.concatenate(parts) ** 2, axis=0)))

@@ -1,0 +1,174 @@
+"""The user's own simulator beside the logs: what the model lacks of it is not taken for the machine's."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from numpy.typing import NDArray
+from typer.testing import CliRunner
+
+from axisight import Effect, Log, Robot, diagnose, load_robot, simulate
+from axisight.cli import app
+from axisight.errors import InputError
+from axisight.gap import verdict_schema
+from axisight.gap.own_simulator import differs, noted, paired
+from gap_data import log_of
+from servo_arm import MACHINES as SERVOS
+from servo_arm import NOMINAL, simulator
+
+Array = NDArray[np.float64]
+
+THEIRS = Effect("coulomb_friction", 2, {"coulomb_nm": 0.5})
+MACHINES = Effect("viscous_friction", 3, {"viscous_nm_s_rad": 0.05})
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("irb6600_like")
+
+
+def reference(robot: Robot, seed: int) -> Array:
+    """Sums of sines of all axes (n, 3) [rad/s] that fade in, 5 s."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(5.0 / robot.sample_time_s)) * robot.sample_time_s
+    waves = [
+        sum(np.sin(2 * np.pi * (f * t + rng.uniform())) for f in rng.uniform(0.5, 12.0, 8))
+        for _ in range(robot.n_axes)
+    ]
+    return np.column_stack(waves) * (6.0 * np.minimum(t, 1.0))[:, None]
+
+
+def logs_of(robot: Robot, effects: list[Effect], first_run: int = 0) -> list[Log]:
+    return [log_of(robot, effects, reference(robot, i), first_run + i) for i in range(3)]
+
+
+@pytest.fixture(scope="module")
+def real(robot: Robot) -> list[Log]:
+    return logs_of(robot, [THEIRS, MACHINES])
+
+
+@pytest.fixture(scope="module")
+def theirs(robot: Robot) -> list[Log]:
+    return logs_of(robot, [THEIRS], 10)
+
+
+def test_what_the_model_lacks_of_the_simulator_is_no_cause(
+    robot: Robot, real: list[Log], theirs: list[Log]
+) -> None:
+    plain = diagnose(robot=robot, estimation=real[:2], validation=real[2:])
+    assert {c.label for c in plain.causes} == {THEIRS.label, MACHINES.label}
+    found = diagnose(robot=robot, estimation=real[:2], validation=real[2:], simulated=theirs)
+    assert [c.label for c in found.causes] == [MACHINES.label]
+    assert found.simulator is not None
+    assert found.simulator.taken_off
+    # Friction of their axis 2, and what it does to axis 3.
+    assert differs(found.simulator).tolist() == [1, 2]
+    assert [f.axis for f in found.findings if f.name == "simulator_differs"] == [2, 3]
+    # The gap is that of their simulator: the logs less its own torques.
+    error = real[2].torque_nm - theirs[2].torque_nm
+    gap = np.sqrt((error**2).mean(axis=0) / real[2].torque_nm.var(axis=0))
+    # Noise is drawn twice, in theirs and in the logs.
+    assert found.gap.before_per_axis == pytest.approx(gap, rel=0.05)
+
+
+def test_a_model_that_is_the_simulator_changes_nothing(robot: Robot, real: list[Log]) -> None:
+    """Their logs without noise are the model's own, but for rounding."""
+    own = [
+        replace(x, torque_nm=run["torque_cmd_nm"].values, position_rad=run["position_rad"].values)
+        for x, run in zip(real, exact(robot), strict=True)
+    ]
+    plain = diagnose(robot=robot, estimation=real[:2], validation=real[2:])
+    found = diagnose(robot=robot, estimation=real[:2], validation=real[2:], simulated=own)
+    assert found.simulator is not None
+    assert found.simulator.per_axis.max() < 1e-9
+    assert not noted(found.simulator)
+    assert [c.label for c in found.causes] == [c.label for c in plain.causes]
+    assert found.gap.before == pytest.approx(plain.gap.before, rel=1e-9)
+
+
+def exact(robot: Robot) -> list[xr.Dataset]:
+    return [simulate(robot, reference(robot, i), method="rk4") for i in range(3)]
+
+
+def test_by_inverse_dynamics_the_gap_stays_that_of_the_model(
+    robot: Robot, real: list[Log], theirs: list[Log]
+) -> None:
+    def bare(logs: list[Log]) -> list[Log]:
+        return [replace(x, velocity_ref_rad_s=None) for x in logs]
+
+    rigid = Robot.from_toml(robot.toml.split("[controller]")[0] + '[controller]\nkind = "none"\n')
+    found = diagnose(
+        robot=rigid, estimation=bare(real[:2]), validation=bare(real[2:]), simulated=bare(theirs)
+    )
+    assert found.mode == "inverse_dynamics"
+    assert found.simulator is not None
+    assert not found.simulator.taken_off
+    assert "the gap is that of the model" in " ".join(found.checks)
+
+
+def test_logs_of_other_motions_are_refused(real: list[Log], theirs: list[Log]) -> None:
+    with pytest.raises(InputError, match="one for each of 3 logs"):
+        paired(real, theirs[:2])
+    with pytest.raises(InputError, match=r"'run11'.*expected the references of log 'run0'"):
+        paired(real[:1], theirs[1:2])
+    with pytest.raises(InputError, match=r"expected \d+ samples of 3 axes"):
+        paired(real[:1], [theirs[0].part(0.0, 3.0)])
+    with pytest.raises(InputError, match="expected a sample time"):
+        paired(real[:1], [replace(theirs[0], sample_time_s=0.002)])
+    bare = replace(theirs[0], velocity_ref_rad_s=None)
+    assert paired(real[:1], [bare])[0].velocity_ref_rad_s is real[0].velocity_ref_rad_s
+
+
+def test_on_the_command_line(
+    tmp_path: Path, robot: Robot, real: list[Log], theirs: list[Log]
+) -> None:
+    files = [[table(tmp_path / f"{kind}{i}.parquet", x) for i, x in enumerate(logs)]
+             for kind, logs in (("real", real), ("own", theirs))]  # fmt: skip
+    (tmp_path / "robot.toml").write_text(robot.toml)
+    own = [part for file in files[1] for part in ("--simulated", str(file))]
+    verdict = tmp_path / "verdict.json"
+    out = CliRunner().invoke(
+        app,
+        ["diagnose", str(tmp_path / "robot.toml"), *map(str, files[0][:2]),
+         "--validation", str(files[0][2]), *own, "--json", str(verdict)],
+    )  # fmt: skip
+    assert out.exit_code == 0, out.output
+    said = " ".join(out.output.split())
+    assert "simulator_differs" in said or "reproduces your simulator" in said
+    content = json.loads(verdict.read_text())
+    jsonschema.validate(content, verdict_schema())
+    assert content["simulator"]["taken_off"] is True
+    assert content["simulator"]["of_gap"][1] > 0.9
+
+
+def table(path: Path, log: Log) -> Path:
+    columns = {"time_s": log.time_s}
+    for i in range(log.n_axes):
+        assert log.velocity_ref_rad_s is not None
+        columns[f"velocity_ref_{i + 1}"] = log.velocity_ref_rad_s[:, i]
+        columns[f"torque_cmd_{i + 1}"] = log.torque_nm[:, i]
+        columns[f"position_{i + 1}"] = log.position_rad[:, i]
+    pd.DataFrame(columns).to_parquet(path)
+    return path
+
+
+def test_targets_have_an_own_simulator_too(tmp_path: Path) -> None:
+    """The logs of MuJoCo that the model was read from: it takes another step, a lag that shows where no gap is."""
+    pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
+    logs = [SERVOS["coulomb_friction@2"].log(run) for run in (1, 2, 3)]
+    own = [NOMINAL.log(run, noise_rad=0.0) for run in (1, 2, 3)]
+    found = diagnose(
+        robot=simulator(tmp_path), estimation=logs[:2], validation=logs[2:], simulated=own
+    )
+    assert found.simulator is not None
+    assert not found.simulator.taken_off
+    assert found.simulator.per_axis.max() < 0.05
+    assert 1 not in differs(found.simulator)
+    assert found.causes[0].label == "coulomb_friction@2"
