@@ -17,7 +17,8 @@ def check_target(
 ) -> None:
     """Raise InputError for a file that signals cannot be written to, MissingExtraError without its library.
 
-    ``target`` has to end in .parquet or .mcap and to be what `axisight.storage.check_target` lets pass.
+    ``target`` has to end in .parquet or .mcap and to be a file that may be written, none of the ``inputs``;
+    with ``overwrite`` one that exists is no obstacle.
     """
     path = Path(target)
     kind = path.suffix.lower()
