@@ -21,6 +21,10 @@ class RobotError(InputError):
     """A robot model cannot be used."""
 
 
+class OutputError(InputError, OSError):
+    """A file or folder cannot be written; the message says which, and what is in the way."""
+
+
 class MissingExtraError(AxisightError, ImportError):
     """A library of an optional extra is not installed; the message names the extra."""
 

@@ -6,7 +6,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from axisight.cli import show
+from axisight.cli import common, show
 from diagnosis_data import explained, hostile, of
 
 
@@ -15,6 +15,7 @@ def shown(monkeypatch):
     def render(diagnosis, width: int = 200) -> str:
         console = Console(width=width, record=True, file=StringIO())
         monkeypatch.setattr(show, "OUT", console)
+        monkeypatch.setattr(common, "OUT", console)
         show.show_diagnosis(diagnosis)
         return " ".join(console.export_text().split())
 

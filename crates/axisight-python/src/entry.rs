@@ -1,5 +1,6 @@
 //! The one way into the core: own inputs, release the GIL, catch panics, honour Ctrl-C.
 
+use crate::own_pool::with_threads;
 use pyo3::prelude::*;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -50,7 +51,7 @@ pub fn detached<T: Send>(
         std::thread::scope(|scope| {
             let (done, finished) = mpsc::channel();
             let handle = scope.spawn(move || {
-                let result = work();
+                let result = with_threads(work);
                 // The receiver outlives the scope; a failed send only means nobody waits.
                 let _ = done.send(());
                 result
@@ -69,7 +70,9 @@ pub fn detached<T: Send>(
             if let Some(e) = interrupt {
                 return Err(e);
             }
-            result.map_err(|panic| panicked(panic.as_ref()))
+            result
+                .map_err(|panic| panicked(panic.as_ref()))?
+                .map_err(|e| AxisightError::new_err(format!("threads: {e}")))
         })
     })
 }

@@ -14,6 +14,7 @@ mod frequency_fit;
 mod frf;
 mod local_models;
 mod montecarlo;
+mod own_pool;
 mod regressor;
 mod robot;
 mod simulation;

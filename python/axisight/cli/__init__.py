@@ -1,5 +1,31 @@
 """The command line ``axisight``."""
 
-from axisight.cli.application import app, main
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Any
+
+from axisight import stopping
 
 __all__ = ["app", "main"]
+
+
+def main() -> None:
+    """Run the command line; asked to stop, it ends without a traceback wherever it is."""
+    try:
+        stopping.listen()
+        # In here, for half of the time of a short command is that of its imports.
+        import_module("axisight.cli.application").app()
+    except BaseException:
+        # Of any kind: libraries turn what stops them into errors and exits of their own.
+        status = stopping.asked()
+        if status is None:
+            raise
+        sys.exit(status)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "app":
+        return import_module("axisight.cli.application").app
+    raise AttributeError(f"module 'axisight.cli' has no attribute {name!r}")

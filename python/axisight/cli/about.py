@@ -9,17 +9,22 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from axisight.cli.common import OUT, Columns, errors
+from axisight.cli.common import OUT, Columns, Untrusted, errors
 from axisight.effects import effect_table
 from axisight.gap import verdict_schema
 from axisight.logs import check_log, render
+from axisight.logs.untrusted import check_log_inside
 
 
 def check_command(
-    log: Annotated[Path, typer.Argument(help="Log to check.")], columns: Columns = None
+    log: Annotated[Path, typer.Argument(help="Log to check.")],
+    columns: Columns = None,
+    untrusted: Untrusted = False,
 ) -> None:
     """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
     with errors():
+        if untrusted:
+            check_log_inside(log)
         found = check_log(log, columns)
         OUT.print(render(found))
         if not found.ok:

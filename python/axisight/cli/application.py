@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
+
+from axisight.stopping import exit_status
 
 # Commands, where each lives, and the first line of its help: without it the list of commands would
 # have to load them all, with the libraries of all.
@@ -98,6 +99,13 @@ class _LoadedWhenCalled(TyperGroup):
         name, command, rest = super().resolve_command(ctx, args)
         return name, command if name is None else load_command(name), rest
 
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stop:
+            # While a command was loaded, where none of its own handlers is yet at work.
+            raise typer.Exit(exit_status(stop)) from None
+
 
 app = typer.Typer(
     cls=_LoadedWhenCalled,
@@ -123,8 +131,3 @@ def _options(
     ] = False,
 ) -> None:
     """Identify industrial robots, simulate them, and explain the sim-to-real gap."""
-
-
-def main() -> None:
-    """Run the command line."""
-    sys.exit(app())

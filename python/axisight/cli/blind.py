@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Annotated
@@ -11,10 +12,10 @@ import typer
 
 from axisight.blind import judged_cases, markdown, summary
 from axisight.blind.page import render_score
-from axisight.cli.common import OUT, bars, errors
+from axisight.cli.common import bars, errors, say, write_each
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
-from axisight.storage import write_whole
+from axisight.storage import check_folder, check_targets, write_whole
 
 blind_app = typer.Typer(
     add_completion=False,
@@ -41,6 +42,8 @@ def make_command(
 ) -> None:
     """Simulate machines that differ from their simulator, with other engines (extra ``blind``)."""
     with errors(), bars() as progress:
+        check_folder(cases)
+        check_folder(truth)
         # Only this command needs the engines.
         from axisight.blind.drawing import Choice  # noqa: PLC0415
         from axisight.blind.make import make_cases  # noqa: PLC0415
@@ -48,7 +51,7 @@ def make_command(
         numbers = range(first, first + count)
         choice = Choice(engine, arm, motions)
         make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress, choice)
-    OUT.print(f"{count} cases: {cases}; what is withheld: {truth}", soft_wrap=True)
+    say(f"{count} cases: {cases}; what is withheld: {truth}")
 
 
 @blind_app.command("run")
@@ -62,6 +65,7 @@ def run_command(
 ) -> None:
     """Diagnose every case of a folder that has no verdict yet."""
     with errors("stopped; finished verdicts stay, run again to go on"), bars() as progress:
+        check_folder(out)
         found = diagnose_fleet(
             cases,
             out,
@@ -72,8 +76,8 @@ def run_command(
         )
     failed = {name: verdict["error"] for name, verdict in found.items() if "error" in verdict}
     for name, reason in failed.items():
-        OUT.print(f"{name}: {reason}", markup=False, soft_wrap=True)
-    OUT.print(f"verdicts: {out}", soft_wrap=True)
+        say(f"{name}: {reason}")
+    say(f"verdicts: {out}")
     if failed:
         raise typer.Exit(1)
 
@@ -89,13 +93,12 @@ def score_command(
 ) -> None:
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
     with errors():
+        check_targets({"--out": out, "--json": json, "--html": html})
         judged = judged_cases(cases, truth, verdicts)
         score = summary(judged)
         text = markdown(score)
-        if out is not None:
-            write_whole(out, text)
-        if json is not None:
-            write_whole(json, dumps(score, indent=1) + "\n")
+        say(text)
+        files = {out: text, json: dumps(score, indent=1) + "\n"}
         if html is not None:
-            write_whole(html, render_score(cases.resolve().name, score))
-    OUT.print(text, markup=False, soft_wrap=True)
+            files[html] = render_score(cases.resolve().name, score)
+        write_each([partial(write_whole, path, made) for path, made in files.items() if path])

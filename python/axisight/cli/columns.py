@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, check_new, errors
+from axisight.cli.common import check_new, errors, say
 from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
 from axisight.robot import load_robot
@@ -26,7 +26,7 @@ def list_command() -> None:
     """List the maps that ship with the package, by what their first line says."""
     for name in MAPS:
         first = named_map_text(name).splitlines()[0].removeprefix("# ")
-        _say(f"{name}: {first}")
+        say(f"{name}: {first}")
 
 
 @columns_app.command("show")
@@ -53,7 +53,8 @@ def guess_command(
 ) -> None:
     """Propose a column map from names and numbers, with the reason of every choice beside it."""
     with errors():
-        check_new(out, overwrite=overwrite)
+        given = [log, *(Path(x) for x in (robot,) if x)]
+        check_new(out, overwrite=overwrite, inputs=given)
         found = guess_columns(log, None if robot is None else load_robot(robot))
         if out is None:
             typer.echo(found.text, nl=False)
@@ -64,17 +65,13 @@ def guess_command(
 
 def _say_found(out: Path, log: Path, found: Proposal) -> None:
     if found.named is None:
-        _say(f"{out}: a map of its own; look at the reasons in it before use")
+        say(f"{out}: a map of its own; look at the reasons in it before use")
     elif found.doubts:
-        _say(f"{out}: the names are those of {found.named}, with fewer axes")
+        say(f"{out}: the names are those of {found.named}, with fewer axes")
     else:
-        _say(f"{out}: the names are those of {found.named}; --columns {found.named} does the same")
+        say(f"{out}: the names are those of {found.named}; --columns {found.named} does the same")
     for doubt in found.doubts:
-        _say(f"doubtful: {doubt}")
+        say(f"doubtful: {doubt}")
     for name, reason in found.unused.items():
-        _say(f"not used: {name}: {reason}")
-    _say(f"then: axisight check {log} --columns {out}")
-
-
-def _say(text: str) -> None:
-    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+        say(f"not used: {name}: {reason}")
+    say(f"then: axisight check {log} --columns {out}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +13,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from axisight.errors import AxisightError, InputError
+from axisight.errors import AxisightError, InputError, OutputError
+from axisight.stopping import exit_status
+from axisight.storage import check_target
 
 OUT = Console()
 ERR = Console(stderr=True)
@@ -35,17 +38,30 @@ Columns = Annotated[
 ]
 
 
+Untrusted = Annotated[
+    bool,
+    typer.Option(
+        "--untrusted",
+        help="What is read is somebody else's: refuse what leads out of its folder.",
+    ),
+]
+
+
 @contextmanager
 def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
-    """Turn our errors into a message and exit status 2, Ctrl-C into ``stopped`` and status 130."""
+    """Turn our errors into a message and exit status 2, Ctrl-C and SIGTERM into ``stopped``."""
     try:
-        yield
+        with warnings.catch_warnings():
+            # What NumPy says of a division in the middle of the work is no news of the result: that has findings.
+            # Of all threads, as `numpy.errstate` is not.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            yield
     except AxisightError as error:
         ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
         raise typer.Exit(2) from None
-    except KeyboardInterrupt:
-        ERR.print(stopped, highlight=False, soft_wrap=True)
-        raise typer.Exit(130) from None
+    except KeyboardInterrupt as stop:
+        ERR.print(stopped, markup=False, highlight=False, soft_wrap=True)
+        raise typer.Exit(exit_status(stop)) from None
 
 
 @contextmanager
@@ -68,6 +84,23 @@ def bars() -> Iterator[Callable[[str, int, int], None]]:
         yield report
 
 
+def say(text: str) -> None:
+    """Print a text as it is: names of files and of users may look like markup."""
+    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def write_each(writes: Sequence[Callable[[], object]]) -> None:
+    """Write every output, whatever becomes of the others; raises OutputError for those that failed."""
+    failed = []
+    for write in writes:
+        try:
+            write()
+        except (AxisightError, OSError) as error:
+            failed.append(str(error))
+    if failed:
+        raise OutputError("; ".join(failed))
+
+
 def numbers(option: str, text: str) -> list[float]:
     """Return numbers with commas between; raises InputError naming the option."""
     try:
@@ -76,7 +109,9 @@ def numbers(option: str, text: str) -> list[float]:
         raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
 
 
-def check_new(target: Path | None, *, overwrite: bool) -> None:
-    """Refuse a file to write that exists, unless it may be replaced; None is the screen."""
-    if target is not None and target.exists() and not overwrite:
-        raise InputError(f"{target} exists: choose another name or pass --overwrite")
+def check_new(target: Path | None, *, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+    """Raise OutputError as `check_target` for a file to write; None is the screen."""
+    if target is not None:
+        if target.is_file() and not overwrite:
+            raise OutputError(f"{target} exists: choose another name or pass --overwrite")
+        check_target(target, inputs=inputs)

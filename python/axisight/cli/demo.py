@@ -10,14 +10,16 @@ import typer
 from numpy.typing import NDArray
 
 from axisight.blind.case_files import CaseFolder, moves
-from axisight.cli.common import OUT, bars, errors
-from axisight.cli.diagnose import write_diagnosis
+from axisight.cli.common import bars, errors, say, write_each
+from axisight.cli.diagnose import diagnosis_writes
+from axisight.cli.show import show_diagnosis
 from axisight.effects import Effect
 from axisight.effects.stated import DEMONSTRATION
 from axisight.errors import InputError
 from axisight.gap import diagnose
 from axisight.robot import Robot, load_robot
 from axisight.simulation import simulate
+from axisight.storage import check_targets
 
 Array = NDArray[np.float64]
 
@@ -94,8 +96,11 @@ def demo_command(
 ) -> None:
     """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
     with errors():
+        verdict, page = out / "verdict.json", out / "report.html"
+        check_targets({"--out, verdict": verdict, "--out, report": page})
         case = write_demo_case(out / "case")
-        OUT.print(f"case: {case} (a simulated machine with an effect its simulator lacks)")
+        say(f"case: {case} (a simulated machine with an effect its simulator lacks)")
         with bars() as progress:
             found = diagnose(case, progress=progress)
-        write_diagnosis(found, out / "verdict.json", out / "report.html")
+        show_diagnosis(found)
+        write_each(diagnosis_writes(found, verdict, page))

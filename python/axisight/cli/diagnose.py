@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -12,16 +13,18 @@ import typer
 
 import axisight
 from axisight import report as pages
-from axisight.cli.common import OUT, Columns, From, To, bars, errors
+from axisight.cli.common import Columns, From, To, Untrusted, bars, errors, say, write_each
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import read_inputs
+from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
 from axisight.robot import Robot
+from axisight.storage import check_targets
 
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
@@ -110,6 +113,7 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
         ),
     ] = None,
+    untrusted: Untrusted = False,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -142,6 +146,7 @@ def diagnose_command(
             "--write-model": write_model,
             "--signals": signals,
             "--simulated": simulated,
+            "--untrusted": untrusted,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -158,12 +163,28 @@ def diagnose_command(
         load = partial(load_simulator, given=parse_effects(effect))
         part = (start_s, stop_s)
         inputs = read_inputs(
-            case_or_logs, model, validation or [], columns, load, part, simulated or []
+            case_or_logs,
+            model,
+            validation or [],
+            columns,
+            load,
+            part,
+            simulated or [],
+            untrusted=untrusted,
         )
+        targets = {
+            "--json": json,
+            "--report": report,
+            "--write-model": write_model,
+            "--signals": signals,
+        }
+        for path in () if next_experiment is None else experiment_files(next_experiment):
+            targets[f"--next-experiment, {path.name}"] = path
+        check_targets(targets, inputs=[*inputs.files(), *_described(case_or_logs, columns)])
         if write_model is not None:
             axisight.write_back.check_target(inputs.robot_source, write_model)
         if signals is not None:
-            axisight.signal_files.check_target(signals, inputs=inputs.files())
+            axisight.signal_files.check_target(signals)
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -184,25 +205,36 @@ def diagnose_command(
                 signals=signals is not None,
                 simulated=inputs.simulated,
             )
-        write_diagnosis(found, json, report)
+        show_diagnosis(found)
+        writes = diagnosis_writes(found, json, report)
         if next_experiment is not None:
-            _write_experiment(found, next_experiment)
+            writes.append(partial(_write_experiment, found, next_experiment))
         if write_model is not None:
-            _write_model(found, inputs.robot_source, inputs.robot, write_model)
+            made = partial(_write_model, found, inputs.robot_source, inputs.robot, write_model)
+            writes.append(made)
         if signals is not None:
-            path = axisight.signal_files.write_signals(found.signals, signals)
-            OUT.print(f"signals: {path}", soft_wrap=True)
+            writes.append(partial(_write_signals, found, signals))
+        write_each(writes)
+
+
+def _described(given: Sequence[Path], columns: Path | None) -> list[Path]:
+    """Return the files that say what is read, beside those that hold it."""
+    return [p / "case.toml" for p in given if p.is_dir()] + [p for p in (columns,) if p]
+
+
+def _write_signals(found: Diagnosis, target: Path) -> None:
+    say(f"signals: {axisight.signal_files.write_signals(found.signals, target)}")
 
 
 def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Path) -> None:
     """Write the simulator with its causes, and say which of them it has no place for."""
     if not found.causes:
-        OUT.print("no model was written: no cause was named")
+        say("no model was written: no cause was named")
         return
     made = axisight.write_back.write_model(source, robot, found.causes, target)
-    OUT.print(f"model: {made.path}, with {', '.join(made.placed) or 'none'}", soft_wrap=True)
+    say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
     for label in made.left_out:
-        OUT.print(f"no place in it for {label}: {made.why[label]}", soft_wrap=True)
+        say(f"no place in it for {label}: {made.why[label]}")
 
 
 def _write_experiment(found: Diagnosis, folder: Path) -> None:
@@ -210,21 +242,27 @@ def _write_experiment(found: Diagnosis, folder: Path) -> None:
     made = found.experiment
     if made is None:
         why = "needs references in every log" if found.mode != "closed_loop" else "nothing is open"
-        OUT.print(f"no experiment: {why}")
+        say(f"no experiment: {why}")
     elif not made.decides:
-        OUT.print("no experiment was written: none of those tried decides")
+        say("no experiment was written: none of those tried decides")
     else:
         for path in made.write(folder):
-            OUT.print(f"experiment: {path}", soft_wrap=True)
+            say(f"experiment: {path}")
 
 
-def write_diagnosis(found: Diagnosis, json: Path | None, report: Path | None) -> None:
-    """Show a diagnosis, and write its verdict and its page where they are asked for."""
-    show_diagnosis(found)
-    if json is not None:
-        found.save_verdict(json)
-        OUT.print(f"verdict: {json}", soft_wrap=True)
-    if report is not None:
+def diagnosis_writes(
+    found: Diagnosis, json: Path | None, report: Path | None
+) -> list[Callable[[], object]]:
+    """Return what writes the verdict and the page of a diagnosis where they are asked for."""
+
+    def verdict(target: Path) -> None:
+        found.save_verdict(target)
+        say(f"verdict: {target}")
+
+    def page(target: Path) -> None:
         # Brings plotly: only for those who ask for a page.
-        pages.save_report(found, report)
-        OUT.print(f"report: {report}", soft_wrap=True)
+        pages.save_report(found, target)
+        say(f"report: {target}")
+
+    wanted = ((verdict, json), (page, report))
+    return [partial(write, target) for write, target in wanted if target is not None]

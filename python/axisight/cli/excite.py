@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from axisight.cli.common import OUT, errors, numbers
+from axisight.cli.common import OUT, errors, numbers, say
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects, with_given
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
+from axisight.excitation.files import reference_files
 from axisight.excitation.plots import plot_references, plot_signal
 from axisight.robot import load_robot
+from axisight.storage import check_targets, write_bytes
 
 
 def excite_command(
@@ -67,6 +70,9 @@ def excite_command(
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
     with errors():
+        targets = {f"--out, {path.name}": path for path in reference_files(out)}
+        targets |= {f"--plot, {path.name}": path for path in _figures(plot)}
+        check_targets(targets, inputs=[Path(x) for x in (design, robot) if x is not None])
         data = {} if design is None else load_design(design)
         _replace(
             data, "signal", kind=kind, period_s=period_s, band_hz=_numbers("--band-hz", band_hz)
@@ -98,10 +104,10 @@ def excite_command(
             OUT.print("nothing was written; --force writes in spite of limits")
             raise typer.Exit(1)
         for path in write_references(made.references, out):
-            OUT.print(f"written: {path}", soft_wrap=True)
+            say(f"written: {path}")
         if plot is not None:
             for path in _draw(made, plot):
-                OUT.print(f"written: {path}", soft_wrap=True)
+                say(f"written: {path}")
 
 
 def _show(made: Excited) -> None:
@@ -118,18 +124,24 @@ def _show(made: Excited) -> None:
             f"({found.status})"
         )
     if made.report is not None:
-        OUT.print(str(made.report), highlight=False, soft_wrap=True)
+        say(str(made.report))
 
 
 def _draw(made: Excited, path: Path) -> list[Path]:
-    both = path.with_name(f"{path.stem}-references{path.suffix}")
-    figures = {path: plot_signal(made.signal), both: plot_references(made.references)}
-    for name, figure in figures.items():
+    figures = (plot_signal(made.signal), plot_references(made.references))
+    for name, figure in zip(_figures(path), figures, strict=True):
+        drawn = io.BytesIO()
         try:
-            figure.savefig(name, dpi=200)
-        except (OSError, ValueError) as error:
+            figure.savefig(drawn, dpi=200, format=name.suffix.removeprefix(".") or None)
+        except ValueError as error:
             raise InputError(f"--plot: {name} cannot be drawn: {error}") from None
-    return list(figures)
+        write_bytes(name, drawn.getvalue())
+    return _figures(path)
+
+
+def _figures(path: Path | None) -> list[Path]:
+    """Return the files of ``--plot``."""
+    return [] if path is None else [path, path.with_name(f"{path.stem}-references{path.suffix}")]
 
 
 def _replace(data: dict[str, Any], part: str, **values: Any) -> None:

@@ -10,19 +10,18 @@ import typer
 from numpy.typing import NDArray
 
 import axisight
-from axisight.cli.common import errors
+from axisight.cli.common import errors, say
 from axisight.cli.identify_common import (
     Columns,
     Force,
     Out,
     Unchecked,
     band,
+    check_out,
     load_source,
     options,
     provenance,
     read_logs,
-    refuse_in_the_way,
-    say,
     write_robot,
 )
 from axisight.errors import InputError
@@ -102,7 +101,7 @@ def axis_command(
     axis. The exit status is 1 if the fit did not converge.
     """
     with errors():
-        refuse_in_the_way(out, force)
+        check_out(out, [slow, *broadband], columns, force=force)
         machine = None if robot is None else load_source(robot)
         if out is not None and machine is None:
             raise InputError("--out: expected the robot to write values into, in --robot")

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from axisight.cli.common import OUT, numbers
-from axisight.errors import InputError
+from axisight.cli.common import numbers, say
+from axisight.errors import InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.faults import refused
 from axisight.gap.inputs import part_of
@@ -26,6 +26,7 @@ from axisight.robot_file import (
     sidecar_path,
     write_identified,
 )
+from axisight.storage import check_targets
 
 Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
 Out = Annotated[
@@ -110,11 +111,20 @@ def _kinds(slides: Sequence[bool]) -> str:
     return ", ".join("slide" if one else "turn" for one in slides)
 
 
-def refuse_in_the_way(out: Path | None, force: bool) -> None:
-    """Refuse files in the way before any work; raises InputError."""
-    for path in [] if out is None or force else [out, sidecar_path(out)]:
-        if path.exists():
-            raise InputError(f"--out: {path} exists; --force replaces it")
+def check_out(
+    out: Path | None, logs: Sequence[Path], columns: Path | None = None, *, force: bool
+) -> None:
+    """Raise OutputError before any work for a robot that cannot be written with its sidecar.
+
+    Logs and their column map are never replaced, the robot with ``force``: it grows from step to step.
+    """
+    if out is None:
+        return
+    targets = {"--out": out, "--out, sidecar": sidecar_path(out)}
+    for path in () if force else targets.values():
+        if path.is_file():
+            raise OutputError(f"--out: {path} exists; --force replaces it")
+    check_targets(targets, inputs=[*logs, *(x for x in (columns,) if x)])
 
 
 def options(ctx: typer.Context) -> dict[str, Any]:
@@ -147,15 +157,10 @@ def write_robot(source: Robot, out: Path, found: Identified, *, force: bool) -> 
     """Write robot and sidecar and say so; raises InputError if they cannot be written."""
     try:
         sidecar = write_identified(source, out, found, overwrite=force)
-    except OSError as error:
-        raise InputError(f"--out: {out} cannot be written: {error}") from None
+    except OutputError as error:
+        raise OutputError(f"--out: {error}") from None
     for path in (out, sidecar):
-        OUT.print(f"written: {path}", soft_wrap=True, highlight=False)
-
-
-def say(text: str) -> None:
-    """Print a text as it is."""
-    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+        say(f"written: {path}")
 
 
 def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Annotated, cast
 import numpy as np
 import typer
 import xarray as xr
+from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, errors, numbers
+from axisight.cli.common import OUT, errors, numbers, say
 from axisight.cli.identify_common import (
     Force,
     Out,
+    check_out,
     load_source,
     options,
     pairs,
     provenance,
-    refuse_in_the_way,
-    say,
     write_robot,
 )
 from axisight.effects import effect_info
@@ -93,7 +93,7 @@ def elastic_command(
     search did not converge.
     """
     with errors():
-        refuse_in_the_way(out, force)
+        check_out(out, responses, force=force)
         machine = load_source(robot)
         linear = [
             effect for effect in machine.effects if effect_info(effect.name).linear == "parameters"
@@ -172,7 +172,7 @@ def _show(fit: FrequencyFit) -> None:
         table.add_column(title, justify="left" if title == "parameter" else "right")
     for row in fit.table().itertuples():
         table.add_row(
-            str(row.parameter),
+            escape(str(row.parameter)),
             f"{row.value:.6g}",
             f"{row.std:.2g}",
             f"{100 * cast(float, row.relative_std):.2g} %",

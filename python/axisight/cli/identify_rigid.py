@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 import xarray as xr
+from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, From, To, errors
+from axisight.cli.common import OUT, From, To, errors, say
 from axisight.cli.identify_common import (
     Columns,
     Force,
     Out,
     Unchecked,
+    check_out,
     load_source,
     options,
     pairs,
     provenance,
     read_logs,
-    refuse_in_the_way,
-    say,
     write_robot,
 )
 from axisight.errors import IdentificationWarning, InputError, RobotError
@@ -129,7 +129,7 @@ def rigid_body_command(
     The exit status is 1 if these were not found to full accuracy.
     """
     with errors():
-        refuse_in_the_way(out, force)
+        check_out(out, [*logs, *(held_out or [])], columns, force=force)
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
         part = (start_s, stop_s)
@@ -221,5 +221,5 @@ def _error_table(of: xr.Dataset, title: str) -> Table:
             f"{rms:.3g} Nm, {100 * share:.3g} %"
             for rms, share in zip(one["rms_nm"].values, one["relative_error"].values, strict=True)
         ]
-        table.add_row(name, *cells)
+        table.add_row(escape(name), *cells)
     return table

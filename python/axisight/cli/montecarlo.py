@@ -9,16 +9,23 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bars
 from rich.table import Table
 
 from axisight import montecarlo
-from axisight.cli.common import ERR, OUT, errors
+from axisight.cli.common import ERR, OUT, errors, say
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects
 from axisight.effects import Effect
+from axisight.errors import StudyError
+from axisight.montecarlo.backends import available_threads
+from axisight.montecarlo.estimate import estimate
 from axisight.montecarlo.progress import Progress, Report
 from axisight.robot import load_robot
+
+# More runs than this are begun by mistake more often than on purpose.
+_UNASKED = 100_000
 
 
 def montecarlo_command(
@@ -35,20 +42,26 @@ def montecarlo_command(
         str | None, typer.Option(help="Address of a Dask scheduler, e.g. tcp://10.0.0.1:8786.")
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(min=1, help="Threads here. Default: all processors.")
+        int | None, typer.Option(min=1, max=1024, help="Threads here. Default: all processors.")
     ] = None,
     effect: GivenEffects = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help=f"Run more than {_UNASKED} runs without being asked.")
+    ] = False,
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
         design = _with_given(montecarlo.read_study(study), parse_effects(effect))
         given = [Effect(**entry.model_dump()) for entry in design.effect]
         say_effects(load_robot(design.robot), design.robot, given)
+        changes = {"runs": runs, "seed": seed}
+        design = design.changed(**{k: v for k, v in changes.items() if v is not None})
+        if design.runs > _UNASKED and not yes:
+            takes = estimate(design, threads or available_threads())
+            raise StudyError(f"runs: {takes}: pass --yes to run more than {_UNASKED}")
         with _bar() as progress:
             result = montecarlo.run(
                 design,
-                runs=runs,
-                seed=seed,
                 out=out,
                 resume=resume,
                 backend="local" if scheduler is None else "dask",
@@ -61,10 +74,10 @@ def montecarlo_command(
         if len(failed):
             table = Table("run", "seed", "experiment", "kind", "detail", title="failed runs")
             for row in failed.head(10).itertuples(index=False):
-                table.add_row(*(str(cell) for cell in row))
+                table.add_row(*(escape(str(cell)) for cell in row))
             OUT.print(table)
         runs_failed = failed["run"].nunique()
-        OUT.print(f"{counted} runs counted, {runs_failed} with failures: {out}", soft_wrap=True)
+        say(f"{counted} runs counted, {runs_failed} with failures: {out}")
         if counted == 0:
             raise typer.Exit(1)
 
@@ -95,7 +108,7 @@ def _bar() -> Iterator[Report]:
 
         def report(state: Progress) -> None:
             if state.message:
-                bars.console.print(state.message, highlight=False, soft_wrap=True)
+                bars.console.print(state.message, markup=False, highlight=False, soft_wrap=True)
             pace = f"{state.rate_hz:.3g} runs/s, {state.remaining_s:.0f} s left"
             if state.failed:
                 pace += f", {state.failed} failed"

@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from axisight.cli.common import ERR, OUT, errors
+from axisight.cli.common import ERR, OUT, errors, say
 from axisight.errors import InputError
+from axisight.storage import check_folder
 
 if TYPE_CHECKING:
     from axisight_thesis import Claim
@@ -45,6 +47,7 @@ def reproduce_command(
         TimeElapsedColumn(),
     )
     with errors(f"stopped; finished items are in {out}"):
+        check_folder(out)
         try:
             from axisight_thesis import context, run  # noqa: PLC0415
         except ModuleNotFoundError as error:
@@ -52,10 +55,10 @@ def reproduce_command(
                 raise
             raise InputError(_MISSING) from None
         with Progress(*columns, console=ERR) as bar:
-            task = bar.add_task(name)
+            task = bar.add_task(escape(name))
 
             def report(line: str) -> None:
-                bar.console.print(line, highlight=False, soft_wrap=True)
+                bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
             def progress(item: str, done: int, total: int) -> None:
                 bar.update(task, description=item, completed=done, total=total)
@@ -63,7 +66,7 @@ def reproduce_command(
             setting = context(seed=seed, threads=threads or 0, quick=quick, report=report)
             items = run(name, setting, out, progress)
         _show([claim for item in items for claim in item.claims])
-        OUT.print(f"{len(items)} items: {out}", soft_wrap=True)
+        say(f"{len(items)} items: {out}")
 
 
 def _show(claims: list[Claim]) -> None:

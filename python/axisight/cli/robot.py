@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, numbers
+from axisight.cli.common import numbers, say
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
@@ -48,7 +48,7 @@ def say_import(robot: Robot) -> None:
     for line in robot.toml.splitlines():
         if not line.startswith("# "):
             break
-        OUT.print(line.removeprefix("# "), markup=False, highlight=False, soft_wrap=True)
+        say(line.removeprefix("# "))
 
 
 def with_given(robot: Robot, given: Sequence[Effect]) -> Robot:
@@ -75,8 +75,7 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
     replaced = {effect.label for effect in given}
     acting = [e.label for e in robot.effects if e.acts and e.label not in replaced]
     if acting:
-        text = f"with the effects of {source}: {', '.join(acting)}"
-        OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+        say(f"with the effects of {source}: {', '.join(acting)}")
 
 
 def parse_effects(texts: Sequence[str] | None) -> list[Effect]:

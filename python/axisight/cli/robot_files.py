@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, check_new, errors
+from axisight.cli.common import check_new, errors, say
 from axisight.cli.robot import say_import
 from axisight.errors import InputError
 from axisight.robot_import import import_robot
@@ -59,7 +59,8 @@ def import_command(
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
     with errors():
-        check_new(out, overwrite=overwrite)
+        given = [model, *(x for x in (drives,) if x)]
+        check_new(out, overwrite=overwrite, inputs=given)
         data = drive_data(model, drives)
         if payload is not None:
             data = data.model_copy(update={"payload": _payload(payload)})
@@ -68,8 +69,7 @@ def import_command(
             typer.echo(robot.toml, nl=False)
             return
         write_whole(out, robot.toml)
-        said = f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}"
-        OUT.print(said, markup=False, highlight=False, soft_wrap=True)
+        say(f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}")
         say_import(robot)
 
 

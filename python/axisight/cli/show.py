@@ -6,7 +6,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from axisight.cli.common import OUT
+from axisight.cli.common import OUT, say
 from axisight.gap import Diagnosis, Gap, Interval, Where
 from axisight.gap.headline import in_order
 from axisight.report.limits import limit_table
@@ -17,16 +17,16 @@ _REFITTED = 10
 
 def show_diagnosis(found: Diagnosis) -> None:
     """Print verdict, causes with values, the gap, what remains, and what to do next."""
-    OUT.print(f"[bold]{found.verdict}[/]: ", end="")
-    _say(found.headline)
+    OUT.print(f"[bold]{escape(found.verdict)}[/]: ", end="")
+    say(found.headline)
     if found.causes:
         OUT.print(_causes(found))
     OUT.print(_gaps(found))
     _show_places(found)
     for finding in found.findings:
-        _say(f"finding: {finding}")
+        say(f"finding: {finding}")
     if found.next_experiment is not None:
-        _say(f"next experiment: {found.next_experiment}")
+        say(f"next experiment: {found.next_experiment}")
     if found.refit:
         OUT.print(_refitted(found.refit))
     if found.ranking:
@@ -36,20 +36,16 @@ def show_diagnosis(found: Diagnosis) -> None:
         OUT.print(_limits(found))
 
 
-def _say(text: str) -> None:
-    OUT.print(text, markup=False, highlight=False, soft_wrap=True)
-
-
 def _show_places(found: Diagnosis) -> None:
     for place in found.where:
-        _say(f"where: {_place(place)}")
+        say(f"where: {_place(place)}")
     left = found.remainder
     if left is None or not left.where:
         return
     varies = "" if left.varies_with is None else f"; it varies with {left.varies_with}"
-    _say(f"remains above noise: {_percent(left.gap)} of the torque{varies}")
+    say(f"remains above noise: {_percent(left.gap)} of the torque{varies}")
     for place in left.where:
-        _say(f"remains: {_place(place)}")
+        say(f"remains: {_place(place)}")
 
 
 def _place(where: Where) -> str:

@@ -11,14 +11,15 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli.common import OUT, Columns, From, To, errors, numbers
+from axisight.cli.common import Columns, From, To, errors, numbers, say
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.gap.inputs import part_of
 from axisight.logs import Log, read_log
+from axisight.logs.sources import files_of
 from axisight.robot import Robot
 from axisight.simulation import Method, Model, simulate
-from axisight.storage import write_bytes
+from axisight.storage import check_targets, write_bytes
 
 # A share of the sample time by which a log may miss that of the robot.
 _SAME_RATE = 1e-4
@@ -65,6 +66,8 @@ def simulate_command(
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
+        given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
+        check_targets({"--out": out}, inputs=given)
         machine = load_simulator(robot, parse_effects(effect))
         used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
         inputs = _inputs(used, machine, torque=torque)
@@ -82,7 +85,7 @@ def simulate_command(
             position_resolution_rad=resolution,
         )
         write_bytes(out, _log_table(result, inputs).to_parquet(index=False))
-        OUT.print(f"{result.attrs['status']}: {out}", soft_wrap=True)
+        say(f"{result.attrs['status']}: {out}")
         if result.attrs["status"] != "completed":
             raise typer.Exit(1)
 

@@ -32,7 +32,7 @@ def write_references(reference: References, path: Path | str) -> list[Path]:
     ``period`` (n_experiments, n_samples, n_inputs) and ``sample_time_s``. The design is JSON:
     beside a CSV in ``NAME.design.json``, in the variable ``design`` of a MAT file, in the
     metadata of a Parquet file. Numbers are written in full. Raises InputError for another
-    ending or a folder that cannot be written.
+    ending, OutputError for what cannot be written.
     """
     instance("reference", reference, References)
     target = _known(path)
@@ -41,11 +41,14 @@ def write_references(reference: References, path: Path | str) -> list[Path]:
     if target.suffix == ".csv":
         files[_beside(target)] = text.encode()
     for name, data in files.items():
-        try:
-            write_bytes(name, data)
-        except OSError as error:
-            raise InputError(f"{name}: cannot be written: {error}") from None
+        write_bytes(name, data)
     return list(files)
+
+
+def reference_files(path: Path | str) -> list[Path]:
+    """Return the files that `write_references` writes; raises InputError for another ending."""
+    target = _known(path)
+    return [target, _beside(target)] if target.suffix == ".csv" else [target]
 
 
 def _bytes(reference: References, text: str, kind: str) -> bytes:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, replace
+from functools import partial
 from importlib.metadata import version
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from axisight.errors import AxisightError
 from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
 from axisight.gap import Settings, diagnose
 from axisight.storage import write_whole
+from axisight.workers import each_done
 
 Progress = Callable[[str, int, int], None]
 
@@ -109,14 +109,9 @@ def _here(
     cases: Sequence[FleetCase], settings: Settings, workers: int
 ) -> Iterator[tuple[FleetCase, str]]:
     """Yield every case with its verdict as it is done, by processes of this machine."""
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        try:
-            jobs = {pool.submit(_of_path, case, settings): case for case in cases}
-            for job in as_completed(jobs):
-                yield jobs[job], job.result()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    work = partial(_of_path, settings=settings)
+    for place, verdict in each_done(work, cases, workers):
+        yield cases[place], verdict
 
 
 def _of_path(case: FleetCase, settings: Settings) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
-from axisight.logs.sources import is_folder_log
+from axisight.logs.sources import files_of, is_folder_log
+from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
 
@@ -36,7 +37,8 @@ class Inputs:
     def files(self) -> list[Path]:
         """Return the files that simulator and logs were read from."""
         logs = (*self.estimation, *self.validation, *self.simulated)
-        return [Path(self.robot_source), *(log.source for log in logs)]
+        parts = [part for log in logs for part in files_of(log.source)]
+        return [Path(self.robot_source), *parts]
 
 
 def read_inputs(
@@ -47,14 +49,20 @@ def read_inputs(
     load: Callable[..., Robot] = load_robot,
     part: tuple[float, float | None] = (0.0, None),
     simulated: Sequence[Path] = (),
+    *,
+    untrusted: bool = False,
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
-    ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator.
-    Raises InputError when nothing is left to hold out, the model is missing, or the part cannot be used.
+    ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator;
+    ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`. Raises InputError when nothing is
+    left to hold out, the model is missing, or the part cannot be used.
     """
-    read = _read(paths, model, validation, columns, load)
+    for path in (*paths, *validation, *simulated) if untrusted else ():
+        if not path.is_dir() or is_folder_log(path):
+            check_log_inside(path)
+    read = _read(paths, model, validation, columns, load, untrusted=untrusted)
     own = tuple(read_log(p, columns, robot=read.robot) for p in simulated)
     read = replace(read, simulated=own)
     if part == (0.0, None):
@@ -119,13 +127,15 @@ def _read(
     validation: Sequence[Path],
     columns: Path | None,
     load: Callable[..., Robot],
+    *,
+    untrusted: bool,
 ) -> Inputs:
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
-        case = read_case(paths[0], columns)
+        case = read_case(paths[0], columns, untrusted=untrusted)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
         extra = tuple(read_log(p, columns, robot=robot) for p in validation)

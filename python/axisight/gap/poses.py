@@ -30,7 +30,8 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
     finding; so are those of a robot without a controller, which is not simulated along them. Positions
     are those of motors at rest.
     """
-    if robot.controller_kind == "none":
+    if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
+        # Logs of another robot are refused, by name, where all faults are looked for.
         return list(logs)
     begins = np.array([log.position_rad[0] for log in logs])
     apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio)

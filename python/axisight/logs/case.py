@@ -17,6 +17,7 @@ from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.reading import read_log
 from axisight.logs.sources import is_folder_log
 from axisight.logs.sources_bag import is_bag
+from axisight.logs.untrusted import check_folder, check_log_inside, check_name
 from axisight.logs.validate import check_same_rate
 from axisight.robot import Robot, load_robot
 
@@ -66,7 +67,12 @@ class Case:
         return tuple(log for log, own in zip(self.logs, self.roles, strict=True) if own == role)
 
 
-def read_case(folder: Path | str, columns: AnyMap | Path | str | None = None) -> Case:
+def read_case(
+    folder: Path | str,
+    columns: AnyMap | Path | str | None = None,
+    *,
+    untrusted: bool = False,
+) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
     `columns` is what `read_log` takes. Raises CaseError naming file and field: case.toml missing or
@@ -74,10 +80,17 @@ def read_case(folder: Path | str, columns: AnyMap | Path | str | None = None) ->
     different numbers of axes,
     a period that is not a whole number of samples or is longer than the log. Raises LogError for a
     log that cannot be read or has another sample rate.
+
+    ``untrusted``: a case of somebody else. Nothing outside the folder is opened: names that are absolute
+    or have ``..``, links that lead out, and HDF5 files that name others are refused.
     """
     folder = Path(folder)
     path = folder / "case.toml"
+    if untrusted:
+        check_folder(folder)
     content = _parse(path)
+    if untrusted:
+        _check_names(path, content)
     robot_path = folder / content.robot
     if not robot_path.is_file():
         raise CaseError(f"{path}: robot: expected an existing file, got {content.robot!r}")
@@ -113,6 +126,14 @@ def read_case(folder: Path | str, columns: AnyMap | Path | str | None = None) ->
     check_same_rate(logs)
     roles = tuple(entry.role for entry in content.log)
     return Case(content.name, folder, robot_path, logs, roles)
+
+
+def _check_names(path: Path, content: _CaseFile) -> None:
+    """Raise CaseError or LogError for what leads out of the folder of a case; see `untrusted`."""
+    check_name(content.robot, f"{path}: robot")
+    for number, entry in enumerate(content.log):
+        check_name(entry.file, f"{path}: log.{number}.file")
+        check_log_inside(path.parent / entry.file)
 
 
 def _parse(path: Path) -> _CaseFile:

@@ -61,7 +61,8 @@ def run(
 
     """
     study = study if isinstance(study, Study) else read_study(study)
-    study = _with(study, runs=runs, seed=seed)
+    given = {"runs": runs, "seed": seed}
+    study = study.changed(**{name: value for name, value in given.items() if value is not None})
     if backend not in ("local", "dask"):
         raise InputError(f"backend: expected local or dask, got {backend!r}")
     if scheduler is not None and backend == "local":
@@ -104,11 +105,6 @@ def run(
 
 def _n_failed(arrays: Arrays) -> int:
     return len(np.unique(arrays["failures"][:, 0]))
-
-
-def _with(study: Study, **changes: Any) -> Study:
-    given = {name: value for name, value in changes.items() if value is not None}
-    return Study(**{**study.model_dump(by_alias=True), **given}) if given else study
 
 
 def _tasks(study: Study) -> list[Task]:

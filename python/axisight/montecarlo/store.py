@@ -78,11 +78,21 @@ class Store:
             new.rename(self.root)
 
     def provenance(self) -> dict[str, Any]:
-        """Return what the store was made with."""
+        """Return what the store was made with; raises StoreError, which says what to do, for one that is damaged."""
+        if not self.root.is_dir():
+            raise StoreError(f"{self.root}: expected a store of a study, got nothing")
         try:
             return dict(zarr.open_group(store=str(self.root), mode="r").attrs)
-        except (OSError, ValueError, KeyError) as error:
-            raise StoreError(f"{self.root}: expected a store of a study: {error}") from error
+        # Damage shows as anything that a reader of JSON or of groups can raise.
+        except Exception as error:
+            raise self.damaged(str(error)) from None
+
+    def damaged(self, reason: str) -> StoreError:
+        """Return the error for metadata without which nobody knows what the blocks are of."""
+        return StoreError(
+            f"{self.root / 'zarr.json'}: expected what the study was begun with, got a damaged file ({reason}): "
+            "put back a copy of it, or begin the study anew in another folder"
+        )
 
     def path(self, first: int, count: int) -> Path:
         """Return where a block is kept."""
@@ -139,8 +149,11 @@ def check_same(store: Store, design: str, seed: int) -> None:
     stored = store.provenance()
     if stored.get("format") != FORMAT:
         raise StudyError(f"{store.root}: format: expected {FORMAT}, got {stored.get('format')!r}")
-    found = differences(json.loads(stored["design"]), json.loads(design))
-    found += differences(stored["seed"], seed, "seed")
+    try:
+        was, seeded = json.loads(stored["design"]), stored["seed"]
+    except (KeyError, TypeError, ValueError) as error:
+        raise store.damaged(f"{type(error).__name__}: {error}") from None
+    found = differences(was, json.loads(design)) + differences(seeded, seed, "seed")
     if found:
         raise StudyError(f"{store.folder}: cannot resume: {'; '.join(found)}")
 

@@ -15,8 +15,10 @@ from axisight.simulation import Method
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Count = Annotated[int, Field(ge=0)]
-AtLeastOne = Annotated[int, Field(ge=1)]
+# What numbers of the core can hold; how long all of it may be is said by the core.
+Count = Annotated[int, Field(ge=0, le=10**9)]
+AtLeastOne = Annotated[int, Field(ge=1, le=10**9)]
+Runs = Annotated[int, Field(ge=1, le=10**8)]
 Seed = Annotated[int, Field(ge=0, lt=2**64)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
@@ -140,7 +142,7 @@ class Study(_Model):
     robot : file in the format ``axisight.robot/1`` or ``/2``, or preset.
     robot_parameters : values that replace those of the robot, e.g. ``{"axis1.damping": 2e3}``.
     seed : rules phases, noise and spread, together with the number of the run.
-    runs : number of realizations.
+    runs : number of realizations, at most 10^8.
     block_runs : runs accumulated together; part of the design, because the order of
         additions follows from it. A resumed study loses at most what was in progress.
     effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``; an effect takes the place of
@@ -156,7 +158,7 @@ class Study(_Model):
     name: str = "study"
     robot: str
     seed: Seed = 0
-    runs: AtLeastOne = 250
+    runs: Runs = 250
     block_runs: AtLeastOne = 32
     robot_parameters: dict[str, float] = {}
     plant: Plant = Plant()
@@ -165,6 +167,10 @@ class Study(_Model):
     statistics: Statistics = Statistics()
     effect: list[EffectEntry] = []
     spread: list[Spread] = []
+
+    def changed(self, **changes: Any) -> Study:
+        """Return the study with other fields; raises StudyError naming one that cannot be."""
+        return Study(**{**self.model_dump(by_alias=True), **changes}) if changes else self
 
     def to_toml(self) -> str:
         """Return the study as TOML; :func:`read_study` gives the same study back."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from axisight import storage
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.mujoco.torques import is_torque
 from axisight.robot import Robot
-from axisight.robot_file import Provenance, identified, write_identified
+from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
 from axisight.robot_import.xml_tree import Element, parse_xml
-from axisight.storage import write_whole
 from axisight.write_back.actuators import GAIN_EFFECTS, write_gain
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
@@ -78,9 +78,9 @@ def check_target(source: Path | str, target: Path | str, *, overwrite: bool = Fa
     ``overwrite``: files that exist are no obstacle.
     """
     path, kind = Path(target), Path(target).suffix.lower()
-    if path.exists() and not overwrite:
-        raise InputError(f"{path} exists: choose another name")
+    storage.check_target(path, overwrite=overwrite)
     if kind == ".toml":
+        storage.check_target(sidecar_path(path), overwrite=overwrite)
         return
     if kind not in _KINDS or Path(source).suffix.lower() != kind:
         raise InputError(
@@ -110,7 +110,7 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
     try:
-        write_whole(path, edits.result().decode("utf-8"))
+        storage.write_whole(path, edits.result().decode("utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{source}: expected a text in UTF-8 to write back to") from None
     out = [cause for cause in causes if cause.label not in there]

@@ -70,11 +70,15 @@ class Experiment:
 
         Raises InputError where they cannot be written.
         """
-        target = Path(folder)
-        files = write_references(self.references, target / "references.parquet")
-        text = target / "experiment.txt"
+        samples, text = experiment_files(folder)
+        write_references(self.references, samples)
         write_whole(text, f"{self}\n")
-        return [*files, text]
+        return [samples, text]
+
+
+def experiment_files(folder: Path | str) -> tuple[Path, Path]:
+    """Return what `Experiment.write` writes into a folder: the references, and what they are for."""
+    return Path(folder) / "references.parquet", Path(folder) / "experiment.txt"
 
 
 def _placed(label: str) -> str:

@@ -1,0 +1,84 @@
+"""Cases and logs of somebody else: nothing outside their folder is opened, or they are refused."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+import h5py
+
+from axisight.errors import CaseError, LogError
+from axisight.logs.sources import files_of, is_folder_log
+
+
+def check_folder(folder: Path) -> None:
+    """Raise CaseError for a link below a folder that leads out of it, and for what is neither file nor folder."""
+    top = folder.resolve()
+    for path in _below(folder):
+        target = path.resolve()
+        if not target.is_relative_to(top):
+            raise CaseError(
+                f"{path}: expected nothing outside the case folder, got a link to {target}"
+            )
+        try:
+            kind = target.stat().st_mode
+        except FileNotFoundError:
+            # A link to nothing opens nothing.
+            continue
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+            raise CaseError(f"{path}: expected files and folders only, got a device or a pipe")
+
+
+def check_name(name: str, said: str) -> None:
+    """Raise CaseError, beginning with ``said``, for a name in a case that may lead out of its folder."""
+    # By the rules of both systems: a case is to mean the same on each.
+    for path in (PurePosixPath(name), PureWindowsPath(name)):
+        if path.anchor or ".." in path.parts:
+            raise CaseError(f"{said}: expected a path inside the case folder, got {name!r}")
+
+
+def check_log_inside(path: Path) -> None:
+    """Raise LogError for a log that has others opened beside it.
+
+    What a folder of a recording holds stays in it, and an HDF5 file (MATLAB v7.3 too) names no other.
+    """
+    files = files_of(path) if path.exists() or is_folder_log(path) else []
+    top = path.parent.resolve()
+    for file in files:
+        if file != path and not file.resolve().is_relative_to(top):
+            raise LogError(
+                f"{file}: expected nothing outside {top}, got a link to {file.resolve()}"
+            )
+        if file.is_file() and h5py.is_hdf5(file):
+            _check_hdf5(file)
+
+
+def _check_hdf5(path: Path) -> None:
+    """Raise LogError for a file with data in others; none of those is opened."""
+
+    def elsewhere(name: str, link: object) -> str | None:
+        if isinstance(link, h5py.ExternalLink):
+            return f"{name}: expected data in this file, got a link to {link.filename}"
+        item = file[name] if isinstance(link, h5py.HardLink) else None
+        if not isinstance(item, h5py.Dataset):
+            return None
+        others = [entry[0] for entry in item.external or ()]
+        if item.is_virtual:
+            others += [s.file_name for s in item.virtual_sources() if s.file_name != "."]
+        return f"{name}: expected data in this file, got data of {others[0]}" if others else None
+
+    try:
+        with h5py.File(path, "r") as file:
+            # Not to be left by an error: its caller is no Python.
+            found = file.visititems_links(elsewhere)
+    except (OSError, RuntimeError, KeyError) as error:
+        raise LogError(f"{path}: cannot be read as HDF5: {error}") from None
+    if found is not None:
+        raise LogError(f"{path}: {found}")
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    for place, inner, files in os.walk(folder):
+        yield from (Path(place, name) for name in (*inner, *files))
