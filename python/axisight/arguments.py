@@ -20,12 +20,22 @@ T = TypeVar("T")
 _MOST_THREADS = 1024
 
 
+def short(text: str, most: int = 80) -> str:
+    """Return a text for a message, cut where it is longer than ``most`` characters."""
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
 def shown(value: object) -> str:
     """Return a value for a message, cut where it is long."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of {value.dtype} with shape {value.shape}"
-    text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+    if isinstance(value, str):  # cut first: the text may be that of a whole file
+        return short(repr(value[:100]))
+    try:
+        text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits, or nested without end
+        text = f"a {type(value).__name__} too large to be shown"
+    return short(text)
 
 
 def _array(value: object, kinds: str) -> NDArray[Any] | None:

@@ -46,15 +46,20 @@ class LogReport:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_log(path: Path | str, columns: AnyMap | Path | str | None = None) -> LogReport:
+def check_log(
+    path: Path | str,
+    columns: AnyMap | Path | str | None = None,
+    *,
+    max_bytes: int | None = None,
+) -> LogReport:
     """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
 
-    Takes the files and column maps that `read_log` takes. A file or map that cannot be used at all
+    Takes the files, column maps and `max_bytes` that `read_log` takes. A file or map that cannot be used at all
     gives a report with that one error.
     """
     path = Path(path)
     try:
-        found = gather(path, columns)
+        found = gather(path, columns, max_bytes=max_bytes)
     except LogError as error:
         return LogReport(path, (Finding("error", "file", str(error)),))
     grid = grid_of(found)
