@@ -38,13 +38,14 @@ class Budget:
 
     def take(self, declared_bytes: int) -> None:
         """Count bytes about to be read; raises LogError where all of them are more than the limit."""
-        self._taken += declared_bytes
-        if self._taken > self.limit:
+        taken = self._taken + declared_bytes
+        if taken > self.limit:
             raise LogError(
                 f"expected at most {_megabytes(self.limit)} MB to be read of a log of this size, got a "
-                f"file that declares {_megabytes(self._taken)} MB so far; read_log(..., max_bytes=...) "
+                f"file that declares {_megabytes(taken)} MB so far; read_log(..., max_bytes=...) "
                 f"raises the limit"
             )
+        self._taken = taken
 
     def take_values(self, shape: Iterable[int], item_bytes: int) -> None:
         """Count an array of a shape, as the numbers of 8 bytes that become of it."""

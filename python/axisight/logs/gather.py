@@ -21,8 +21,8 @@ from axisight.logs.log import Floats
 from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.mean_rate import mean_rate_hz
 from axisight.logs.native import native_map
-from axisight.logs.patterns import ColumnPattern
 from axisight.logs.paths import usable_path
+from axisight.logs.patterns import ColumnPattern
 from axisight.logs.sources import Arrays, load_arrays
 from axisight.logs.sources_bag import is_bag
 from axisight.logs.sources_lerobot import is_lerobot
@@ -144,7 +144,9 @@ class _Files:
 
     def doubts(self) -> tuple[str, ...]:
         """Return what is doubtful about any of the files, with its name where it is not the log."""
-        siblings = [f"{short(name)}: {d}" for name, file in self._opened.items() for d in file.doubts]
+        siblings = [
+            f"{short(name)}: {d}" for name, file in self._opened.items() for d in file.doubts
+        ]
         return (*self.main.doubts, *siblings)
 
 
@@ -237,7 +239,7 @@ def _scalar(arrays: Mapping[str, NDArray[Any]], value: float | str) -> float:
     """Return the number itself, or the scalar of that name in the file."""
     if not isinstance(value, str):
         return value
-    found = arrays[value] if value in arrays else None
+    found = arrays.get(value)
     if found is None:
         raise LogError(f"expected a scalar named {shown(value)} in the file, got none")
     if found.size != 1 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():

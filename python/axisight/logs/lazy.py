@@ -33,6 +33,7 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
         return cls({name: given(values) for name, values in arrays.items()})
 
     def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return an array, reading it when it is asked for first."""
         if name not in self._read:
             read = self._readers[name]
             try:
@@ -55,12 +56,15 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
         return found, others
 
     def __contains__(self, name: object) -> bool:
+        """Say whether the file has a name, without reading it."""
         return name in self._readers
 
     def __iter__(self) -> Iterator[str]:
+        """Return the names in the order of the file."""
         return iter(self._readers)
 
     def __len__(self) -> int:
+        """Return the number of arrays."""
         return len(self._readers)
 
 

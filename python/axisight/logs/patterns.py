@@ -132,9 +132,7 @@ class ColumnPattern(_Strict):
         joint = robot.axis_names[0] if robot is not None else "JOINT"
         return " or ".join(_filled(s.name, 0, [joint]) for s in getattr(self.every_axis, field))
 
-    def _joints(
-        self, names: Sequence[str], robot: Robot | None, where: Path
-    ) -> list[str] | None:
+    def _joints(self, names: Sequence[str], robot: Robot | None, where: Path) -> list[str] | None:
         """Return one name per axis, those of joints where they are known; None without a position.
 
         Raises LogError where axes have numbers beyond those that follow each other.

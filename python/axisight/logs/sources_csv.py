@@ -18,9 +18,7 @@ from axisight.logs.lazy import LazyArrays, Reader, given, refusing
 # Wider tables are matrices of something else.
 _MOST_COLUMNS = 10_000
 _BLOCK = 2**20
-UNENDED = (
-    "expected a line end behind the last row, as behind the others, got none: its last value may be cut"
-)
+UNENDED = "expected a line end behind the last row, as behind the others, got none: its last value may be cut"
 
 
 def load_csv(path: Path, budget: Budget, options: CsvOptions) -> LazyArrays:

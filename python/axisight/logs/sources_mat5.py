@@ -25,7 +25,10 @@ from axisight.logs.budget import Budget
 from axisight.logs.lazy import Reader, given, refusing
 
 _HEADER = 128
-_INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
+_MATRIX, _COMPRESSED = 14, 15
+_INT8, _INT32, _UINT32 = (1,), (5,), (6,)
+# Some writers put these where MATLAB has the types above.
+_NAME, _DIMENSIONS = (1, 16), (5, 6)
 _NUMBERS = {
     **{1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4"},
     **{7: "f4", 9: "f8", 12: "i8", 13: "u8"},
@@ -83,7 +86,9 @@ def load_mat5(path: Path, budget: Budget) -> dict[str, Reader]:
     names: set[str] = set()
     for part in _parts(data, _HEADER, len(data), order):
         if part.kind not in (_MATRIX, _COMPRESSED):
-            raise LogError(f"byte {part.start}: expected a variable, got an element of type {part.kind}")
+            raise LogError(
+                f"byte {part.start}: expected a variable, got an element of type {part.kind}"
+            )
         head = _head(data, part, order)
         if not head.name:  # what MATLAB keeps for itself
             continue
@@ -148,10 +153,11 @@ def _parts(data: bytes, at: int, end: int, order: str) -> Iterator[_Part]:
         at = part.next
 
 
-def _expect(data: bytes, at: int, end: int, order: str, kind: int, what: str) -> _Part:
+def _expect(data: bytes, at: int, end: int, order: str, kinds: tuple[int, ...], what: str) -> _Part:
     part = _part(data, at, end, order)
-    if part.kind != kind:
-        raise LogError(f"byte {at}: {what}: expected an element of type {kind}, got {part.kind}")
+    if part.kind not in kinds:
+        said = " or ".join(map(str, kinds))
+        raise LogError(f"byte {at}: {what}: expected an element of type {said}, got {part.kind}")
     return part
 
 
@@ -171,7 +177,7 @@ def _whole(data: bytes, part: _Part, order: str, budget: Budget) -> _Matrix:
         return _matrix(data, part.start, part.stop, order)
     size = _declared(_inflate(data, part, 8), order)
     budget.take(size)
-    inflated = _inflate(data, part, size + 8)
+    inflated = _inflate(data, part, size + 9)  # one more, for the checksum behind the last
     if len(inflated) != size + 8:
         raise LogError(
             f"byte {part.start}: expected {size} bytes compressed here, got {len(inflated) - 8}"
@@ -180,8 +186,17 @@ def _whole(data: bytes, part: _Part, order: str, budget: Budget) -> _Matrix:
 
 
 def _inflate(data: bytes, part: _Part, most: int) -> bytes:
+    """Return the first ``most`` bytes of a compressed element; less is all of it, whose checksum holds."""
+    stream = zlib.decompressobj()
     try:
-        return zlib.decompressobj().decompress(data[part.start : part.stop], most)
+        found = stream.decompress(data[part.start : part.stop], most)
+        if len(found) < most and not stream.eof:
+            raise LogError(f"byte {part.start}: expected compressed bytes, got the first of them")
+        if stream.unused_data:
+            raise LogError(
+                f"byte {part.start}: expected the end of compressed bytes, got more of them"
+            )
+        return found
     except zlib.error as error:
         raise LogError(f"byte {part.start}: expected compressed bytes, got {error}") from None
 
@@ -206,17 +221,17 @@ def _matrix(data: bytes, at: int, end: int, order: str) -> _Matrix:
     if kind not in (_CELL, _STRUCT, _OBJECT, _CHAR, *_NUMERIC, *_OTHERS):
         raise LogError(f"byte {flags.start}: expected a class of arrays, got {kind}")
     if kind == _OPAQUE:  # has a name and no dimensions
-        name = _expect(data, flags.next, end, order, _INT8, "name")
+        name = _expect(data, flags.next, end, order, _NAME, "name")
         text = data[name.start : name.stop].decode("latin-1")
         return _Matrix(data, order, kind, word, (), text, name.next, end)
-    sizes = _expect(data, flags.next, end, order, _INT32, "dimensions")
+    sizes = _expect(data, flags.next, end, order, _DIMENSIONS, "dimensions")
     n, rest = divmod(sizes.stop - sizes.start, 4)
     if rest or not 2 <= n <= _MOST_DIMENSIONS:
         raise LogError(f"byte {sizes.start}: expected 2 to {_MOST_DIMENSIONS} dimensions, got {n}")
     dims = unpack_from(f"{order}{n}i", data, sizes.start)
     if min(dims) < 0:
         raise LogError(f"byte {sizes.start}: expected dimensions from 0 on, got {min(dims)}")
-    name = _expect(data, sizes.next, end, order, _INT8, "name")
+    name = _expect(data, sizes.next, end, order, _NAME, "name")
     text = data[name.start : name.stop].decode("latin-1")
     return _Matrix(data, order, kind, word, dims, text, name.next, end)
 
@@ -228,11 +243,9 @@ def _children(matrix: _Matrix, at: int, count: int, budget: Budget) -> list[_Mat
     budget.take(count * _MATRIX_COST)
     found: list[_Matrix | None] = []
     for _ in range(count):
-        part = _expect(matrix.data, at, matrix.stop, matrix.order, _MATRIX, "cell or field")
+        part = _expect(matrix.data, at, matrix.stop, matrix.order, (_MATRIX,), "cell or field")
         empty = part.start == part.stop
-        found.append(
-            None if empty else _matrix(matrix.data, part.start, part.stop, matrix.order)
-        )
+        found.append(None if empty else _matrix(matrix.data, part.start, part.stop, matrix.order))
         at = part.next
     _end(matrix, at)
     return found
@@ -240,7 +253,9 @@ def _children(matrix: _Matrix, at: int, count: int, budget: Budget) -> list[_Mat
 
 def _end(matrix: _Matrix, at: int) -> None:
     if at != matrix.stop:
-        raise LogError(f"byte {at}: expected the end of a variable, got {matrix.stop - at} bytes more")
+        raise LogError(
+            f"byte {at}: expected the end of a variable, got {matrix.stop - at} bytes more"
+        )
 
 
 def _fields(matrix: _Matrix) -> tuple[list[str], int]:
@@ -255,7 +270,9 @@ def _fields(matrix: _Matrix) -> tuple[list[str], int]:
     names = _expect(matrix.data, length.next, matrix.stop, matrix.order, _INT8, "names of fields")
     text = matrix.data[names.start : names.stop]
     if size <= 0 or len(text) % size:
-        raise LogError(f"byte {names.start}: expected names of {size} bytes, got {len(text)} in all")
+        raise LogError(
+            f"byte {names.start}: expected names of {size} bytes, got {len(text)} in all"
+        )
     each = [text[k : k + size].split(b"\0")[0] for k in range(0, len(text), size)]
     found = [name.decode("latin-1") for name in each]
     if len(set(found)) != len(found) or "" in found:
@@ -271,8 +288,9 @@ def _leaves(
         raise LogError(f"{short(label)}: expected at most {_DEEPEST} structs inside each other")
     if matrix.kind in (_STRUCT, _OBJECT):
         names, at = _fields(matrix)
-        if not matrix.count:
+        if not matrix.count or not names:
             yield label, given(np.empty(0))
+            return
         inside = _children(matrix, at, matrix.count * len(names), budget)
         for number, element in _numbered(matrix):
             own = label if matrix.count == 1 else f"{label}.{number}"
@@ -316,7 +334,8 @@ def _values(matrix: _Matrix, budget: Budget, depth: int) -> NDArray[Any]:
     if matrix.kind == _CELL:
         cells = np.empty(matrix.count, dtype=object)
         for k, child in enumerate(_children(matrix, matrix.body, matrix.count, budget)):
-            cells[k] = np.empty(0) if child is None else _values(child, budget, depth + 1)
+            values = np.empty(0) if child is None else _values(child, budget, depth + 1)
+            cells[k] = values if values.ndim else values.item()
         return cells.reshape(matrix.dims, order="F").squeeze()
     if matrix.kind == _CHAR:
         return _text(matrix)

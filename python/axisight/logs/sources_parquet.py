@@ -125,7 +125,9 @@ class _Column:
             raise LogError(f"expected a list for every sample, got {column.null_count} without one")
         lengths = pa.compute.list_value_length(column).unique().to_pylist()
         if len(lengths) > 1:
-            raise LogError(f"expected lists that are all as long, got lengths {sorted(lengths)[:8]}")
+            raise LogError(
+                f"expected lists that are all as long, got lengths {sorted(lengths)[:8]}"
+            )
         if not len(column):
             return np.empty((0, 0))
         values = pa.concat_arrays([chunk.flatten() for chunk in column.chunks])
