@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from axisight.robot import Robot
 
 _FIELDS = tuple(AxisColumns.model_fields)
+# Arrays as long as the stamps that looking at these takes.
+_TIME_COST = 4
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
 
@@ -91,6 +93,8 @@ def gather(
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
+    if result.time_s is None:
+        _count_time(result, budget)
     if result.columns.side == "joint" and robot is not None:
         _to_motors(result, robot)
     if given is None:
@@ -99,6 +103,15 @@ def gather(
     result.findings += [Finding("warning", "file", doubt) for doubt in result.doubts]
     result.most_samples = budget.limit // (8 * (len(result.signals) + 1))
     return result
+
+
+def _count_time(result: Gathered, budget: Budget) -> None:
+    """Count the time that signals without stamps get."""
+    longest = max((values.nbytes for values in result.signals.values()), default=0)
+    try:
+        budget.take(2 * longest)
+    except LogError as error:
+        result.findings.append(Finding("error", "sample_rate_hz", str(error)))
 
 
 def _used_names(columns: ColumnMap) -> set[str]:
@@ -121,7 +134,7 @@ def _to_motors(result: Gathered, robot: Robot) -> None:
     """Turn signals of joints into those of their motors."""
     for (name, axis), values in result.signals.items():
         if name in _POWERS and axis < robot.n_axes:
-            result.signals[name, axis] = values * robot.gear_ratio[axis] ** _POWERS[name]
+            values *= robot.gear_ratio[axis] ** _POWERS[name]
 
 
 class _Files:
@@ -130,7 +143,7 @@ class _Files:
     def __init__(self, path: Path, columns: AnyMap | None, budget: Budget) -> None:
         self._folder = path.parent
         self._csv = columns.csv if columns is not None else None
-        self._budget = budget
+        self.budget = budget
         self._opened: dict[str, LazyArrays] = {}
         self.main = load_arrays(path, self._csv, budget)
 
@@ -139,7 +152,7 @@ class _Files:
             return self.main
         if address.file not in self._opened:
             path = self._folder / address.file
-            self._opened[address.file] = load_arrays(path, self._csv, self._budget)
+            self._opened[address.file] = load_arrays(path, self._csv, self.budget)
         return self._opened[address.file]
 
     def doubts(self) -> tuple[str, ...]:
@@ -154,7 +167,8 @@ def _take_time(files: _Files, result: Gathered) -> None:
     columns = result.columns
     try:
         if columns.time is not None:
-            values = _vector(files.of(columns.time), columns.time)
+            values = _vector(files.of(columns.time), columns.time, files.budget)
+            files.budget.take(_TIME_COST * values.nbytes)
             result.time_s = values * si_factor(columns.time.unit)
     except LogError as error:
         result.findings.append(
@@ -181,7 +195,7 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     result.labels[channel] = signal.label
     try:
         arrays = files.of(signal)
-        values = _vector(arrays, signal)
+        values = _vector(arrays, signal, files.budget)
         scale = 1.0 if signal.scale is None else _scalar(arrays, signal.scale)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
@@ -193,7 +207,7 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     result.signals[channel] = values
 
 
-def _vector(arrays: Mapping[str, NDArray[Any]], address: Address) -> Floats:
+def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> Floats:
     """Return the addressed values as 1-D float64; raise LogError saying expected and got."""
     if address.name not in arrays:
         listed = ", ".join(map(short, list(arrays)[:12])) or "nothing"
@@ -216,6 +230,7 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address) -> Floats:
             f"expected one value per sample, got shape {vector.shape}; pick a row or column with "
             'index, for example ":,0"'
         )
+    budget.take(8 * vector.size)
     return _numbers(vector)
 
 

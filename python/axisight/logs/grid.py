@@ -54,7 +54,7 @@ def make_grid(
     """
     grid = Grid(n_samples=n_samples)
     for name, rate in (("sample_rate_hz", rate_hz), ("resample_hz", resample_hz)):
-        if rate is not None and not 1.0 / STEPS_S[1] <= rate <= 1.0 / STEPS_S[0]:
+        if rate is not None and not STEPS_S[0] <= 1.0 / rate <= STEPS_S[1]:
             message = f"expected {1 / STEPS_S[1]:g} to {1 / STEPS_S[0]:g} Hz, got {rate:g} Hz"
             grid.error(name, message, "sample_time_differs")
             return grid

@@ -36,8 +36,8 @@ def read_log(
     `robot` is the one it is a log of:
     its axes are found by the names of its joints in recordings, and its gear ratios turn signals
     of joints into those of motors. `n_axes` is the number of driven axes the caller expects, those of the
-    robot unless given. Only columns that are mapped are read, and none where together they declare more than
-    `max_bytes` as numbers of 8 bytes; by default 64 MiB and eight times the size of the files.
+    robot unless given. Only columns that are mapped are read, and none that would take more than `max_bytes`
+    together, as they are read and as signals; by default 64 MiB and sixteen times the size of the files.
     The result is in SI units on a uniform grid that starts at 0.
 
     Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
