@@ -18,6 +18,9 @@ Lines = NDArray[np.int64]
 T = TypeVar("T")
 
 _MOST_THREADS = 1024
+# Bytes of a name, and of a whole path, that file systems take.
+_LONGEST_NAME = 255
+_LONGEST_PATH = 4000
 
 
 def short(text: str, most: int = 80) -> str:
@@ -152,9 +155,26 @@ def instance(field: str, value: object, *kinds: type[T]) -> T:
 
 def path_of(field: str, value: object) -> Path:
     """Return a path."""
-    if not isinstance(value, str | PathLike) or "\0" in str(value):
+    if not isinstance(value, str | PathLike):
         raise InputError(f"{field}: expected a path, got {shown(value)}")
-    return Path(value)
+    return usable_path(value, InputError, field)
+
+
+def usable_path(path: str | PathLike[str], kind: type[InputError], field: str = "") -> Path:
+    """Return a path; raises an error of ``kind`` for one that no file can have.
+
+    Asked about such names, the system raises instead of saying that there is no such file.
+    """
+    path, where = Path(path), f"{field}: " if field else ""
+    if "\0" in str(path):
+        raise kind(f"{where}expected the path of a file, got {shown(str(path))}")
+    if any(_bytes(part) > _LONGEST_NAME for part in path.parts) or _bytes(path) > _LONGEST_PATH:
+        raise kind(f"{where}expected a shorter path of a file, got {shown(str(path))}")
+    return path
+
+
+def _bytes(path: str | Path) -> int:
+    return len(str(path).encode("utf-8", "replace"))
 
 
 def several(field: str, value: object) -> list[Any]:

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import scipy.io
 
 from axisight.arguments import instance, path_of, short
+from axisight.documents import parse_json
 from axisight.errors import InputError, LogError
 from axisight.excitation.references import References
 from axisight.logs.sources import load_arrays
@@ -21,7 +22,7 @@ from axisight.storage import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
 _KEY = b"axisight.excitation"
-_DAMAGED = (pa.ArrowException, RecursionError)
+_DAMAGED = (pa.ArrowException,)
 _KINDS = (".csv", ".mat", ".parquet")
 
 
@@ -75,7 +76,7 @@ def read_references(path: Path | str) -> References:
     source = _known(path)
     try:
         text, period = _content(source)
-        design = json.loads(text)
+        design = parse_json(text)
         if design["schema"] != _SCHEMA:
             raise InputError(f"{source}: schema: expected {_SCHEMA}, got {design['schema']}")
         period = period.reshape(design["shape"])

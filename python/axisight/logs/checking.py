@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from axisight.arguments import short
 from axisight.errors import LogError
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel, Gathered, gather
@@ -72,7 +73,7 @@ def check_log(
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("warning", "map", note) for note in found.notes]
     why = "not a native column, not used" if found.pattern is None else "not used by the map"
-    findings += [Finding("ok", name, why) for name in found.unused]
+    findings += [Finding("ok", short(name, 200), why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
     sound = all(finding.severity != "error" for finding in findings)
     if sound and rate is not None and grid.stamps_s is None:

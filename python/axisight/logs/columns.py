@@ -50,7 +50,7 @@ class Address(_Strict):
     def label(self) -> str:
         """Return the address as it appears in messages."""
         index = "" if self.index is None else f"[{self.index}]"
-        return f"{self.file + ':' if self.file else ''}{self.name}{index}"
+        return short(f"{self.file + ':' if self.file else ''}{self.name}{index}", 200)
 
 
 class TimeColumn(Address):

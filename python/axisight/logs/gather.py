@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.arguments import short, shown
+from axisight.arguments import short, shown, usable_path
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
 from axisight.logs.columns import Address, AxisColumns, ColumnMap
@@ -21,7 +21,6 @@ from axisight.logs.log import Floats
 from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.mean_rate import mean_rate_hz
 from axisight.logs.native import native_map
-from axisight.logs.paths import usable_path
 from axisight.logs.patterns import ColumnPattern
 from axisight.logs.sources import Arrays, load_arrays
 from axisight.logs.sources_bag import is_bag
@@ -78,7 +77,7 @@ def gather(
     ``robot``: whose log it is; without one signals of joints stay as they are. ``max_bytes``: what all
     mapped columns may declare. Raises LogError when the file or the map itself cannot be used.
     """
-    path = usable_path(path)
+    path = usable_path(path, LogError)
     budget = Budget(max_bytes)
     given = load_column_map(columns) if isinstance(columns, Path | str) else columns
     files = _Files(path, given, budget)
@@ -132,9 +131,9 @@ _POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "position_ref": -
 
 def _to_motors(result: Gathered, robot: Robot) -> None:
     """Turn signals of joints into those of their motors."""
-    for (name, axis), values in result.signals.items():
+    for name, axis in result.signals:
         if name in _POWERS and axis < robot.n_axes:
-            values *= robot.gear_ratio[axis] ** _POWERS[name]
+            result.signals[name, axis] *= robot.gear_ratio[axis] ** _POWERS[name]
 
 
 class _Files:
@@ -151,7 +150,7 @@ class _Files:
         if address.file is None:
             return self.main
         if address.file not in self._opened:
-            path = self._folder / address.file
+            path = self._folder / usable_path(address.file, LogError)
             self._opened[address.file] = load_arrays(path, self._csv, self.budget)
         return self._opened[address.file]
 
@@ -169,7 +168,8 @@ def _take_time(files: _Files, result: Gathered) -> None:
         if columns.time is not None:
             values = _vector(files.of(columns.time), columns.time, files.budget)
             files.budget.take(_TIME_COST * values.nbytes)
-            result.time_s = values * si_factor(columns.time.unit)
+            with np.errstate(over="ignore"):
+                result.time_s = values * si_factor(columns.time.unit)
     except LogError as error:
         result.findings.append(
             Finding("error", columns.time.label if columns.time else "", str(error))
@@ -202,8 +202,9 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
         return
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
     # In place: a log may take all the memory that it was allowed.
-    values *= factor
-    values += si_offset(signal.unit)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is found later
+        values *= factor
+        values += si_offset(signal.unit)
     result.signals[channel] = values
 
 
@@ -214,15 +215,15 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget
         raise LogError(f"expected a column named {shown(address.name)}, got {listed}")
     values: Any = arrays[address.name]
     if address.index is not None:
-        key = tuple(
-            slice(None) if part.strip() == ":" else int(part)
-            for part in str(address.index).split(",")
-        )
         try:
+            key = tuple(
+                slice(None) if part.strip() == ":" else int(part)
+                for part in str(address.index).split(",")
+            )
             values = values[key]
         except (IndexError, ValueError, OverflowError):
             raise LogError(
-                f"expected an index inside shape {values.shape}, got [{address.index}]"
+                f"expected an index inside shape {values.shape}, got [{short(str(address.index))}]"
             ) from None
     vector = np.squeeze(np.asarray(values))
     if vector.ndim != 1:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from axisight.errors import LogError
@@ -20,7 +22,7 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(time_s)
-    if time_s.size < 3 or not np.all(steps > 0) or not np.isfinite(1.0 / np.mean(steps)):
+    if time_s.size < 3 or not np.all(steps > 0) or not math.isfinite(1.0 / float(np.mean(steps))):
         return None
     usual = float(np.median(steps))
     mean = float(time_s[-1] - time_s[0]) / (time_s.size - 1)

@@ -8,12 +8,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from axisight.arguments import short
+from axisight.arguments import short, usable_path
 from axisight.errors import LogError, MissingExtraError
 from axisight.logs.budget import Budget
 from axisight.logs.columns import CsvOptions
 from axisight.logs.lazy import LazyArrays, Reader, unreadable
-from axisight.logs.paths import usable_path
 from axisight.logs.sources_bag import BAG_SUFFIXES, is_bag, load_bag
 from axisight.logs.sources_csv import load_csv
 from axisight.logs.sources_hdf5 import load_hdf5
@@ -54,7 +53,7 @@ def load_arrays(
     unknown suffix, an episode that is not there, a truncated or corrupt file, and one that is too large.
     """
     budget = Budget() if budget is None else budget
-    usable_path(path)
+    usable_path(path, LogError)
     folder = path.is_dir() and is_bag(path)
     suffix = ".db3" if folder else path.suffix.lower()
     if is_lerobot(path):
