@@ -39,10 +39,8 @@ FORMAT: Final = "axisight.montecarlo.store/1"
 # One file per array instead of a tree of folders.
 _FLAT: Final[dict[str, Any]] = {"name": "default", "configuration": {"separator": "."}}
 # All that a block is written in; whatever else a description names is nothing of ours.
-_TYPES: Final = frozenset(
-    ["bool", *(f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64))]
-    + ["float32", "float64", "complex64", "complex128"]
-)
+_INTEGERS = [f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64)]
+_TYPES: Final = frozenset(["bool", *_INTEGERS, "float32", "float64", "complex64", "complex128"])
 _CODECS: Final = ("bytes", "zstd")
 # What blocks may declare, at all and for each byte on disk.
 _MOST_BYTES: Final = 2**28
