@@ -22,7 +22,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     if rng.random() < 0.4:  # structure stands at the ends of most formats
         at = int(rng.choice([at % 512, len(data) - 1 - at % 512])) % len(data)
     long = int(rng.integers(1, 9))
-    kind = rng.integers(6)
+    kind = rng.integers(7)
     if kind == 0:
         spoiled[at] ^= 1 << int(rng.integers(8))
     elif kind == 1:
@@ -33,6 +33,8 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
         spoiled[at:at] = spoiled[at : at + 4 * long]
     elif kind == 4:
         del spoiled[at:]
+    elif kind == 5:  # where types stand as small numbers, another one
+        spoiled[at] = int(rng.integers(32))
     else:
         spoiled[at : at + long] = rng.choice([b"\0", b"\xff", b"\x7f"]) * long
     return bytes(spoiled)

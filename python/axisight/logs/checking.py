@@ -55,7 +55,7 @@ def check_log(
 ) -> LogReport:
     """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
 
-    Takes the files, column maps and `max_bytes` that `read_log` takes. A file or map that cannot be used at all
+    Takes the files, `columns` (a map) and `max_bytes` that `read_log` takes. A file or map that cannot be used at all
     gives a report with that one error.
     """
     path = Path(path)
