@@ -81,6 +81,6 @@ def _lines(path: Path) -> tuple[int, bool]:
     count, last = 0, b""
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
-            count += block.count(b"\n") + block.count(b"\r")
+            count += block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
             last = block[-1:]
     return count + 1, last in (b"\n", b"\r", b"") or count < 2
