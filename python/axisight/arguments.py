@@ -18,14 +18,27 @@ Lines = NDArray[np.int64]
 T = TypeVar("T")
 
 _MOST_THREADS = 1024
+# Bytes of a name, and of a whole path, that file systems take.
+_LONGEST_NAME = 255
+_LONGEST_PATH = 4000
+
+
+def short(text: str, most: int = 80) -> str:
+    """Return a text for a message, cut where it is longer than ``most`` characters."""
+    return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def shown(value: object) -> str:
     """Return a value for a message, cut where it is long."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of {value.dtype} with shape {value.shape}"
-    text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+    if isinstance(value, str):  # cut first: the text may be that of a whole file
+        return short(repr(value[:100]))
+    try:
+        text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits, or nested without end
+        text = f"a {type(value).__name__} too large to be shown"
+    return short(text)
 
 
 def _array(value: object, kinds: str) -> NDArray[Any] | None:
@@ -142,9 +155,26 @@ def instance(field: str, value: object, *kinds: type[T]) -> T:
 
 def path_of(field: str, value: object) -> Path:
     """Return a path."""
-    if not isinstance(value, str | PathLike) or "\0" in str(value):
+    if not isinstance(value, str | PathLike):
         raise InputError(f"{field}: expected a path, got {shown(value)}")
-    return Path(value)
+    return usable_path(value, InputError, field)
+
+
+def usable_path(path: str | PathLike[str], kind: type[InputError], field: str = "") -> Path:
+    """Return a path; raises an error of ``kind`` for one that no file can have.
+
+    Asked about such names, the system raises instead of saying that there is no such file.
+    """
+    path, where = Path(path), f"{field}: " if field else ""
+    if "\0" in str(path):
+        raise kind(f"{where}expected the path of a file, got {shown(str(path))}")
+    if any(_bytes(part) > _LONGEST_NAME for part in path.parts) or _bytes(path) > _LONGEST_PATH:
+        raise kind(f"{where}expected a shorter path of a file, got {shown(str(path))}")
+    return path
+
+
+def _bytes(path: str | Path) -> int:
+    return len(str(path).encode("utf-8", "replace"))
 
 
 def several(field: str, value: object) -> list[Any]:

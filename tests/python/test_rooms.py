@@ -14,6 +14,7 @@ LOOSE = {
     "__init__.pyi",
     "_core.pyi",
     "arguments.py",
+    "documents.py",
     "errors.py",
     "palette.py",
     "storage.py",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -10,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import instance, path_of, shown
+from axisight.documents import parse_toml
 from axisight.errors import InputError
 from axisight.excitation.crest import CrestSearch, optimize_crest_factor
 from axisight.excitation.limits import LimitReport, Limits, check_limits
@@ -134,8 +134,8 @@ def load_design(path: Path | str) -> dict[str, Any]:
     """Return the design in a TOML file, not yet checked; a robot file lies next to it."""
     source = path_of("path", path)
     try:
-        data = tomllib.loads(source.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        data = parse_toml(source.read_text("utf-8"))
+    except (OSError, ValueError) as error:
         raise InputError(f"{source}: expected a design in TOML: {error}") from None
     robot = data.get("robot")
     if isinstance(robot, str) and robot not in PRESETS:

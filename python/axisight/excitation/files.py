@@ -13,14 +13,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
 
-from axisight.arguments import instance, path_of
-from axisight.errors import InputError
+from axisight.arguments import instance, path_of, short
+from axisight.documents import parse_json
+from axisight.errors import InputError, LogError
 from axisight.excitation.references import References
+from axisight.logs.sources import load_arrays
 from axisight.storage import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
 _KEY = b"axisight.excitation"
-_DAMAGED = (pa.ArrowException, scipy.io.matlab.MatReadError)
+_DAMAGED = (pa.ArrowException,)
 _KINDS = (".csv", ".mat", ".parquet")
 
 
@@ -77,7 +79,7 @@ def read_references(path: Path | str) -> References:
     source = _known(path)
     try:
         text, period = _content(source)
-        design = json.loads(text)
+        design = parse_json(text)
         if design["schema"] != _SCHEMA:
             raise InputError(f"{source}: schema: expected {_SCHEMA}, got {design['schema']}")
         period = period.reshape(design["shape"])
@@ -89,10 +91,14 @@ def read_references(path: Path | str) -> References:
             unit=design["unit"],
             design=design["design"],
         )
+    except LogError as error:
+        raise InputError(f"{source}: expected references with their design: {error}") from None
     except InputError:
         raise
     except (*_DAMAGED, OSError, ValueError, KeyError, TypeError, NotImplementedError) as e:
-        raise InputError(f"{source}: expected references with their design: {e!r}") from None
+        raise InputError(
+            f"{source}: expected references with their design: {short(repr(e), 200)}"
+        ) from None
 
 
 def _design(reference: References) -> dict[str, Any]:
@@ -110,15 +116,15 @@ def _design(reference: References) -> dict[str, Any]:
 def _content(source: Path) -> tuple[str, np.ndarray[Any, np.dtype[np.float64]]]:
     """Return the design and the samples in the order (experiment, sample, input)."""
     if source.suffix == ".mat":
-        content = scipy.io.loadmat(source)
+        content = load_arrays(source)
         return str(content["design"].item()), np.asarray(content["period"], np.float64)
     if source.suffix == ".parquet":
-        arrow = pq.read_table(source)
-        text = (arrow.schema.metadata or {})[_KEY].decode()
-        table = arrow.to_pandas()
-    else:
-        text = _beside(source).read_text("utf-8")
-        table = pd.read_csv(source, float_precision="round_trip")
+        text = (pq.read_schema(source).metadata or {})[_KEY].decode()
+        arrays = load_arrays(source)
+        columns = [arrays[name] for name in list(arrays)[2:]]
+        return text, np.column_stack(columns).astype(np.float64)
+    text = _beside(source).read_text("utf-8")
+    table = pd.read_csv(source, float_precision="round_trip")
     return text, table.iloc[:, 2:].to_numpy(np.float64)
 
 

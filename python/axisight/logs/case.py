@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.arguments import shown, usable_path
+from axisight.documents import parse_toml
 from axisight.errors import CaseError
 from axisight.logs.columns import describe_validation
 from axisight.logs.log import Log
@@ -72,28 +74,28 @@ def read_case(
     columns: AnyMap | Path | str | None = None,
     *,
     untrusted: bool = False,
+    max_bytes: int | None = None,
 ) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
-    `columns` is what `read_log` takes. Raises CaseError naming file and field: case.toml missing or
-    invalid, unknown keys, no estimation log, robot file missing, one file listed twice, logs with
-    different numbers of axes,
-    a period that is not a whole number of samples or is longer than the log. Raises LogError for a
-    log that cannot be read or has another sample rate.
+    `columns` and `max_bytes`, which holds for each log, are what `read_log` takes. Raises CaseError naming
+    file and field: case.toml missing or invalid, unknown keys, no estimation log, robot file missing, one
+    file listed twice, logs with different numbers of axes, a period that is not a whole number of samples
+    or is longer than the log. Raises LogError for a log that cannot be read or has another sample rate.
 
     ``untrusted``: a case of somebody else. Nothing outside the folder is opened: names that are absolute
     or have ``..``, links that lead out, and HDF5 files that name others are refused.
     """
-    folder = Path(folder)
+    folder = usable_path(folder, CaseError)
     path = folder / "case.toml"
     if untrusted:
         check_folder(folder)
     content = _parse(path)
     if untrusted:
         _check_names(path, content)
-    robot_path = folder / content.robot
+    robot_path = folder / usable_path(content.robot, CaseError, f"{path}: robot")
     if not robot_path.is_file():
-        raise CaseError(f"{path}: robot: expected an existing file, got {content.robot!r}")
+        raise CaseError(f"{path}: robot: expected an existing file, got {shown(content.robot)}")
     if not any(entry.role == "estimation" for entry in content.log):
         raise CaseError(
             f"{path}: log: expected at least one with role 'estimation', got "
@@ -101,10 +103,11 @@ def read_case(
         )
     seen: set[Path] = set()
     for number, entry in enumerate(content.log):
+        usable_path(entry.file, CaseError, f"{path}: log.{number}.file")
         file = (folder / entry.file).resolve()
         if file in seen:
             raise CaseError(
-                f"{path}: log.{number}.file: expected a new file, got {entry.file!r} again"
+                f"{path}: log.{number}.file: expected a new file, got {shown(entry.file)} again"
             )
         seen.add(file)
     given = load_column_map(columns) if isinstance(columns, str | Path) else columns
@@ -115,7 +118,8 @@ def read_case(
     )
     robot = load_robot(robot_path) if joints or recorded else None
     logs = tuple(
-        _read_entry(path, number, entry, given, robot) for number, entry in enumerate(content.log)
+        _read_entry(path, number, entry, given, robot, max_bytes)
+        for number, entry in enumerate(content.log)
     )
     for number, log in enumerate(logs):
         if log.n_axes != logs[0].n_axes:
@@ -138,25 +142,32 @@ def _check_names(path: Path, content: _CaseFile) -> None:
 
 def _parse(path: Path) -> _CaseFile:
     try:
-        return _CaseFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return _CaseFile.model_validate(parse_toml(path.read_text(encoding="utf-8")))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(f"{path}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{path}: expected TOML, got: {error}") from error
     except ValidationError as error:
         raise CaseError(f"{path}: {describe_validation(error)}") from error
+    except ValueError as error:
+        raise CaseError(f"{path}: expected TOML, got: {error}") from error
 
 
 def _read_entry(
-    path: Path, number: int, entry: _LogEntry, columns: AnyMap | None, robot: Robot | None
+    path: Path,
+    number: int,
+    entry: _LogEntry,
+    columns: AnyMap | None,
+    robot: Robot | None,
+    max_bytes: int | None,
 ) -> Log:
     file = path.parent / entry.file
     if not file.is_file() and not is_folder_log(file):
-        raise CaseError(f"{path}: log.{number}.file: expected an existing file, got {entry.file!r}")
-    log = read_log(file, columns, robot=robot)
+        raise CaseError(
+            f"{path}: log.{number}.file: expected an existing file, got {shown(entry.file)}"
+        )
+    log = read_log(file, columns, robot=robot, max_bytes=max_bytes)
     if entry.period_s is not None:
         samples = entry.period_s / log.sample_time_s
-        if round(samples) < 1 or abs(samples - round(samples)) > 0.01:
+        if not np.isfinite(samples) or round(samples) < 1 or abs(samples - round(samples)) > 0.01:
             raise CaseError(
                 f"{path}: log.{number}.period_s: expected a whole number of samples, got "
                 f"{samples:.6g}"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from axisight.arguments import short
 from axisight.errors import LogError
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel, Gathered, gather
@@ -46,15 +47,20 @@ class LogReport:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_log(path: Path | str, columns: AnyMap | Path | str | None = None) -> LogReport:
+def check_log(
+    path: Path | str,
+    columns: AnyMap | Path | str | None = None,
+    *,
+    max_bytes: int | None = None,
+) -> LogReport:
     """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
 
-    Takes the files and column maps that `read_log` takes. A file or map that cannot be used at all
+    Takes the files, `columns` (a map) and `max_bytes` that `read_log` takes. A file or map that cannot be used at all
     gives a report with that one error.
     """
     path = Path(path)
     try:
-        found = gather(path, columns)
+        found = gather(path, columns, max_bytes=max_bytes)
     except LogError as error:
         return LogReport(path, (Finding("error", "file", str(error)),))
     grid = grid_of(found)
@@ -67,7 +73,7 @@ def check_log(path: Path | str, columns: AnyMap | Path | str | None = None) -> L
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("warning", "map", note) for note in found.notes]
     why = "not a native column, not used" if found.pattern is None else "not used by the map"
-    findings += [Finding("ok", name, why) for name in found.unused]
+    findings += [Finding("ok", short(name, 200), why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
     sound = all(finding.severity != "error" for finding in findings)
     if sound and rate is not None and grid.stamps_s is None:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from axisight.arguments import short, shown
 from axisight.logs.units import (
     PRISMATIC_UNITS,
     REVOLUTE_UNITS,
@@ -18,6 +19,10 @@ from axisight.logs.units import (
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
+
+
+# Faults of one file that a message tells.
+_SHOWN = 8
 
 
 class _Strict(BaseModel):
@@ -45,7 +50,7 @@ class Address(_Strict):
     def label(self) -> str:
         """Return the address as it appears in messages."""
         index = "" if self.index is None else f"[{self.index}]"
-        return f"{self.file + ':' if self.file else ''}{self.name}{index}"
+        return short(f"{self.file + ':' if self.file else ''}{self.name}{index}", 200)
 
 
 class TimeColumn(Address):
@@ -141,10 +146,11 @@ class AxisColumns(_Strict):
 class CsvOptions(_Strict):
     """How a CSV file is written; without a header, columns are named "0", "1" and so on.
 
-    `separator` "auto" is what stands between the names of the header.
+    `separator` is one character, or "auto" for what stands between the names of the header.
     """
 
-    separator: Text = ","
+    # One character: pandas would take more for a pattern, which may take any time to search for.
+    separator: Annotated[str, Field(pattern=r"^(auto|.|\\s\+)$")] = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
     header: bool = True
     skip_rows: Annotated[int, Field(ge=0)] = 0
@@ -174,12 +180,15 @@ class ColumnMap(_Strict):
 def describe_validation(error: ValidationError) -> str:
     """Return pydantic's findings as "field: message (got value)", joined by semicolons."""
     parts = []
-    for item in error.errors():
-        path = ".".join(str(key) for key in item["loc"]) or "(whole file)"
+    items = error.errors()
+    for item in items[:_SHOWN]:
+        path = ".".join(short(str(key)) for key in item["loc"]) or "(whole file)"
+        message = short(item["msg"], 200)
         if item["type"] == "extra_forbidden":
             parts.append(f"{path}: expected a known key, got an unknown one")
         elif item["type"] in {"missing", "value_error"}:
-            parts.append(f"{path}: {item['msg']}")
+            parts.append(f"{path}: {message}")
         else:
-            parts.append(f"{path}: {item['msg']}, got {item['input']!r}")
-    return "; ".join(parts)
+            parts.append(f"{path}: {message}, got {shown(item['input'])}")
+    more = [f"and {len(items) - _SHOWN} more"] if len(items) > _SHOWN else []
+    return "; ".join([*parts, *more])

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import short, shown, usable_path
 from axisight.errors import LogError
+from axisight.logs.budget import Budget
 from axisight.logs.columns import Address, AxisColumns, ColumnMap
 from axisight.logs.findings import Finding
 from axisight.logs.joint_states import joint_state_map
+from axisight.logs.lazy import LazyArrays
 from axisight.logs.log import Floats
 from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.mean_rate import mean_rate_hz
@@ -28,13 +31,18 @@ if TYPE_CHECKING:
     from axisight.robot import Robot
 
 _FIELDS = tuple(AxisColumns.model_fields)
+# Arrays as long as the stamps that looking at these takes.
+_TIME_COST = 4
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
 
 
 @dataclass
 class Gathered:
-    """The signals found in SI units, each 1-D, and what was wrong with the others."""
+    """The signals found in SI units, each 1-D, and what was wrong with the others.
+
+    `doubts` are about whole files; a grid of more than `most_samples` would not keep to the budget.
+    """
 
     path: Path
     columns: ColumnMap
@@ -45,6 +53,8 @@ class Gathered:
     findings: list[Finding] = field(default_factory=list)
     unused: tuple[str, ...] = ()
     pattern: ColumnPattern | None = None
+    doubts: tuple[str, ...] = ()
+    most_samples: int = 2**62
 
     @property
     def notes(self) -> list[str]:
@@ -60,15 +70,17 @@ def gather(
     path: Path | str,
     columns: AnyMap | Path | str | None = None,
     robot: Robot | None = None,
+    max_bytes: int | None = None,
 ) -> Gathered:
     """Open a log and take out every mapped signal; problems of single columns become findings.
 
-    ``robot``: whose log it is; without one signals of joints stay as they are. Raises LogError when the file or
-    the map itself cannot be used.
+    ``robot``: whose log it is; without one signals of joints stay as they are. ``max_bytes``: what all
+    mapped columns may declare. Raises LogError when the file or the map itself cannot be used.
     """
-    path = Path(path)
+    path = usable_path(path, LogError)
+    budget = Budget(max_bytes)
     given = load_column_map(columns) if isinstance(columns, Path | str) else columns
-    files = _Files(path, given)
+    files = _Files(path, given, budget)
     chosen = _usual_map(files.main, robot, path) if given is None else given
     pattern = chosen if isinstance(chosen, ColumnPattern) else None
     if isinstance(chosen, ColumnPattern):
@@ -80,11 +92,25 @@ def gather(
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
+    if result.time_s is None:
+        _count_time(result, budget)
     if result.columns.side == "joint" and robot is not None:
         _to_motors(result, robot)
     if given is None:
         result.unused = tuple(sorted(set(files.main) - _used_names(result.columns)))
+    result.doubts = files.doubts()
+    result.findings += [Finding("warning", "file", doubt) for doubt in result.doubts]
+    result.most_samples = budget.limit // (8 * (len(result.signals) + 1))
     return result
+
+
+def _count_time(result: Gathered, budget: Budget) -> None:
+    """Count the time that signals without stamps get."""
+    longest = max((values.nbytes for values in result.signals.values()), default=0)
+    try:
+        budget.take(2 * longest)
+    except LogError as error:
+        result.findings.append(Finding("error", "sample_rate_hz", str(error)))
 
 
 def _used_names(columns: ColumnMap) -> set[str]:
@@ -105,34 +131,45 @@ _POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "position_ref": -
 
 def _to_motors(result: Gathered, robot: Robot) -> None:
     """Turn signals of joints into those of their motors."""
-    for (name, axis), values in result.signals.items():
+    for name, axis in result.signals:
         if name in _POWERS and axis < robot.n_axes:
-            result.signals[name, axis] = values * robot.gear_ratio[axis] ** _POWERS[name]
+            result.signals[name, axis] *= robot.gear_ratio[axis] ** _POWERS[name]
 
 
 class _Files:
     """The log's own arrays and those of sibling files, each file opened once."""
 
-    def __init__(self, path: Path, columns: AnyMap | None) -> None:
+    def __init__(self, path: Path, columns: AnyMap | None, budget: Budget) -> None:
         self._folder = path.parent
         self._csv = columns.csv if columns is not None else None
-        self._opened: dict[str, Arrays] = {}
-        self.main = load_arrays(path, self._csv)
+        self.budget = budget
+        self._opened: dict[str, LazyArrays] = {}
+        self.main = load_arrays(path, self._csv, budget)
 
-    def of(self, address: Address) -> Arrays:
+    def of(self, address: Address) -> LazyArrays:
         if address.file is None:
             return self.main
         if address.file not in self._opened:
-            self._opened[address.file] = load_arrays(self._folder / address.file, self._csv)
+            path = self._folder / usable_path(address.file, LogError)
+            self._opened[address.file] = load_arrays(path, self._csv, self.budget)
         return self._opened[address.file]
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return what is doubtful about any of the files, with its name where it is not the log."""
+        siblings = [
+            f"{short(name)}: {d}" for name, file in self._opened.items() for d in file.doubts
+        ]
+        return (*self.main.doubts, *siblings)
 
 
 def _take_time(files: _Files, result: Gathered) -> None:
     columns = result.columns
     try:
         if columns.time is not None:
-            values = _vector(files.of(columns.time), columns.time)
-            result.time_s = values * si_factor(columns.time.unit)
+            values = _vector(files.of(columns.time), columns.time, files.budget)
+            files.budget.take(_TIME_COST * values.nbytes)
+            with np.errstate(over="ignore"):
+                result.time_s = values * si_factor(columns.time.unit)
     except LogError as error:
         result.findings.append(
             Finding("error", columns.time.label if columns.time else "", str(error))
@@ -149,7 +186,7 @@ def _take_time(files: _Files, result: Gathered) -> None:
         result.rate_hz = _scalar(files.main, rate)
         if result.rate_hz <= 0:
             result.rate_hz = None
-            raise LogError(f"expected a positive rate in Hz, got {rate!r}")
+            raise LogError(f"expected a positive rate in Hz, got {shown(rate)}")
     except LogError as error:
         result.findings.append(Finding("error", "sample_rate_hz", str(error)))
 
@@ -158,31 +195,35 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     result.labels[channel] = signal.label
     try:
         arrays = files.of(signal)
-        values = _vector(arrays, signal)
+        values = _vector(arrays, signal, files.budget)
         scale = 1.0 if signal.scale is None else _scalar(arrays, signal.scale)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
         return
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
-    result.signals[channel] = values * factor + si_offset(signal.unit)
+    # In place: a log may take all the memory that it was allowed.
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is found later
+        values *= factor
+        values += si_offset(signal.unit)
+    result.signals[channel] = values
 
 
-def _vector(arrays: Mapping[str, NDArray[Any]], address: Address) -> Floats:
+def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> Floats:
     """Return the addressed values as 1-D float64; raise LogError saying expected and got."""
     if address.name not in arrays:
-        listed = ", ".join(list(arrays)[:12]) or "nothing"
-        raise LogError(f"expected a column named {address.name!r}, got {listed}")
+        listed = ", ".join(map(short, list(arrays)[:12])) or "nothing"
+        raise LogError(f"expected a column named {shown(address.name)}, got {listed}")
     values: Any = arrays[address.name]
     if address.index is not None:
-        key = tuple(
-            slice(None) if part.strip() == ":" else int(part)
-            for part in str(address.index).split(",")
-        )
         try:
+            key = tuple(
+                slice(None) if part.strip() == ":" else int(part)
+                for part in str(address.index).split(",")
+            )
             values = values[key]
-        except IndexError:
+        except (IndexError, ValueError, OverflowError):
             raise LogError(
-                f"expected an index inside shape {values.shape}, got [{address.index}]"
+                f"expected an index inside shape {values.shape}, got [{short(str(address.index))}]"
             ) from None
     vector = np.squeeze(np.asarray(values))
     if vector.ndim != 1:
@@ -190,6 +231,7 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address) -> Floats:
             f"expected one value per sample, got shape {vector.shape}; pick a row or column with "
             'index, for example ":,0"'
         )
+    budget.take(8 * vector.size)
     return _numbers(vector)
 
 
@@ -204,8 +246,8 @@ def _numbers(vector: NDArray[Any]) -> Floats:
     for index, value in enumerate(vector):
         try:
             numbers[index] = np.nan if value is None else float(value)
-        except (TypeError, ValueError):
-            raise LogError(f"expected numbers, got {value!r} at index {index}") from None
+        except (TypeError, ValueError, OverflowError):
+            raise LogError(f"expected numbers, got {shown(value)} at index {index}") from None
     return numbers
 
 
@@ -215,7 +257,7 @@ def _scalar(arrays: Mapping[str, NDArray[Any]], value: float | str) -> float:
         return value
     found = arrays.get(value)
     if found is None:
-        raise LogError(f"expected a scalar named {value!r} in the file, got none")
+        raise LogError(f"expected a scalar named {shown(value)} in the file, got none")
     if found.size != 1 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():
-        raise LogError(f"expected {value!r} to be one finite number, got shape {found.shape}")
+        raise LogError(f"expected {shown(value)} to be one finite number, got shape {found.shape}")
     return float(found.reshape(-1)[0])

@@ -15,6 +15,8 @@ RATE_TOLERANCE = 1e-4
 """Largest relative difference between two rates that still count as equal."""
 SHORTEST_S = 1.0
 """Shortest log that is read (s)."""
+STEPS_S = (1e-9, 1e6)
+"""Shortest and longest sample time that is read (s): of neither is any log of a machine."""
 
 
 @dataclass
@@ -42,13 +44,20 @@ def make_grid(
     *,
     label: str = "time",
     resample_hz: float | None = None,
+    most_samples: int = 2**62,
 ) -> Grid:
     """Return the uniform grid of a log and what is wrong with its time stamps.
 
     `time_s` (n,) in s or None, `rate_hz` declared or None, `n_samples` of the signals. Stamps
-    that are off by up to 1 % of a sample are replaced by the uniform grid.
+    that are off by up to 1 % of a sample are replaced by the uniform grid. One of more than
+    `most_samples` is not made.
     """
     grid = Grid(n_samples=n_samples)
+    for name, rate in (("sample_rate_hz", rate_hz), ("resample_hz", resample_hz)):
+        if rate is not None and not STEPS_S[0] <= 1.0 / rate <= STEPS_S[1]:
+            message = f"expected {1 / STEPS_S[1]:g} to {1 / STEPS_S[0]:g} Hz, got {rate:g} Hz"
+            grid.error(name, message, "sample_time_differs")
+            return grid
     if time_s is None:
         if rate_hz is not None:
             grid.sample_time_s = 1.0 / rate_hz
@@ -57,7 +66,7 @@ def make_grid(
             _check_uniform(grid, time_s, label)
             grid.n_samples = time_s.size
         else:
-            _resample(grid, time_s, resample_hz, label)
+            _resample(grid, time_s, resample_hz, label, most_samples)
         if rate_hz is not None:
             _agree(grid, rate_hz, label)
     if grid.sample_time_s is not None:
@@ -84,7 +93,8 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
             "not_finite",
         )
         return False
-    back = np.flatnonzero(np.diff(time_s) <= 0)
+    with np.errstate(over="ignore"):  # steps beyond all numbers are long ones
+        back = np.flatnonzero(np.diff(time_s) <= 0)
     if back.size:
         first = int(back[0])
         grid.error(
@@ -92,6 +102,14 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
             f"expected strictly increasing time, got {back.size} steps that do not increase, first "
             f"at index {first + 1} ({time_s[first]:.9g} s then {time_s[first + 1]:.9g} s)",
             "time_not_increasing",
+        )
+        return False
+    step = (time_s[-1] / time_s.size) - (time_s[0] / time_s.size)  # a difference might overflow
+    if not STEPS_S[0] <= step <= STEPS_S[1]:
+        grid.error(
+            label,
+            f"expected steps of {STEPS_S[0]:g} to {STEPS_S[1]:g} s, got {step:.6g} s: another unit of time?",
+            "sample_time_differs",
         )
         return False
     return True
@@ -132,10 +150,20 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
         )
 
 
-def _resample(grid: Grid, time_s: Floats, resample_hz: float, label: str) -> None:
-    grid.sample_time_s = 1.0 / resample_hz
+def _resample(
+    grid: Grid, time_s: Floats, resample_hz: float, label: str, most_samples: int
+) -> None:
     span = float(time_s[-1] - time_s[0])
-    grid.n_samples = int(np.floor(span * resample_hz * (1.0 + 1e-12))) + 1
+    n_samples = int(np.floor(span * resample_hz * (1.0 + 1e-12))) + 1
+    if n_samples > most_samples:
+        message = (
+            f"expected at most {most_samples} samples from a log of this size, got {span:g} s at "
+            f"{resample_hz:g} Hz; read_log(..., max_bytes=...) raises the limit"
+        )
+        grid.error("resample_hz", message, "sample_time_differs")
+        return
+    grid.sample_time_s = 1.0 / resample_hz
+    grid.n_samples = n_samples
     grid.stamps_s = time_s - time_s[0]
     steps = np.diff(time_s)
     if steps.max() > 1.5 * np.median(steps):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from axisight.arguments import shown, usable_path
+from axisight.documents import parse_toml
 from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap, describe_validation
 from axisight.logs.maps import MAPS
@@ -21,19 +22,19 @@ AnyMap = ColumnMap | ColumnPattern
 def parse_column_map(text: str, where: str = "column map") -> AnyMap:
     """Parse the TOML `text` of a column map. Raises LogError naming `where` and each bad field."""
     try:
-        content = tomllib.loads(text)
+        content = parse_toml(text)
         kind = ColumnPattern if "every_axis" in content else ColumnMap
         return kind.model_validate(content)
-    except tomllib.TOMLDecodeError as error:
-        raise LogError(f"{where}: expected TOML, got: {error}") from error
     except ValidationError as error:
         raise LogError(f"{where}: {describe_validation(error)}") from error
+    except ValueError as error:
+        raise LogError(f"{where}: expected TOML, got: {error}") from error
 
 
 def named_map_text(name: str) -> str:
     """Return the TOML of a map that ships with the package. Raises LogError listing their names."""
     if name not in MAPS:
-        raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {name!r}")
+        raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {shown(name)}")
     return _shipped(name).read_text("utf-8")
 
 
@@ -45,7 +46,7 @@ def load_column_map(path: Path | str) -> AnyMap:
     """
     if str(path) in MAPS:
         return parse_column_map(named_map_text(str(path)), where=str(path))
-    path = Path(path)
+    path = usable_path(path, LogError)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

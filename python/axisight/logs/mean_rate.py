@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from axisight.errors import LogError
@@ -18,8 +20,9 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
 
     Raises LogError, naming the column ``where`` they stand, for a hole.
     """
-    steps = np.diff(time_s)
-    if time_s.size < 3 or not np.all(steps > 0):
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.diff(time_s)
+    if time_s.size < 3 or not np.all(steps > 0) or not math.isfinite(1.0 / float(np.mean(steps))):
         return None
     usual = float(np.median(steps))
     mean = float(time_s[-1] - time_s[0]) / (time_s.size - 1)

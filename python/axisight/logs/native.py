@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
+from axisight.arguments import short
 from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap
 
@@ -20,32 +21,40 @@ NATIVE_STEMS = {
     "temperature": ("temperature_c", "degC"),
 }
 _PATTERN = re.compile(
-    r"^(" + "|".join(stem for stem, _ in NATIVE_STEMS.values()) + r")_([1-9]\d*)$"
+    r"^(" + "|".join(stem for stem, _ in NATIVE_STEMS.values()) + r")_([1-9][0-9]*)$"
 )
 
 
 def native_map(names: Iterable[str], where: str) -> ColumnMap:
     """Return the column map of a file whose columns bear the native `names`.
 
-    The number of axes is the highest axis number that any native column has, so that a missing
-    column of a middle axis is found. Raises LogError, naming the file `where`, when no native
-    column is there at all.
+    The number of axes is the highest axis number that any native column has. Raises LogError, naming the
+    file `where`, when no native column is there at all, or none of an axis below the highest.
     """
     present = set(names)
-    numbers = [int(match.group(2)) for name in present if (match := _PATTERN.match(name))]
+    matches = [match for name in present if (match := _PATTERN.match(name))]
+    # Nine digits are enough to be more than any file has, and few enough to count with.
+    numbers = {int(match.group(2)[:9]): match.group(0) for match in matches}
     if not numbers:
-        listed = ", ".join(sorted(present)[:8]) or "nothing"
+        listed = ", ".join(map(short, sorted(present)[:8])) or "nothing"
         raise LogError(
             f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1, "
             f"... or a column map, got {listed}"
         )
-    stems = {match.group(1) for name in present if (match := _PATTERN.match(name))}
+    highest = max(numbers)
+    if highest > len(numbers):
+        missing = next(k for k in range(1, highest) if k not in numbers)
+        raise LogError(
+            f"{where}: position_{missing}: expected columns of every axis up to the highest, which "
+            f"{short(numbers[highest])} is of, got none of axis {missing}"
+        )
+    stems = {match.group(1) for match in matches}
     # Targets of positions stand in for torques where there are none at all.
     required = {"position", "torque"}
     if "position_ref" in stems and "torque_cmd" not in stems:
         required = {"position", "position_ref"}
     axes = []
-    for number in range(1, max(numbers) + 1):
+    for number in range(1, highest + 1):
         axis: dict[str, Any] = {}
         for field, (stem, unit) in NATIVE_STEMS.items():
             name = f"{stem}_{number}"

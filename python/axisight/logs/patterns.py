@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from axisight.arguments import short
 from axisight.errors import LogError
 from axisight.logs.columns import (
     Address,
@@ -81,7 +82,7 @@ class ColumnPattern(_Strict):
     schema_: Literal["axisight.columns/1"] = Field(default="axisight.columns/1", alias="schema")
     sample_rate_hz: Positive | Text | None = None
     side: Literal["motor", "joint"] = "motor"
-    axes: Annotated[int, Field(ge=1)] | None = None
+    axes: Annotated[int, Field(ge=1, le=1000)] | None = None
     time: Annotated[tuple[TimeColumn, ...], BeforeValidator(_listed)] = ()
     every_axis: AxisPattern
     csv: CsvOptions = CsvOptions()
@@ -100,9 +101,9 @@ class ColumnPattern(_Strict):
         looked for and what is there, when no position is.
         """
         names = list(arrays)
-        joints = self._joints(names, robot)
+        joints = self._joints(names, robot, where)
         if joints is None:
-            listed = ", ".join(names[:_SHOWN]) or "nothing"
+            listed = ", ".join(map(short, names[:_SHOWN])) or "nothing"
             raise LogError(
                 f"{where}: position: expected columns like {self.looked_for('position', robot)}, got "
                 f"{listed}{' ...' if len(names) > _SHOWN else ''}"
@@ -131,20 +132,31 @@ class ColumnPattern(_Strict):
         joint = robot.axis_names[0] if robot is not None else "JOINT"
         return " or ".join(_filled(s.name, 0, [joint]) for s in getattr(self.every_axis, field))
 
-    def _joints(self, names: Sequence[str], robot: Robot | None) -> list[str] | None:
-        """Return one name per axis, those of joints where they are known; None without a position."""
+    def _joints(self, names: Sequence[str], robot: Robot | None, where: Path) -> list[str] | None:
+        """Return one name per axis, those of joints where they are known; None without a position.
+
+        Raises LogError where axes have numbers beyond those that follow each other.
+        """
         own = [""] * 0 if robot is None else list(robot.axis_names)
         for signal in self.every_axis.position:
             before, place, after = _split(signal.name)
-            middle = r"(\d+)" if place != "joint" else "([^/]+)"
+            middle = r"([0-9]+)" if place != "joint" else "([^/]+)"
             pattern = re.compile(f"{re.escape(before)}{middle}{re.escape(after)}")
             found = [match[1] for name in names if (match := pattern.fullmatch(name))]
             if place == "joint":
                 if found and (not own or set(own) & set(found)):
                     return own or found
                 continue
-            highest = max((int(number) for number in found), default=-1) + 1 - int(place)
-            if highest > 0:
+            # Nine digits are enough to be more than any file has, and few enough to count with.
+            numbers = {int(number[:9]) + 1 - int(place) for number in found} - {0}
+            highest = max(numbers, default=0)
+            if highest > len(numbers):
+                missing = next(k for k in range(1, highest) if k not in numbers) - 1 + int(place)
+                raise LogError(
+                    f"{where}: position: expected a column named {before + str(missing) + after!r}, as "
+                    f"axes go on beyond it, got {len(numbers)} columns of others"
+                )
+            if highest:
                 return [*own, *[""] * highest][:highest]
         return None
 

@@ -26,6 +26,7 @@ def read_log(
     *,
     n_axes: int | None = None,
     robot: Robot | None = None,
+    max_bytes: int | None = None,
 ) -> Log:
     """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or .db3.
 
@@ -35,14 +36,16 @@ def read_log(
     `robot` is the one it is a log of:
     its axes are found by the names of its joints in recordings, and its gear ratios turn signals
     of joints into those of motors. `n_axes` is the number of driven axes the caller expects, those of the
-    robot unless given. The result is in SI units on a uniform grid that starts at 0.
+    robot unless given. Only columns that are mapped are read, and none that would take more than `max_bytes`
+    together, as they are read and as signals; by default 64 MiB and sixteen times the size of the files.
+    The result is in SI units on a uniform grid that starts at 0.
 
     Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
     column or axis missing; NaN or inf; unequal lengths; time that does not increase; gaps or
     jitter beyond 1 % of a sample; a declared rate that the stamps contradict; less than one
-    second; another number of axes than `n_axes`.
+    second; another number of axes than `n_axes`; more declared than `max_bytes`.
     """
-    found = gather(path, columns, robot)
+    found = gather(path, columns, robot, max_bytes)
     if found.columns.side == "joint" and robot is None:
         raise LogError(
             f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "
@@ -69,6 +72,7 @@ def grid_of(found: Gathered) -> Grid:
         n_samples,
         label=time.label if time is not None else "sample_rate_hz",
         resample_hz=resample,
+        most_samples=found.most_samples,
     )
 
 
@@ -103,7 +107,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
         axis_kinds=tuple(
             "prismatic" if axis.prismatic else "revolute" for axis in found.columns.axis
         ),
-        notes=(*grid.notes, *found.notes),
+        notes=(*grid.notes, *found.notes, *found.doubts),
     )
 
 

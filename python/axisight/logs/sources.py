@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import islice
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from axisight.arguments import short, usable_path
 from axisight.errors import LogError, MissingExtraError
+from axisight.logs.budget import Budget
 from axisight.logs.columns import CsvOptions
+from axisight.logs.lazy import LazyArrays, Reader, unreadable
 from axisight.logs.sources_bag import BAG_SUFFIXES, is_bag, load_bag
+from axisight.logs.sources_csv import load_csv
 from axisight.logs.sources_hdf5 import load_hdf5
 from axisight.logs.sources_lerobot import (
     check_episode,
@@ -22,9 +23,10 @@ from axisight.logs.sources_lerobot import (
     load_lerobot,
 )
 from axisight.logs.sources_mat import load_mat
+from axisight.logs.sources_npz import load_npz
 from axisight.logs.sources_parquet import load_parquet
 
-Arrays = dict[str, NDArray[Any]]
+Arrays = Mapping[str, NDArray[Any]]
 
 
 def is_folder_log(path: Path) -> bool:
@@ -39,68 +41,57 @@ def files_of(path: Path) -> list[Path]:
     return sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
 
 
-def load_arrays(path: Path, csv: CsvOptions | None = None) -> Arrays:
-    """Return every array of the file by (dotted) name; scalars are 0-dimensional.
+def load_arrays(
+    path: Path, csv: CsvOptions | None = None, budget: Budget | None = None
+) -> LazyArrays:
+    """Return the arrays of a file by (dotted) name, read as they are asked for; scalars are 0-dimensional.
 
     The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording of
     ROS (.mcap, .bag, .db3, or the folder of a rosbag2). A folder of LeRobot is another log, of one
-    episode (`folder#3`). Raises MissingExtraError for one without the library that reads it, LogError for
-    a missing file, an unknown suffix, an episode that is not there, and a truncated or corrupt file.
+    episode (`folder#3`). What the file declares counts against `budget`, by default one by its size.
+    Raises MissingExtraError for one without the library that reads it, LogError for a missing file, an
+    unknown suffix, an episode that is not there, a truncated or corrupt file, and one that is too large.
     """
-    loaders: dict[str, Callable[[Path], Arrays]] = {
-        ".parquet": load_parquet,
-        ".csv": lambda file: _load_csv(file, csv or CsvOptions()),
-        ".mat": load_mat,
-        ".h5": load_hdf5,
-        ".hdf5": load_hdf5,
-        ".npz": _load_npz,
-        **dict.fromkeys(BAG_SUFFIXES, load_bag),
-    }
+    budget = Budget() if budget is None else budget
+    usable_path(path, LogError)
     folder = path.is_dir() and is_bag(path)
     suffix = ".db3" if folder else path.suffix.lower()
     if is_lerobot(path):
         check_episode(path)
-        folder, suffix, loaders = True, ".parquet", {".parquet": load_lerobot}
+        folder, suffix = True, ".lerobot"
+    loaders = _loaders(csv or CsvOptions())
     if suffix not in loaders:
-        raise LogError(f"{path}: suffix: expected one of {', '.join(loaders)}, got {suffix!r}")
+        listed = ", ".join(known for known in loaders if known != ".lerobot")
+        raise LogError(f"{path}: suffix: expected one of {listed}, got {short(suffix)!r}")
     if not path.is_file() and not folder:
         raise LogError(f"{path}: expected a file, got {'a folder' if path.is_dir() else 'nothing'}")
+    budget.grow(files_of(path))
     try:
-        return loaders[suffix](path)
+        found = loaders[suffix](path, budget)
     except MissingExtraError:
         raise
-    except MemoryError:
-        raise LogError(f"{path}: truncated, corrupt or too large for memory") from None
+    except LogError as error:
+        raise LogError(f"{path}: {error}") from error
     except Exception as error:  # corrupt files make the readers raise nearly anything
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise LogError(
-            f"{path}: expected a readable {suffix[1:]} file, got one that is truncated, corrupt or "
-            f"of another format ({reason}) [file_unreadable]"
-        ) from error
+        kind = "parquet" if suffix == ".lerobot" else suffix[1:]
+        raise LogError(f"{path}: {unreadable(error, kind)}") from error
+    return found if isinstance(found, LazyArrays) else LazyArrays(found)
 
 
-def _load_csv(path: Path, options: CsvOptions) -> Arrays:
-    separator = options.separator
-    frame = pd.read_csv(
-        path,
-        sep=_separator(path, options.skip_rows) if separator == "auto" else separator,
-        decimal=options.decimal,
-        header=0 if options.header else None,
-        skiprows=options.skip_rows,
-        skipinitialspace=True,
-        index_col=False,
-    )
-    return {str(name).strip(): frame[name].to_numpy() for name in frame.columns}
+_Loader = Callable[[Path, Budget], LazyArrays | dict[str, Reader]]
 
 
-def _separator(path: Path, skip_rows: int) -> str:
-    """Return what stands between the names of a header: a tab or semicolon, comma, or else a space."""
-    with path.open(encoding="utf-8") as file:
-        header = next(islice(file, skip_rows, None), "")
-    return next((mark for mark in "\t;," if mark in header), " ")
-
-
-def _load_npz(path: Path) -> Arrays:
-    # np.load leaks its own file handle when the archive is damaged
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+def _loaders(csv: CsvOptions) -> dict[str, _Loader]:
+    return {
+        ".parquet": load_parquet,
+        ".csv": lambda file, budget: load_csv(file, budget, csv),
+        ".mat": load_mat,
+        ".h5": load_hdf5,
+        ".hdf5": load_hdf5,
+        ".npz": load_npz,
+        ".lerobot": load_lerobot,
+        **dict.fromkeys(
+            BAG_SUFFIXES,
+            lambda file, budget: LazyArrays.of(load_bag(file, budget)),
+        ),
+    }

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import LogError, MissingExtraError
+from axisight.logs.budget import Budget
 
 BAG_SUFFIXES = (".mcap", ".bag", ".db3")
 """How files end that `load_bag` reads; a rosbag2 is a folder with ``metadata.yaml`` too."""
@@ -21,6 +22,8 @@ _NAMES = ("name", "joint_names")
 # What is no signal: the header has the time.
 _SKIPPED = ("header", *_NAMES)
 _DEEPEST = 4
+# Bytes that a number of a message takes until all messages are there.
+_NUMBER_COST = 64
 
 
 def is_bag(path: Path) -> bool:
@@ -28,13 +31,15 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in BAG_SUFFIXES or (path / "metadata.yaml").is_file()
 
 
-def load_bag(path: Path) -> dict[str, NDArray[Any]]:
+def load_bag(path: Path, budget: Budget | None = None) -> dict[str, NDArray[Any]]:
     """Return the numbers of every topic of a recording by ``topic.field``, or ``topic.field.joint``.
 
     ``topic.time_s`` are the stamps of its messages, those of recording where they have none, from the
     first on. Messages of one topic that name other joints become ``topic#2``. Topics whose messages have no
-    numbers, or a type that nobody defines, are left out. Raises LogError and MissingExtraError.
+    numbers, or a type that nobody defines, are left out. Numbers count against ``budget`` as messages
+    come. Raises LogError and MissingExtraError.
     """
+    budget = _own_budget(path) if budget is None else budget
     any_reader, stores = _rosbags()
     series: dict[tuple[str, frozenset[str]], _Series] = {}
     unknown: set[str] = set()
@@ -50,7 +55,9 @@ def load_bag(path: Path) -> dict[str, NDArray[Any]]:
             names = _names(message)
             topic = connection.topic.strip("/").replace("/", ".")
             one = series.setdefault((topic, frozenset(names)), _Series())
-            one.add(_stamp_ns(message, received_ns), dict(_numbers(message, names)))
+            row = dict(_numbers(message, names))
+            budget.take(_NUMBER_COST * len(row))
+            one.add(_stamp_ns(message, received_ns), row)
     out: dict[str, NDArray[Any]] = {}
     seen: dict[str, int] = {}
     for (topic, _), one in series.items():
@@ -63,6 +70,12 @@ def load_bag(path: Path) -> dict[str, NDArray[Any]]:
         said = f" (types nobody defines: {', '.join(sorted(unknown))})" if unknown else ""
         raise LogError(f"expected messages with numbers, got none{said}")
     return out
+
+
+def _own_budget(path: Path) -> Budget:
+    budget = Budget()
+    budget.grow(path.iterdir() if path.is_dir() else [path])
+    return budget
 
 
 def _rosbags() -> tuple[Any, Any]:

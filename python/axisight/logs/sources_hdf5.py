@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -9,35 +10,74 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.errors import LogError
+from axisight.logs.budget import Budget
+from axisight.logs.lazy import Reader
 
-def load_hdf5(path: Path, *, matlab: bool = False) -> dict[str, NDArray[Any]]:
-    """Return every dataset by its path with dots for slashes.
+_DEEPEST = 32
+
+
+def load_hdf5(path: Path, budget: Budget, *, matlab: bool = False) -> dict[str, Reader]:
+    """Return a reader for every dataset, by its path with dots for slashes.
 
     With `matlab`, arrays are transposed back to MATLAB's order, singleton dimensions dropped, and
     cells followed into object arrays. Raises whatever h5py raises on a damaged file.
     """
-    arrays: dict[str, NDArray[Any]] = {}
+    names: list[str] = []
     with h5py.File(path, "r") as file:
 
         def visit(name: str, item: object) -> None:
             if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-                arrays[name.replace("/", ".")] = _read(file, item, matlab=matlab)
+                names.append(name)
 
         file.visititems(visit)
-    return arrays
+    return {name.replace("/", "."): _reader(path, name, budget, matlab) for name in names}
 
 
-def _read(file: h5py.File, dataset: h5py.Dataset, *, matlab: bool) -> NDArray[Any]:
-    values = np.asarray(dataset[()])
-    if not matlab:
-        return values
-    if "MATLAB_empty" in dataset.attrs:
-        return np.empty(0)
-    if h5py.check_ref_dtype(dataset.dtype) is h5py.Reference:
-        cells = np.empty(values.shape, dtype=object)
-        for index, reference in np.ndenumerate(values):
-            target = file[reference] if reference else None
-            if isinstance(target, h5py.Dataset):
-                cells[index] = _read(file, target, matlab=True)
-        values = cells
-    return values.T.squeeze()
+def _reader(path: Path, name: str, budget: Budget, matlab: bool) -> Reader:
+    def read() -> NDArray[Any]:
+        with h5py.File(path, "r") as file:
+            dataset = file[name]
+            return _Cells(file, budget).of(dataset, 0) if matlab else _read(dataset, budget)
+
+    return read
+
+
+def _read(dataset: h5py.Dataset, budget: Budget) -> NDArray[Any]:
+    """Return the values of a dataset that holds them itself, as much as it declares within the budget."""
+    if dataset.is_virtual or dataset.external:
+        raise LogError("expected values in the file itself, got those of other files")
+    if dataset.dtype.hasobject and h5py.check_ref_dtype(dataset.dtype) is not h5py.Reference:
+        raise LogError("expected numbers, got values of variable length")
+    # A chunk is unpacked whole, however little of it is asked for.
+    shape = max(dataset.shape or (), dataset.chunks or (), key=prod)
+    budget.take_values(shape, dataset.dtype.itemsize)
+    return np.asarray(dataset[()])
+
+
+class _Cells:
+    """Cells of MATLAB: references to datasets, each of which is read once however often it is named."""
+
+    def __init__(self, file: h5py.File, budget: Budget) -> None:
+        self._file = file
+        self._budget = budget
+        self._seen: dict[str, NDArray[Any]] = {}
+
+    def of(self, dataset: h5py.Dataset, depth: int) -> NDArray[Any]:
+        """Return the values of a dataset, cells followed."""
+        if depth > _DEEPEST:
+            raise LogError(f"expected at most {_DEEPEST} cells inside each other")
+        if dataset.name in self._seen:
+            return self._seen[dataset.name]
+        values = _read(dataset, self._budget)
+        if "MATLAB_empty" in dataset.attrs:
+            return np.empty(0)
+        if h5py.check_ref_dtype(dataset.dtype) is h5py.Reference:
+            cells = np.empty(values.shape, dtype=object)
+            for index, reference in np.ndenumerate(values):
+                target = self._file[reference] if reference else None
+                if isinstance(target, h5py.Dataset):
+                    cells[index] = self.of(target, depth + 1)
+            values = cells
+        self._seen[dataset.name] = values.T.squeeze()
+        return self._seen[dataset.name]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.errors import LogError
+from axisight.logs.budget import Budget
 from axisight.logs.columns import describe_validation
+from axisight.logs.lazy import Reader
 from axisight.logs.sources_parquet import load_parquet
 
 _INFO = Path("meta") / "info.json"
@@ -64,20 +65,24 @@ def check_episode(path: Path) -> None:
         )
 
 
-def load_lerobot(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of one episode by name; `observation.state` becomes `observation.state[0]`, ...
+def load_lerobot(path: Path, budget: Budget) -> dict[str, Reader]:
+    """Return readers of the columns of one episode; `observation.state` becomes `observation.state[0]`, ...
 
     The folder may be given alone where it has a single episode. Raises LogError for an episode without
     rows, and whatever the reader raises on a damaged file.
     """
     number = split_episode(path)[1] or 0
     filters = [(_EPISODE, "=", number)]
-    parts = [load_parquet(file, filters) for file in files_of_episode(path)[1:]]
-    parts = [part for part in parts if part and next(iter(part.values())).size]
+    parts = [load_parquet(file, budget, filters) for file in files_of_episode(path)[1:]]
+    parts = [part for part in parts if _EPISODE in part and part[_EPISODE]().size]
     if not parts:
         raise LogError(f"expected rows with {_EPISODE} {number} below data, got none")
     shared = [name for name in parts[0] if all(name in part for part in parts)]
-    return {name: np.concatenate([part[name] for part in parts]) for name in shared}
+    return {name: _joined([part[name] for part in parts]) for name in shared}
+
+
+def _joined(readers: list[Reader]) -> Reader:
+    return lambda: np.concatenate([read() for read in readers])
 
 
 def _info(path: Path) -> _Info:

@@ -2,42 +2,133 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from axisight.errors import LogError
+from axisight.logs.budget import Budget
+from axisight.logs.lazy import Reader, refusing
 
-def load_parquet(path: Path, filters: Any = None) -> dict[str, NDArray[Any]]:
-    """Return the columns of a file by name; ``filters``, those of pyarrow, choose rows.
+# Lists with more entries per sample than that hold no signals of axes.
+_MOST_ENTRIES = 4096
+
+
+def load_parquet(path: Path, budget: Budget, filters: Any = None) -> dict[str, Reader]:
+    """Return a reader for every column by name; ``filters``, those of pyarrow, choose rows.
 
     A column `q` of lists that are all as long becomes `q[0]`, `q[1]`, ...
     """
-    # Not pandas.read_parquet: that turns a stored index such as time_s into no column at all
-    table = pq.read_table(path, filters=filters, partitioning=None)
-    out: dict[str, NDArray[Any]] = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        matrix = _matrix(column)
-        if matrix is None:
-            out[name] = np.asarray(column.to_numpy())
+    with pq.ParquetFile(path) as file:
+        metadata, schema = file.metadata, file.schema_arrow
+        leaves = _leaves(metadata)
+    readers: dict[str, Reader] = {}
+    for field in schema:
+        if schema.names.count(field.name) > 1:
+            said = f"expected one column of that name, got {schema.names.count(field.name)}"
+            readers[field.name] = refusing(said)
+            continue
+        values, size = leaves.get(field.name, (0, 0))
+        one = _Column(path, budget, filters, field, values, size)
+        entries = _entries(field.type, values, metadata.num_rows)
+        if entries:
+            matrix = cache(one.matrix)
+            readers |= {f"{field.name}[{k}]": _entry(matrix, entries, k) for k in range(entries)}
         else:
-            out |= {f"{name}[{k}]": values for k, values in enumerate(matrix.T)}
-    return out
+            readers[field.name] = one.plain
+    return readers
 
 
-def _matrix(column: Any) -> NDArray[Any] | None:
-    """Return a column of lists of numbers that are all as long as (samples, entries)."""
-    kind = column.type
+def _leaves(metadata: Any) -> dict[str, tuple[int, int]]:
+    """Return the number of values and the bytes that every column declares, unpacked."""
+    found: dict[str, tuple[int, int]] = {}
+    for group in range(metadata.num_row_groups):
+        row_group = metadata.row_group(group)
+        for k in range(row_group.num_columns):
+            chunk = row_group.column(k)
+            name = _column_of(chunk.path_in_schema)
+            for own in {chunk.path_in_schema, *name}:
+                values, size = found.get(own, (0, 0))
+                found[own] = values + chunk.num_values, size + chunk.total_uncompressed_size
+    return found
+
+
+def _column_of(path: str) -> Iterator[str]:
+    """Yield the columns that a leaf may belong to: names may have dots themselves."""
+    while "." in path:
+        path = path.rpartition(".")[0]
+        yield path
+
+
+def _entries(kind: Any, values: int, rows: int) -> int:
+    """Return the entries per sample of a column of lists that may all be as long; 0 for others."""
     lists = pa.types.is_list(kind) or pa.types.is_large_list(kind)
-    if not (lists or pa.types.is_fixed_size_list(kind)) or column.null_count or not len(column):
-        return None
+    if not (lists or pa.types.is_fixed_size_list(kind)) or not rows:
+        return 0
     if not (pa.types.is_floating(kind.value_type) or pa.types.is_integer(kind.value_type)):
-        return None
-    lengths = np.unique([len(entry) for entry in column])
-    if lengths.size != 1 or lengths[0] == 0:
-        return None
-    values = pa.concat_arrays([chunk.flatten() for chunk in column.chunks])
-    return np.asarray(values.to_numpy(zero_copy_only=False)).reshape(len(column), -1)
+        return 0
+    entries, rest = divmod(values, rows)
+    return 0 if rest or entries > _MOST_ENTRIES else entries
+
+
+def _entry(matrix: Any, entries: int, k: int) -> Reader:
+    def read() -> NDArray[Any]:
+        values = matrix()
+        if values.shape[1] != entries:
+            raise LogError(f"expected lists of {entries} numbers, got {values.shape[1]}")
+        return np.asarray(values[:, k])
+
+    return read
+
+
+class _Column:
+    """One column of a file, and what it declares."""
+
+    def __init__(
+        self, path: Path, budget: Budget, filters: Any, field: Any, values: int, size: int
+    ) -> None:
+        self._path = path
+        self._budget = budget
+        self._filters = filters
+        self._field = field
+        self._declared = max(8 * values, size)
+
+    def _read(self) -> Any:
+        self._budget.take(self._declared)
+        # Not pandas.read_parquet: that turns a stored index such as time_s into no column at all
+        table = pq.read_table(
+            self._path, columns=[self._field.name], filters=self._filters, partitioning=None
+        )
+        return table.column(self._field.name)
+
+    def plain(self) -> NDArray[Any]:
+        """Return a column of one value per sample."""
+        kind = self._field.type
+        numbers = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean)
+        fixed = (pa.types.is_decimal, pa.types.is_temporal, pa.types.is_null)
+        # A text may stand once in the file and in every row: nothing declares what it takes.
+        if not any(is_kind(kind) for is_kind in (*numbers, *fixed)):
+            raise LogError(f"expected numbers, got values of type {kind}")
+        return np.asarray(self._read().to_numpy())
+
+    def matrix(self) -> NDArray[Any]:
+        """Return a column of lists of numbers that are all as long as (samples, entries)."""
+        column = self._read()
+        if column.null_count:
+            raise LogError(f"expected a list for every sample, got {column.null_count} without one")
+        lengths = pa.compute.list_value_length(column).unique().to_pylist()
+        if len(lengths) > 1:
+            raise LogError(
+                f"expected lists that are all as long, got lengths {sorted(lengths)[:8]}"
+            )
+        if not len(column):
+            return np.empty((0, 0))
+        values = pa.concat_arrays([chunk.flatten() for chunk in column.chunks])
+        return np.asarray(values.to_numpy(zero_copy_only=False)).reshape(len(column), -1)

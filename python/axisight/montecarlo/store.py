@@ -18,6 +18,7 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +28,8 @@ import zarr
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
+from axisight.arguments import short, shown
+from axisight.documents import parse_json
 from axisight.errors import StoreError, StudyError
 from axisight.montecarlo.design import Arrays, differences
 
@@ -35,6 +38,13 @@ FORMAT: Final = "axisight.montecarlo.store/1"
 
 # One file per array instead of a tree of folders.
 _FLAT: Final[dict[str, Any]] = {"name": "default", "configuration": {"separator": "."}}
+# All that a block is written in; whatever else a description names is nothing of ours.
+_INTEGERS = [f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64)]
+_TYPES: Final = frozenset(["bool", *_INTEGERS, "float32", "float64", "complex64", "complex128"])
+_CODECS: Final = ("bytes", "zstd")
+# What blocks may declare, at all and for each byte on disk.
+_MOST_BYTES: Final = 2**28
+_MOST_PER_BYTE: Final = 1000
 
 
 @contextmanager
@@ -82,10 +92,10 @@ class Store:
         if not self.root.is_dir():
             raise StoreError(f"{self.root}: expected a store of a study, got nothing")
         try:
-            return dict(zarr.open_group(store=str(self.root), mode="r").attrs)
+            return dict(_opened(self.root).attrs)
         # Damage shows as anything that a reader of JSON or of groups can raise.
         except Exception as error:
-            raise self.damaged(str(error)) from None
+            raise self.damaged(short(str(error))) from None
 
     def damaged(self, reason: str) -> StoreError:
         """Return the error for metadata without which nobody knows what the blocks are of."""
@@ -125,10 +135,10 @@ class Store:
                     shutil.rmtree(other)
 
     def read(self, first: int, count: int) -> Arrays | None:
-        """Return a block, or None if it is damaged."""
+        """Return a block, or None if it is damaged, or not written as :meth:`write` does."""
         # Damage shows as anything from a missing file to a codec's own exception.
         try:
-            group = zarr.open_group(store=str(self.path(first, count)), mode="r")
+            group = _opened(self.path(first, count))
             arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
             return arrays if group.attrs["sha256"] == checksum(arrays) else None
         except Exception:
@@ -144,15 +154,61 @@ class Store:
             new.rename(target)
 
 
+def _opened(path: Path) -> zarr.Group:
+    """Open a group whose descriptions are those that this file writes; raises ValueError for others.
+
+    Descriptions are read before Zarr follows them: they may name codecs that run what they unpack, types
+    that hold objects, and sizes without end.
+    """
+    found = _described(path, "group")
+    if found.get("consolidated_metadata") is not None:
+        raise ValueError(f"{path}: expected a description in every folder")
+    declared, stored = 0, 0
+    for below in path.iterdir():
+        if below.is_dir() and path.parent.name == "blocks":
+            declared += _declared(below)
+            stored += sum(file.stat().st_size for file in below.rglob("*") if file.is_file())
+    if declared > _MOST_BYTES + _MOST_PER_BYTE * stored:
+        raise ValueError(f"{path}: expected accumulators, got {declared} bytes declared")
+    return zarr.open_group(store=str(path), mode="r", zarr_format=3, use_consolidated=False)
+
+
+def _described(path: Path, kind: str) -> dict[str, Any]:
+    found = parse_json((path / "zarr.json").read_text("utf-8"))
+    if not isinstance(found, dict) or (found.get("zarr_format"), found.get("node_type")) != (
+        3,
+        kind,
+    ):
+        raise ValueError(f"{path}: expected the description of a Zarr 3 {kind}")
+    return found
+
+
+def _declared(path: Path) -> int:
+    """Return the bytes that an array declares; raises ValueError for other types and codecs than ours."""
+    found = _described(path, "array")
+    shape, kind = found["shape"], found["data_type"]
+    codecs = [(codec["name"], set(codec)) for codec in found["codecs"]]
+    if kind not in _TYPES or codecs != [(name, {"name", "configuration"}) for name in _CODECS]:
+        raise ValueError(
+            f"{path}: expected numbers in {', '.join(_CODECS)}, got {short(repr(found))}"
+        )
+    whole = {"name": "regular", "configuration": {"chunk_shape": [max(1, n) for n in shape]}}
+    if found["chunk_grid"] != whole or found.get("storage_transformers"):
+        raise ValueError(f"{path}: expected an array in one piece")
+    return int(prod(shape) * np.dtype(kind).itemsize)
+
+
 def check_same(store: Store, design: str, seed: int) -> None:
     """Raise StudyError naming the fields that differ from what the store was made with."""
     stored = store.provenance()
     if stored.get("format") != FORMAT:
-        raise StudyError(f"{store.root}: format: expected {FORMAT}, got {stored.get('format')!r}")
+        raise StudyError(
+            f"{store.root}: format: expected {FORMAT}, got {shown(stored.get('format'))}"
+        )
     try:
-        was, seeded = json.loads(stored["design"]), stored["seed"]
+        was, seeded = parse_json(stored["design"]), stored["seed"]
     except (KeyError, TypeError, ValueError) as error:
-        raise store.damaged(f"{type(error).__name__}: {error}") from None
+        raise store.damaged(short(f"{type(error).__name__}: {error}")) from None
     found = differences(was, json.loads(design)) + differences(seeded, seed, "seed")
     if found:
         raise StudyError(f"{store.folder}: cannot resume: {'; '.join(found)}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.documents import parse_toml
 from axisight.errors import StudyError
 from axisight.robot.presets import PRESETS
 from axisight.simulation import Method
@@ -185,8 +185,8 @@ def read_study(source: Path | str) -> Study:
     """
     path = Path(source)
     try:
-        data = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        data = parse_toml(path.read_text("utf-8"))
+    except (OSError, ValueError) as error:
         raise StudyError(f"{path}: expected a study in TOML: {error}") from None
     robot = data.get("robot")
     if isinstance(robot, str) and robot not in PRESETS:

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import usable_path
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
@@ -390,7 +391,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
     if isinstance(source, str) and source in PRESETS:
         text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
         return Robot.from_toml(text)
-    path = Path(source)
+    path = usable_path(source, RobotError)
     # Stands above robots: only those who have such a file load its readers.
     if path.suffix.lower() in MODEL_SUFFIXES:
         found: Robot = import_module("axisight.robot_import").import_robot(

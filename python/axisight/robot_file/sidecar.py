@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.documents import parse_json
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file.identified import Identified
@@ -128,7 +128,7 @@ def read_sidecar(path: Path) -> Sidecar | Earlier:
 
 def _is_earlier(text: str) -> bool:
     try:
-        content = json.loads(text)
+        content = parse_json(text)
     except ValueError:
         return False
     return isinstance(content, dict) and content.get("schema") == "axisight.identified/1"

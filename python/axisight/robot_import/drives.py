@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.documents import parse_toml
 from axisight.errors import RobotError
 
 
@@ -73,10 +73,10 @@ class DriveData(_Strict):
 def read_drives(path: Path) -> DriveData:
     """Return the drive data of a TOML file; raises RobotError naming file and key."""
     try:
-        content = tomllib.loads(path.read_text("utf-8"))
+        content = parse_toml(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f"{path}: expected a readable file of drive data: {error}") from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise RobotError(f"{path}: expected TOML, got {error}") from None
     try:
         return DriveData.model_validate(content)

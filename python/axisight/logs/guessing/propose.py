@@ -21,8 +21,9 @@ from axisight.logs.guessing.others import (
 )
 from axisight.logs.guessing.series import series_of
 from axisight.logs.guessing.write import text_of
+from axisight.logs.lazy import LazyArrays
 from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
-from axisight.logs.sources import Arrays, load_arrays
+from axisight.logs.sources import load_arrays
 from axisight.robot import Robot
 
 _NATIVE = ("time_s", "position_1", "torque_cmd_1")
@@ -65,7 +66,8 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     file that cannot be read.
     """
     path = Path(path)
-    arrays, csv = _opened(path)
+    opened, csv = _opened(path)
+    arrays, unread = opened.readable()
     if set(_NATIVE) <= set(arrays):
         raise LogError(
             f"{path}: expected a log without the native columns, got one: it needs no map"
@@ -74,6 +76,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     if fit is not None:
         return _named(path, fit)
     series, unused = series_of(arrays)
+    unused |= unread
     joints = [] if robot is None else list(robot.axis_names)
     families = families_of(series, joints)
     draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
@@ -105,14 +108,14 @@ def _named(path: Path, fit: Fit) -> Proposal:
     return Proposal(text, parse_column_map(text, f"{path}: guess"), fit.name, doubts, {})
 
 
-def _opened(path: Path) -> tuple[Arrays, CsvOptions]:
+def _opened(path: Path) -> tuple[LazyArrays, CsvOptions]:
     """Return the arrays of a file, of a CSV with the separator and decimal mark that its header shows."""
     if path.suffix.lower() != ".csv":
         return load_arrays(path), CsvOptions()
     arrays = load_arrays(path, CsvOptions(separator="auto"))
     if len(load_header(path, ",")) == len(arrays):
         return arrays, CsvOptions()
-    numbers = [values.dtype.kind in "iuf" for values in arrays.values()]
+    numbers = [values.dtype.kind in "iuf" for values in arrays.readable()[0].values()]
     comma = CsvOptions(separator="auto", decimal=",")
     return (
         (arrays, CsvOptions(separator="auto"))

@@ -1,0 +1,47 @@
+"""TOML and JSON written by strangers: nested, long and huge ones are refused, never followed."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from typing import Any
+
+from axisight.arguments import short
+
+_LONGEST = 32 * 2**20
+_MOST_PARTS = 32
+# Keys of many parts cost the square of their number, or worse: a key part, a dot, and so on.
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}){{{_MOST_PARTS}}}")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the content of a TOML document; raises ValueError, whose message is short, for any other."""
+    if len(text) > _LONGEST:
+        raise ValueError(f"expected at most {_LONGEST} characters, got {len(text)}")
+    if found := _DOTTED.search(text):
+        raise ValueError(
+            f"expected keys of fewer than {_MOST_PARTS} parts, got {short(found.group())}"
+        )
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("expected values in fewer brackets, got some nested too deep") from None
+    except ValueError as error:  # that of tomllib, and of int() for thousands of digits
+        raise ValueError(_cut(str(error))) from None
+
+
+def parse_json(text: str) -> Any:
+    """Return the content of a JSON document; raises ValueError, whose message is short, for any other."""
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("expected values in fewer brackets, got some nested too deep") from None
+    except ValueError as error:
+        raise ValueError(_cut(str(error))) from None
+
+
+def _cut(said: str) -> str:
+    """Cut the middle of what a parser says: where it was stands at the end."""
+    return said if len(said) <= 200 else f"{said[:80]} ... {said[-60:]}"

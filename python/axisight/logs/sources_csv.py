@@ -1,0 +1,86 @@
+"""CSV files: a header of names, then rows of numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from axisight.errors import LogError
+from axisight.logs.budget import Budget
+from axisight.logs.columns import CsvOptions
+from axisight.logs.lazy import LazyArrays, Reader, given, refusing
+
+# Wider tables are matrices of something else.
+_MOST_COLUMNS = 10_000
+_BLOCK = 2**20
+UNENDED = "expected a line end behind the last row, as behind the others, got none: its last value may be cut"
+
+
+def load_csv(path: Path, budget: Budget, options: CsvOptions) -> LazyArrays:
+    """Return the columns of a table; of names that stand twice none is read.
+
+    A last line without an end is said among the doubts: whether the file was cut inside its last number
+    cannot be known from it. Raises LogError for a table that is too wide or too large.
+    """
+    lines, ended = _lines(path)
+    with path.open(encoding="utf-8", newline="") as file:
+        separator = _settle(file, options)
+        first = pd.read_csv(
+            file, sep=separator, header=None, nrows=1, dtype=str, skipinitialspace=True,
+            index_col=False,
+        )  # fmt: skip
+    n_columns = first.shape[1]
+    if n_columns > _MOST_COLUMNS:
+        raise LogError(f"expected at most {_MOST_COLUMNS} columns, got {n_columns}")
+    budget.take_values((lines, n_columns), 8)
+    with path.open(encoding="utf-8", newline="") as file:
+        _settle(file, options)
+        frame = pd.read_csv(
+            file,
+            sep=separator,
+            decimal=options.decimal,
+            header=0 if options.header else None,
+            skipinitialspace=True,
+            index_col=False,
+        )
+    raw = [str(name).strip() for name in (first.iloc[0] if options.header else range(n_columns))]
+    counts = Counter(raw)
+    readers: dict[str, Reader] = {}
+    for k, name in enumerate(raw):
+        if counts[name] > 1:
+            readers[name] = refusing(f"expected one column of that name, got {counts[name]}")
+        elif k < frame.shape[1]:
+            readers[name] = given(_column(frame, k))
+    return LazyArrays(readers, () if ended else (UNENDED,))
+
+
+def _column(frame: pd.DataFrame, k: int) -> NDArray[Any]:
+    return np.asarray(frame.iloc[:, k].to_numpy())
+
+
+def _settle(file: TextIO, options: CsvOptions) -> str:
+    """Go behind the lines to be skipped, and return what stands between the names of the header."""
+    for _ in range(options.skip_rows):
+        if not file.readline():
+            break
+    if options.separator != "auto":
+        return options.separator
+    start = file.tell()
+    header = file.readline()
+    file.seek(start)
+    return next((mark for mark in "\t;," if mark in header), " ")
+
+
+def _lines(path: Path) -> tuple[int, bool]:
+    """Return at most how many lines a file has, and whether the last one is ended where others are."""
+    count, last = 0, b""
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            count += block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
+            last = block[-1:]
+    return count + 1, last in (b"\n", b"\r", b"") or count < 2

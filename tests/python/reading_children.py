@@ -1,0 +1,66 @@
+"""Reading files in child processes, so that one that kills, hangs or swells its reader is seen."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+# Reads every path it is given on its standard input, one line of outcome each: what the exception was,
+# and the largest memory so far (MB).
+_CHILD = """
+import json, resource, signal, sys, warnings
+warnings.simplefilter("ignore")
+from axisight.errors import AxisightError
+from axisight.logs import parse_column_map, read_log
+import h5py, pandas, pyarrow.parquet
+
+limit, seconds = int(sys.argv[1]), int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+signal.signal(signal.SIGALRM, signal.SIG_DFL)
+for line in sys.stdin:
+    path, columns = json.loads(line)
+    signal.alarm(seconds)
+    try:
+        read_log(path, None if columns is None else parse_column_map(columns))
+        said = "read"
+    except AxisightError as error:
+        said = f"refused: {error}"
+    except BaseException as error:
+        said = f"{type(error).__name__}: {str(error)[:300]}"
+    signal.alarm(0)
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    print(json.dumps([said, used]), flush=True)
+"""
+
+
+def read_in_child(
+    paths: list[Path], columns: str | None = None, *, limit: int = 4 * 10**9, seconds: int = 20
+) -> list[tuple[str, float]]:
+    """What reading each file came to, and the child's largest memory until then (MB).
+
+    "read", "refused: ..." for an error of the package, another exception by its name, or "killed: ..."
+    by a signal: 11 where memory was violated, 14 where it took longer than `seconds`.
+    """
+    found: list[tuple[str, float]] = []
+    while len(found) < len(paths):
+        lines = "".join(f"{json.dumps([str(p), columns])}\n" for p in paths[len(found) :])
+        child = subprocess.run(
+            [sys.executable, "-c", _CHILD, str(limit), str(seconds)],
+            check=False,
+            input=lines,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            timeout=600,
+        )
+        found += [tuple(json.loads(line)) for line in child.stdout.splitlines()]
+        if len(found) < len(paths):
+            assert child.returncode, child.stderr
+            found.append((f"killed: {child.returncode} {child.stderr[-300:]}", 0.0))
+    return found
+
+
+def wrong(outcomes: list[tuple[str, float]]) -> list[str]:
+    """Outcomes that are neither a log nor an error of the package."""
+    return [said for said, _ in outcomes if said != "read" and not said.startswith("refused: ")]

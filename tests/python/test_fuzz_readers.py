@@ -1,0 +1,188 @@
+"""Damage of any kind, seeded: no reader is killed, hangs, swells, or raises what is not the package's."""
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from axisight.errors import InputError
+from axisight.logs import check_log, named_map_text, parse_column_map, read_case, read_log
+from bag_data import written_states
+from columns_data import robot, write_lerobot
+from logs_data import FORMAT_IDS, FORMATS, native_columns, write
+from reading_children import read_in_child, wrong
+
+_TIMES = 200
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """The bytes with one kind of damage: changed, taken out, put in twice, cut off, or set to extremes."""
+    spoiled = bytearray(data)
+    at = int(rng.integers(len(data)))
+    if rng.random() < 0.4:  # structure stands at the ends of most formats
+        at = int(rng.choice([at % 512, len(data) - 1 - at % 512])) % len(data)
+    long = int(rng.integers(1, 9))
+    kind = rng.integers(7)
+    if kind == 0:
+        spoiled[at] ^= 1 << int(rng.integers(8))
+    elif kind == 1:
+        spoiled[at : at + long] = rng.bytes(long)
+    elif kind == 2:
+        del spoiled[at : at + long]
+    elif kind == 3:
+        spoiled[at:at] = spoiled[at : at + 4 * long]
+    elif kind == 4:
+        del spoiled[at:]
+    elif kind == 5:  # where types stand as small numbers, another one
+        spoiled[at - at % 8] = int(rng.integers(32))
+    else:
+        spoiled[at : at + long] = rng.choice([b"\0", b"\xff", b"\x7f"]) * long
+    return bytes(spoiled)
+
+
+def batch(folder, path, rng, times=_TIMES):
+    """Files with damage, as many of the same suffix."""
+    data, paths = path.read_bytes(), []
+    for number in range(times):
+        paths.append(folder / f"{number}{path.suffix}")
+        paths[-1].write_bytes(mutated(data, rng))
+    return paths
+
+
+def sound(outcomes):
+    assert wrong(outcomes) == []
+    assert any(said.startswith("refused") for said, _ in outcomes)
+    assert max(used for _, used in outcomes) < 500
+
+
+@pytest.mark.parametrize(("name", "kind"), FORMATS, ids=FORMAT_IDS)
+def test_damaged_logs(tmp_path, name, kind):
+    rng = np.random.default_rng([8, FORMATS.index((name, kind))])
+    path = write(tmp_path / name, native_columns(120, 1, 100.0), kind)
+    sound(read_in_child(batch(tmp_path, path, rng), seconds=10, limit=3 * 10**9))
+
+
+def packed_mat(path):
+    columns = native_columns(120, 1, 100.0)
+    names = [(name, "O") for name in columns]
+    cells = np.array([columns["time_s"], "text"], dtype=object)
+    struct = np.array([tuple(columns.values())], dtype=names)
+    scipy.io.savemat(path, {"run": struct, "cells": cells}, do_compression=path.stem == "packed")
+    return path
+
+
+def packed_hdf5(path):
+    with h5py.File(path, "w") as file:
+        for name, values in native_columns(120, 1, 100.0).items():
+            file.create_dataset(
+                f"run/{name}", data=values, chunks=(60,), compression="gzip", shuffle=True
+            )
+    return path
+
+
+def packed_npz(path):
+    np.savez_compressed(path, **{f"run.{k}": v for k, v in native_columns(120, 1, 100.0).items()})
+    return path
+
+
+RUN = """
+time = { name = "run.time_s" }
+[[axis]]
+position = { name = "run.position_1", unit = "rad" }
+torque = { name = "run.torque_cmd_1", unit = "Nm" }
+"""
+PACKED = {
+    "struct.mat": packed_mat,
+    "packed.mat": packed_mat,
+    "a.h5": packed_hdf5,
+    "a.npz": packed_npz,
+}
+
+
+@pytest.mark.parametrize("name", PACKED)
+def test_damaged_logs_with_structure(tmp_path, name):
+    path = PACKED[name](tmp_path / name)
+    assert read_log(path, parse_column_map(RUN)).n_samples == 120
+    rng = np.random.default_rng([9, len(name)])
+    sound(read_in_child(batch(tmp_path, path, rng), RUN, seconds=10, limit=3 * 10**9))
+
+
+STATES = """
+time = { name = "joint_states.time_s", resample_hz = "mean" }
+[[axis]]
+position = { name = "joint_states.position.a", unit = "rad" }
+torque = { name = "joint_states.effort.a", unit = "Nm" }
+"""
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap", "rosbag2"])
+def test_damaged_recordings(tmp_path, kind):
+    time_s = np.arange(120) / 100.0
+    fields = [np.sin(time_s)[:, None]] * 3
+    good = tmp_path / ("good.bag" if kind == "bag" else "good")
+    path = written_states(good, kind, time_s, ["a"], fields)
+    rng = np.random.default_rng(10)
+    if kind == "bag":
+        paths = batch(tmp_path, path, rng)
+    else:  # a folder with a description and a file: either is damaged
+        paths, files = [], sorted(p for p in good.iterdir() if p.is_file())
+        for number in range(_TIMES):
+            paths.append(tmp_path / f"{number}")
+            paths[-1].mkdir()
+            spoiled = files[number % len(files)]
+            for file in files:
+                data = file.read_bytes()
+                data = mutated(data, rng) if file == spoiled else data
+                (paths[-1] / file.name).write_bytes(data)
+    sound(read_in_child(paths, STATES, seconds=10, limit=3 * 10**9))
+
+
+def refused_only(call, times=_TIMES):
+    """Call with numbers of damages; errors of the package are right, all others are raised."""
+    refused = 0
+    for number in range(times):
+        try:
+            call(number)
+        except InputError:
+            refused += 1
+    assert refused
+
+
+def test_damaged_maps_and_cases(tmp_path):
+    path = write(tmp_path / "a.csv", native_columns(120, 1, 100.0))
+    (tmp_path / "robot.toml").touch()
+    rng = np.random.default_rng(12)
+    maps = [RUN.replace("run.", ""), named_map_text("ur-rtde"), named_map_text("franka")]
+
+    def one_map(number):
+        text = mutated(maps[number % 3].encode(), rng).decode("utf-8", "replace")
+        check_log(path, parse_column_map(text))
+
+    refused_only(one_map)
+    case = (
+        'schema = "axisight.case/1"\nname = "c"\nrobot = "robot.toml"\n'
+        '[[log]]\nfile = "a.csv"\nrole = "estimation"\nperiod_s = 1.0\n'
+    )
+
+    def one_case(number):
+        (tmp_path / "case.toml").write_bytes(mutated(case.encode(), rng))
+        read_case(tmp_path)
+
+    refused_only(one_case)
+
+
+def test_damaged_folders_of_lerobot(tmp_path):
+    folder = write_lerobot(tmp_path / "set", 2)
+    files = [p for p in sorted(folder.rglob("*")) if p.suffix in (".json", ".parquet")]
+    good = {file: file.read_bytes() for file in files}
+    rng = np.random.default_rng(13)
+
+    def one(number):
+        spoiled = files[number % len(files)]
+        spoiled.write_bytes(mutated(good[spoiled], rng))
+        try:
+            read_log(tmp_path / "set#1", robot=robot(6))
+        finally:
+            spoiled.write_bytes(good[spoiled])
+
+    refused_only(one)
