@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from axisight.arguments import usable_path
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
@@ -130,6 +131,7 @@ def _read(
     *,
     untrusted: bool,
 ) -> Inputs:
+    paths = [usable_path(path, InputError) for path in paths]
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
