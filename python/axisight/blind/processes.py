@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from axisight.workers import each_done
+from axisight.cluster.workers import each_done
 
 Progress = Callable[[str, int, int], None]
 A = TypeVar("A")

@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 from typing import Any
 
-from axisight import stopping
+from axisight.cli import stopping
 
 __all__ = ["app", "main"]
 

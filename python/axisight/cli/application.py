@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from axisight.stopping import exit_status
+from axisight.cli.stopping import exit_status
 
 # Commands, where each lives, and the first line of its help: without it the list of commands would
 # have to load them all, with the libraries of all.

@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from axisight.cli.stopping import exit_status
 from axisight.errors import AxisightError, InputError, OutputError
-from axisight.stopping import exit_status
 from axisight.storage import check_target
 
 OUT = Console()

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from axisight.cli.common import OUT, say
 from axisight.gap import Diagnosis, Gap, Interval, Where
-from axisight.gap.headline import in_order
+from axisight.gap.headline import in_order, percent
 from axisight.report.limits import limit_table
 
 _RANKED = 8
@@ -53,7 +53,8 @@ def _place(where: Where) -> str:
 
 
 def _percent(x: float) -> str:
-    return f"{100 * x:.3g} %"
+    # Narrow: a table of 80 columns has five of them.
+    return percent(x).replace("more than", ">").replace("no share", "-")
 
 
 def _causes(found: Diagnosis) -> Table:

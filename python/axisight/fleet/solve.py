@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from axisight.cluster import on_cluster
+from axisight.cluster.workers import each_done
 from axisight.errors import AxisightError
 from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
 from axisight.gap import Settings, diagnose
 from axisight.storage import write_whole
-from axisight.workers import each_done
 
 Progress = Callable[[str, int, int], None]
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from axisight.effects import Effect, article, noun, phrase
 from axisight.effects.stated import STEPS
+from axisight.gap.beyond import LARGEST
 from axisight.gap.result import Cause, Gap, Where
 from axisight.gap.verdict import Conclusion
 
@@ -120,5 +122,7 @@ def _listed(items: Sequence[str]) -> str:
 
 
 def percent(x: float) -> str:
-    """Return a share in per cent, three digits."""
-    return f"{100 * x:.3g} %"
+    """Return a share in per cent, three digits; what is no share any more is not told as one."""
+    if not math.isfinite(x):
+        return "no share"
+    return f"{100 * x:.3g} %" if x <= LARGEST else f"more than {100 * LARGEST:,.0f} %"

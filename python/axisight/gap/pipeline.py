@@ -17,6 +17,7 @@ from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import own_simulator
+from axisight.gap.beyond import beyond_torque
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over
 from axisight.gap.chatter import chance_check, with_chance
@@ -429,6 +430,7 @@ def _assemble(
         findings=(
             *noted,
             *refit_worse(reach.stages, names),
+            *beyond_torque(gap, held_logs),
             *parameters_at_edge(fitted, nominal, tolerances),
         ),
         settings=settings.as_dict(robot),

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import title
+from axisight.gap.beyond import LARGEST
 from axisight.gap.result import Candidate, Cause, Diagnosis, Interval, Where
 
 Floats = NDArray[np.float64]
@@ -72,6 +73,8 @@ def percent(value: float, digits: int = 2) -> str:
     """A ratio in per cent: ``0.3142`` as ``31 %``, ``0.0123`` as ``1.2 %``."""
     if not math.isfinite(value):
         return _not_finite(value)
+    if value > LARGEST:
+        return f"> {100 * LARGEST:,.0f} %"
     scaled = 100.0 * value
     if scaled == 0:
         return "0 %"
