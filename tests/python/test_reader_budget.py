@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,7 +10,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
+from axisight.cli import app
 from axisight.errors import InputError, LogError
 from axisight.logs import check_log, parse_column_map, read_log
 from logs_data import native_columns, write
@@ -239,3 +242,13 @@ def test_a_log_as_large_as_it_looks_is_read(tmp_path):
     frame.to_parquet(tmp_path / "a.parquet", compression="zstd")
     assert (tmp_path / "a.parquet").stat().st_size < 8 * n
     assert read_log(tmp_path / "a.parquet").n_samples == n
+
+
+def test_the_command_line_has_the_limit_too(tmp_path: Path) -> None:
+    """What a small file may not take, a stated limit allows, and the other way round."""
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{0.01 * k},{k % 7},{k % 5}" for k in range(400))
+    path.write_text(f"time_s,torque_cmd_1,position_1\n{rows}\n")
+    for limit, refused in (("1000000", False), ("1000", True)):
+        out = CliRunner().invoke(app, ["check", str(path), "--max-bytes", limit])
+        assert ("--max-bytes" in out.output) == refused

@@ -38,6 +38,14 @@ Columns = Annotated[
 ]
 
 
+MaxBytes = Annotated[
+    int | None,
+    typer.Option(
+        help="Most memory that reading one log may take, in bytes. Default: by the size of its files."
+    ),
+]
+
+
 Untrusted = Annotated[
     bool,
     typer.Option(

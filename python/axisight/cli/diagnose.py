@@ -13,7 +13,17 @@ import typer
 
 import axisight
 from axisight import report as pages
-from axisight.cli.common import Columns, From, To, Untrusted, bars, errors, say, write_each
+from axisight.cli.common import (
+    Columns,
+    From,
+    MaxBytes,
+    To,
+    Untrusted,
+    bars,
+    errors,
+    say,
+    write_each,
+)
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
@@ -114,6 +124,7 @@ def diagnose_command(
         ),
     ] = None,
     untrusted: Untrusted = False,
+    max_bytes: MaxBytes = None,
     start_s: From = 0.0,
     stop_s: To = None,
     fleet: Annotated[
@@ -147,6 +158,7 @@ def diagnose_command(
             "--signals": signals,
             "--simulated": simulated,
             "--untrusted": untrusted,
+            "--max-bytes": max_bytes,
             "--from": start_s,
             "--to": stop_s,
         }
@@ -171,6 +183,7 @@ def diagnose_command(
             part,
             simulated or [],
             untrusted=untrusted,
+            max_bytes=max_bytes,
         )
         targets = {
             "--json": json,

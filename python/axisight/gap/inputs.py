@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -52,20 +53,22 @@ def read_inputs(
     simulated: Sequence[Path] = (),
     *,
     untrusted: bool = False,
+    max_bytes: int | None = None,
 ) -> Inputs:
     """Read a case folder, or logs with a model, which ``load`` turns into a robot.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
     ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator;
-    ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`. Raises InputError when nothing is
-    left to hold out, the model is missing, or the part cannot be used.
+    ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`; ``max_bytes`` as in `read_log`.
+    Raises InputError when nothing is left to hold out, the model is missing, or the part cannot be used.
     """
+    paths = [usable_path(path, InputError) for path in paths]
     for path in (*paths, *validation, *simulated) if untrusted else ():
         if not path.is_dir() or is_folder_log(path):
             check_log_inside(path)
-    read = _read(paths, model, validation, columns, load, untrusted=untrusted)
-    own = tuple(read_log(p, columns, robot=read.robot) for p in simulated)
-    read = replace(read, simulated=own)
+    read = _read(paths, model, validation, columns, load, untrusted, max_bytes)
+    sims = [read_log(p, columns, robot=read.robot, max_bytes=max_bytes) for p in simulated]
+    read = replace(read, simulated=tuple(sims))
     if part == (0.0, None):
         return read
     logs = (*read.estimation, *read.validation)
@@ -128,19 +131,18 @@ def _read(
     validation: Sequence[Path],
     columns: Path | None,
     load: Callable[..., Robot],
-    *,
     untrusted: bool,
+    max_bytes: int | None,
 ) -> Inputs:
-    paths = [usable_path(path, InputError) for path in paths]
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
-        case = read_case(paths[0], columns, untrusted=untrusted)
+        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
-        extra = tuple(read_log(p, columns, robot=robot) for p in validation)
+        extra = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in validation]
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         raise InputError(
@@ -148,8 +150,8 @@ def _read(
         )
     # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
     robot = load_robot(model) if is_model_file(model) else load(model)
-    logs = [read_log(p, columns, robot=robot) for p in paths]
-    held = [read_log(p, columns, robot=robot) for p in validation]
+    read = partial(read_log, columns=columns, robot=robot, max_bytes=max_bytes)
+    logs, held = [read(p) for p in paths], [read(p) for p in validation]
     if is_model_file(model):
         robot = _loaded(load, model, [*logs, *held])
     if not held:

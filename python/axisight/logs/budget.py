@@ -43,7 +43,7 @@ class Budget:
         if taken > self.limit:
             raise LogError(
                 f"expected at most {_megabytes(self.limit)} MB to be needed for a log of this size, got "
-                f"{_megabytes(taken)} MB by what the file declares; read_log(..., max_bytes=...) raises "
+                f"{_megabytes(taken)} MB by what the file declares; max_bytes (--max-bytes) raises "
                 f"the limit"
             )
         self._taken = taken

@@ -158,7 +158,7 @@ def _resample(
     if n_samples > most_samples:
         message = (
             f"expected at most {most_samples} samples from a log of this size, got {span:g} s at "
-            f"{resample_hz:g} Hz; read_log(..., max_bytes=...) raises the limit"
+            f"{resample_hz:g} Hz; max_bytes (--max-bytes) raises the limit"
         )
         grid.error("resample_hz", message, "sample_time_differs")
         return
