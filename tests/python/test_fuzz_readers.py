@@ -1,5 +1,7 @@
 """Damage of any kind, seeded: no reader is killed, hangs, swells, or raises what is not the package's."""
 
+import os
+
 import h5py
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ from columns_data import robot, write_lerobot
 from logs_data import FORMAT_IDS, FORMATS, native_columns, write
 from reading_children import read_in_child, wrong
 
-_TIMES = 200
+# Of each format; `make fuzz` asks for more.
+_TIMES = int(os.environ.get("AXISIGHT_FUZZ", "200"))
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:

@@ -10,8 +10,8 @@ use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
 use crate::robot::MOST_JOINTS;
 use crate::robot::description::{
-    Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, Stepped, check_unit,
-    is_positive_definite,
+    Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, Stepped,
+    check_unit, is_positive_definite,
 };
 use std::sync::Arc;
 use toml::de::DeTable;
