@@ -40,6 +40,9 @@ const TOKENS: [&str; 20] = [
 /// The text with a piece taken out, put in twice, exchanged for a token, or cut off.
 fn damaged(text: &str, rng: &mut StdRng) -> String {
     let characters: Vec<char> = text.chars().collect();
+    if characters.is_empty() {
+        return String::new();
+    }
     let at = rng.random_range(0..characters.len());
     let end = (at + rng.random_range(1..40)).min(characters.len());
     let (before, piece, after) = (&characters[..at], &characters[at..end], &characters[end..]);
