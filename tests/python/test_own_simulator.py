@@ -160,7 +160,24 @@ def table(path: Path, log: Log) -> Path:
 
 
 def test_targets_have_an_own_simulator_too(tmp_path: Path) -> None:
-    """The logs of MuJoCo that the model was read from: it takes another step, a lag that shows where no gap is."""
+    """Damping that the model file lacks, and their simulator has, is none of the machine's causes."""
+    pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
+    damped = SERVOS["viscous_friction@3"]
+    machine = damped.with_changed("dry_friction", 2, 2.5)
+    logs = [machine.log(run) for run in (1, 2, 3)]
+    own = [damped.log(run, noise_rad=0.0) for run in (1, 2, 3)]
+    found = diagnose(
+        robot=simulator(tmp_path), estimation=logs[:2], validation=logs[2:], simulated=own
+    )
+    assert found.simulator is not None
+    assert found.simulator.taken_off
+    assert 2 in differs(found.simulator)
+    assert found.verdict == "explained"
+    assert [c.label for c in found.causes] == ["coulomb_friction@2"]
+
+
+def test_the_model_of_an_mjcf_is_its_simulator(tmp_path: Path) -> None:
+    """To half a per cent of the torque that its errors are: below the noise of any encoder."""
     pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
     logs = [SERVOS["coulomb_friction@2"].log(run) for run in (1, 2, 3)]
     own = [NOMINAL.log(run, noise_rad=0.0) for run in (1, 2, 3)]
@@ -168,7 +185,6 @@ def test_targets_have_an_own_simulator_too(tmp_path: Path) -> None:
         robot=simulator(tmp_path), estimation=logs[:2], validation=logs[2:], simulated=own
     )
     assert found.simulator is not None
-    assert not found.simulator.taken_off
-    assert found.simulator.per_axis.max() < 0.05
-    assert 1 not in differs(found.simulator)
-    assert found.causes[0].label == "coulomb_friction@2"
+    assert found.simulator.per_axis.max() < 0.005
+    assert not noted(found.simulator)
+    assert [c.label for c in found.causes] == ["coulomb_friction@2"]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
-from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.faults import Finding
 from axisight.gap.result import Reproduction
 from axisight.gap.settings import Settings
@@ -106,21 +105,47 @@ def _paired(log: Log, own: Log) -> Log:
     return replace(own, **given, sample_time_s=log.sample_time_s, start_rad=log.start_rad)
 
 
+@dataclass(frozen=True)
+class Difference:
+    """What the user's simulator is off the model along each log: torques [Nm] and positions [rad], (n, n_axes)."""
+
+    torques_nm: tuple[Array, ...]
+    positions_rad: tuple[Array, ...]
+
+    def off(self, logs: Sequence[Log]) -> list[Log]:
+        """Return logs with it taken off: what is left to the model is the gap of the user's simulator.
+
+        To first order of the difference, for the loop of the machine answers to both.
+        """
+        each = zip(logs, self.torques_nm, self.positions_rad, strict=True)
+        return [
+            replace(log, torque_nm=log.torque_nm - u, position_rad=log.position_rad - x)
+            for log, u, x in each
+        ]
+
+
+def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:
+    """Return what ``simulated`` logs are off the model of ``view``, in closed loop."""
+    ours = view.torques(AS_GIVEN, simulated)
+    moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
+    return Difference(
+        tuple(view.measured(own) - torque for own, torque in zip(simulated, ours, strict=True)),
+        tuple(own.position_rad - x for own, x in zip(simulated, moved, strict=True)),
+    )
+
+
 def reproduction(
     view: View, logs: Sequence[Log], simulated: Sequence[Log], settings: Settings
-) -> tuple[Reproduction, list[Log]]:
-    """Return how far the model of ``view`` reproduces ``simulated``, and the logs to diagnose.
+) -> Reproduction:
+    """Return how far the model of ``view`` reproduces ``simulated``.
 
-    In closed loop these are ``logs`` with the differences taken off their torques and positions: what is
-    left to the model is then the gap of the user's simulator, to first order of the difference. By
-    inverse dynamics the two go other ways, and with targets nothing but positions is compared: logs stay
-    as they are.
+    In closed loop the difference can be taken off the logs; by inverse dynamics the two go other ways.
     """
     theirs = [view.measured(own) for own in simulated]
     ours = view.torques(AS_GIVEN, simulated)
     differences = [their - our for their, our in zip(theirs, ours, strict=True)]
     real = [view.measured(log) for log in logs]
-    taken_off = isinstance(view, ClosedLoopView)
+    taken_off = view.mode == "closed_loop"
     model = theirs if taken_off else view.torques(AS_GIVEN, logs)
     errors = [a - b for a, b in zip(real, model, strict=True)]
     about_mean = [their - their.mean(axis=0) for their in theirs]
@@ -128,24 +153,12 @@ def reproduction(
     items = [ErrorLog(*each) for each in zip(logs, differences, noises, strict=True)]
     bands = band_map(items, settings.block_s)
     regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
-    found = Reproduction(
+    return Reproduction(
         _rms(differences) / np.maximum(_rms(about_mean), 1e-300),
         _rms(differences) / np.maximum(_rms(errors), 1e-300),
         taken_off,
         findings(bands, regimes, settings.significance),
     )
-    if not taken_off:
-        return found, list(logs)
-    moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
-    each = zip(logs, simulated, differences, moved, strict=True)
-    return found, [
-        replace(
-            log,
-            torque_nm=log.torque_nm - torque,
-            position_rad=log.position_rad - (own.position_rad - position),
-        )
-        for log, own, torque, position in each
-    ]
 
 
 def _rms(parts: Sequence[Array]) -> Array:

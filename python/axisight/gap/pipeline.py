@@ -163,17 +163,25 @@ class _Inputs:
     def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> _Inputs:
         """Return the same against the user's own simulator, by its logs."""
         logs, n = [*self.estimation, *self.validation], len(self.estimation)
-        if self.commanded is None:
+        commanded = self.commanded
+        if commanded is None:
             beside = own_simulator.paired(logs, simulated)
         else:
-            as_logged = own_simulator.paired(self.commanded.as_logged(), simulated)
-            beside = self.commanded.commanded(as_logged)
-        found, left = own_simulator.reproduction(view, logs, beside, settings)
+            as_logged = own_simulator.paired(commanded.as_logged(), simulated)
+            beside = commanded.commanded(as_logged)
+        found = own_simulator.reproduction(view, logs, beside, settings)
+        if found.taken_off:
+            logs = own_simulator.difference(view, beside, settings).off(logs)
+        if commanded is not None:
+            # What the controller commands follows from the positions that are left.
+            commanded = commanded.along(logs)
+            logs = list(commanded.logs)
         return replace(
             self,
-            estimation=left[:n],
-            validation=left[n:],
+            estimation=logs[:n],
+            validation=logs[n:],
             noted=(*self.noted, *own_simulator.noted(found)),
+            commanded=commanded,
             simulator=found,
         )
 

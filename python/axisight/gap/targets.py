@@ -50,6 +50,15 @@ class Commanded:
         """Return other logs of the logs' own rate as these are."""
         return [_commanded(self.robot, log, self.step) for log in logs]
 
+    def along(self, logs: Sequence[Log]) -> Commanded:
+        """Return the same along the positions of other logs at the controller's rate, where they were logged."""
+        told = []
+        for log, other in zip(self.logs, logs, strict=True):
+            position = self.fine(other.position_rad[:: self.step])
+            torque = log.torque_nm + self.of_error(position - log.position_rad)
+            told.append(replace(log, position_rad=position, torque_nm=torque))
+        return replace(self, logs=tuple(told))
+
     def fine(self, values: Array) -> Array:
         """Return samples (n, n_axes) of the logs' rate at that of the controller, as positions are."""
         return between(values, self.step)
