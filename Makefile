@@ -8,6 +8,7 @@
 #   make format  rewrite the sources in the format that lint asks for
 #   make docs    regenerate the generated pages
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
+#   make crash   studies killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
 #   make bench   criterion benches, then side-by-side runs against other libraries
 #   make clean   remove everything that was built
 
@@ -15,6 +16,7 @@ PYTHON ?= python3.11
 VENV ?= .venv
 CARGO ?= cargo
 FUZZ ?= 10000
+KILLS ?= 100
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 BIN := $(VENV)/bin
@@ -36,7 +38,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs fuzz bench clean force
+.PHONY: setup demo test test-rust test-python lint format docs fuzz crash bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -76,6 +78,9 @@ docs: $(STAMPS)/installed
 fuzz: $(STAMPS)/test-tools
 	AXISIGHT_FUZZ=$(FUZZ) $(CARGO) test --release --locked -p axisight-tests --test damaged_robots
 	AXISIGHT_FUZZ=$(FUZZ) $(BIN)/python -m pytest -q tests/python/test_fuzz_readers.py
+
+crash: $(STAMPS)/test-tools
+	$(BIN)/python tests/python/crash_trial.py $(KILLS)
 
 bench: $(STAMPS)/bench-tools
 	$(CARGO) bench --locked -p axisight-benches
