@@ -25,6 +25,8 @@ _SEEN = 0.03
 # Causes have to remove this share of the explainable squared gap of validation logs: less than half
 # of its amplitude is left then. One of two equal causes does not.
 _ENOUGH = 0.8
+# Share of what stands above the floor that a cause of the size of noise has to remove.
+_HALF = 0.5
 # Noise cannot be this much larger than a gap that contains it.
 _ABSURD = 1.25
 
@@ -40,7 +42,8 @@ def carried_over(
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
-    A cause whose addition does not shrink the validation gap is withdrawn; so is *none* where a
+    A cause whose addition does not shrink the validation gap is withdrawn; where nothing stands above the
+    floor there, and hardly anything on the estimation logs, it is none. *None* is withdrawn where a
     log stands above the floor; and nothing is said where the noise estimated from the logs is
     larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
@@ -56,6 +59,8 @@ def carried_over(
     elif own is not None:
         # Another motion may leave more of what nothing explains, and ask as much of the causes.
         withdrawn = _no_fall_there(own, stages, names)
+    elif conclusion.causes and _of_no_size(conclusion, stages):
+        return _nothing(conclusion)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings) or _out_of_shape(bent)
     elif conclusion.verdict == "none":
@@ -73,6 +78,42 @@ def carried_over(
             "range)? Record more of it for estimation."
         ),
         withdrawn=withdrawn,
+    )
+
+
+def _of_no_size(conclusion: Conclusion, stages: Stages) -> bool:
+    """Whether causes explain what the simulator leaves anyway: no log stands above what passes for the floor.
+
+    Half of what there is of them on the validation logs would do to let them stand.
+    """
+    small = all(a.excess <= _FACTOR**2 - 1.0 for a in conclusion.axes)
+    if not small or np.any(above_floor(stages.refitted, stages.floor) > 0):
+        return False
+    places = {c.axis for c in conclusion.causes}
+    axes = [a.axis - 1 for a in conclusion.axes if None in places or a.axis in places]
+    before, left, floor = (
+        float(_squares(s)[:, axes].mean()) for s in (stages.refitted, stages.after, stages.floor)
+    )
+    return before - left < _HALF * (before - floor) or before <= floor
+
+
+def _nothing(conclusion: Conclusion) -> Conclusion:
+    """Return *none* in the place of causes of no size; a check says which they were."""
+    names = ", ".join(
+        c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in conclusion.causes
+    )
+    return replace(
+        conclusion,
+        verdict="none",
+        causes=(),
+        equivalent=(),
+        next_experiment=None,
+        axes=tuple(replace(a, causes=(), verdict="none") for a in conclusion.axes),
+        checks=(
+            *conclusion.checks,
+            f"{names} explains a little of the estimation logs, where the simulator leaves next to what noise "
+            "does, and nothing of the validation logs: no cause.",
+        ),
     )
 
 
