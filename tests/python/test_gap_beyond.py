@@ -10,6 +10,8 @@ import pytest
 from axisight.cli.show import _percent
 from axisight.gap.beyond import beyond_torque
 from axisight.gap.headline import percent
+from axisight.gap.remainder import reversals_smeared
+from axisight.gap.result import Remainder, Where
 from axisight.report import wording
 from diagnosis_data import gap
 from gap_data import bare_axis, log_of, reference
@@ -50,3 +52,17 @@ def test_the_reason_is_looked_for_in_the_torque() -> None:
     broke_off = replace(wide, before_per_axis=np.array([np.nan]))
     assert "broke off" in beyond_torque(broke_off, [good])[0].message
     assert beyond_torque(gap(0.5, 0.4, 0.3, 0.1, 1), [good]) == ()
+
+
+def test_what_a_low_pass_smears_is_told_with_a_better_one() -> None:
+    place = Where(2, 0.9, (2.0, 6.0), None, "")
+    slow = replace(place, regime="speed: slow")
+    left = Remainder(0.1, np.array([0.0, 0.1]), (place,))
+    (finding,) = reversals_smeared(left, (slow,), 3.5)
+    assert (finding.name, finding.axis) == ("reversals_smeared", 2)
+    assert "try --cutoff-hz 7" in finding.message
+    # Elsewhere, in closed loop, and where nothing remains there is nothing to smear.
+    assert reversals_smeared(left, (replace(slow, regime="speed: fast"),), 3.5) == ()
+    assert reversals_smeared(left, (replace(slow, axis=1),), 3.5) == ()
+    assert reversals_smeared(left, (slow,), None) == ()
+    assert reversals_smeared(Remainder(0.0, np.zeros(2)), (slow,), 3.5) == ()

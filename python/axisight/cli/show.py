@@ -9,6 +9,7 @@ from rich.table import Table
 from axisight.cli.common import OUT, say
 from axisight.gap import Diagnosis, Gap, Interval, Where
 from axisight.gap.headline import in_order, percent
+from axisight.gap.own_simulator import said
 from axisight.report.limits import limit_table
 
 _RANKED = 8
@@ -22,6 +23,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     if found.causes:
         OUT.print(_causes(found))
     OUT.print(_gaps(found))
+    _show_comparison(found)
     _show_places(found)
     for finding in found.findings:
         say(f"finding: {finding}")
@@ -34,6 +36,15 @@ def show_diagnosis(found: Diagnosis) -> None:
     # What could be there all the same is the other half of finding nothing.
     if found.verdict == "none" and found.detection_limits:
         OUT.print(_limits(found))
+
+
+def _show_comparison(found: Diagnosis) -> None:
+    """Say what the figures rest on, where it was chosen here or is not the robot file alone."""
+    cutoff_hz = found.provenance.get("cutoff_hz")
+    if cutoff_hz is not None:
+        say(f"compared: by inverse dynamics, below {cutoff_hz:.3g} Hz (--cutoff-hz)")
+    if found.simulator is not None:
+        say(said(found.simulator))
 
 
 def _show_places(found: Diagnosis) -> None:

@@ -33,7 +33,7 @@ from axisight.gap.modes import view_of
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
-from axisight.gap.remainder import refit_worse, remainder_of
+from axisight.gap.remainder import refit_worse, remainder_of, reversals_smeared
 from axisight.gap.result import Cause, Diagnosis, Interval, Overlay, Reproduction
 from axisight.gap.search import Search, search
 from axisight.gap.separate.design import separating_experiment_of
@@ -396,6 +396,7 @@ def _assemble(
     names = [log.name for log in held_logs]
     nominal, tolerances = robot_parameters(robot), view.fitter.tolerances
     share = bent_for(view.fitter, found)
+    left = remainder_of(reach.judged, judged, reach.left, settings)
     conclusion = carried_over(conclusion, reach.judged, judged, names, settings, own, share)
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(
@@ -433,12 +434,13 @@ def _assemble(
         axes=conclusion.axes,
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
-        remainder=remainder_of(reach.judged, judged, reach.left, settings),
+        remainder=left,
         detection_limits=detection_limits(found, view),
         findings=(
             *noted,
             *refit_worse(reach.stages, names),
             *beyond_torque(gap, held_logs),
+            *reversals_smeared(left, places, view.cutoff_hz),
             *parameters_at_edge(fitted, nominal, tolerances),
         ),
         settings=settings.as_dict(robot),

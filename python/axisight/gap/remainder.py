@@ -10,9 +10,9 @@ from axisight.gap.carried import above_floor
 from axisight.gap.faults import Finding
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stages
-from axisight.gap.result import Gap, Remainder
+from axisight.gap.result import Gap, Remainder, Where
 from axisight.gap.settings import Settings
-from axisight.gap.where import ErrorLog, band_map, placed, regime_maps
+from axisight.gap.where import AT_REVERSALS, ErrorLog, band_map, placed, regime_maps
 
 # A squared gap may rise by so much of what stands above noise through scatter of the logs.
 _WORSE = 0.2
@@ -45,6 +45,32 @@ def remainder_of(
     regime = where[0].regime
     return Remainder(
         total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
+    )
+
+
+def reversals_smeared(
+    left: Remainder | None, places: Sequence[Where], cutoff_hz: float | None
+) -> tuple[Finding, ...]:
+    """Return a finding for axes where what remains lies around reversals, which a low-pass smears.
+
+    Of a torque that jumps there a low-pass of ``cutoff_hz`` leaves a slope of half a period, as wide as
+    laws of friction differ; without one (closed loop) there is none. ``places``: of the whole gap, whose
+    more logs tell the regime where the remainder's do not.
+    """
+    if left is None or cutoff_hz is None:
+        return ()
+    slow = {w.axis for w in (*left.where, *places) if w.regime in AT_REVERSALS}
+    return tuple(
+        Finding(
+            "reversals_smeared",
+            "flag",
+            f"axis {axis}: what remains lies around reversals, where the low-pass of {cutoff_hz:.3g} Hz "
+            f"smears dry friction: try --cutoff-hz {2 * cutoff_hz:.3g}, before something unknown is looked for",
+            None,
+            axis,
+            "cutoff_hz",
+        )
+        for axis in sorted({w.axis for w in left.where} & slow)
     )
 
 

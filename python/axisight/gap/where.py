@@ -86,6 +86,9 @@ def regime_maps(
     return maps
 
 
+AT_REVERSALS = ("direction: around reversals", "speed: slow", "speed: standstill")
+"""Regimes of what lies where the sign of speed changes."""
+
 _REGIMES: dict[str, list[str]] = {
     "speed": ["standstill", "slow", "medium", "fast"],
     "direction": ["backward", "around reversals", "forward"],

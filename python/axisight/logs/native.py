@@ -39,7 +39,8 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
         listed = ", ".join(map(short, sorted(present)[:8])) or "nothing"
         raise LogError(
             f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1, "
-            f"... or a column map, got {listed}"
+            f"... or a column map, got {listed} ({len(present)} columns); `axisight columns guess LOG "
+            "--robot MODEL -o columns.toml` proposes a map for --columns"
         )
     highest = max(numbers)
     if highest > len(numbers):
