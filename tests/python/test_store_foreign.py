@@ -110,7 +110,7 @@ def test_a_group_of_the_older_format_is_not_read(store):
 )
 def test_a_root_that_is_none(store, text):
     (store.root / "zarr.json").write_text(text)
-    with pytest.raises(StoreError, match=r"study\.zarr: expected a store of a study") as caught:
+    with pytest.raises(StoreError, match=r"zarr\.json: .*damaged file .*put back") as caught:
         store.provenance()
     assert len(str(caught.value)) < 1000
 
@@ -126,6 +126,6 @@ def test_a_root_that_is_none(store, text):
 )
 def test_provenance_that_is_none(store, attributes):
     describe(store.root, attributes=attributes)
-    with pytest.raises(StudyError, match=r"study\.zarr: ") as caught:
+    with pytest.raises((StudyError, StoreError), match=r"study\.zarr") as caught:
         check_same(store, "{}", 1)
     assert len(str(caught.value)) < 1000
