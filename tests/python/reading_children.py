@@ -29,7 +29,9 @@ for line in sys.stdin:
     except BaseException as error:
         said = f"{type(error).__name__}: {str(error)[:300]}"
     signal.alarm(0)
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    # Not `ru_maxrss`, which begins at the size of the process that this one was forked from.
+    with open("/proc/self/status") as status:
+        used = next(int(line.split()[1]) for line in status if line.startswith("VmHWM")) / 1000
     print(json.dumps([said, used]), flush=True)
 """
 
