@@ -78,15 +78,16 @@ def test_causes_that_leave_the_gap_are_withdrawn(after: float, words: str):
 def test_causes_of_no_size_that_hold_nowhere_are_none():
     """A tenth above the noise where they were found, and no more than noise where they were not."""
     small = replace(named(), axes=(AxisVerdict(1, "explained", 0.1, 0.9, (0,)),))
-    found = judged(small, stages(0.051, 0.0509))
+    found = judged(small, stages(0.051, 0.0509), removed=0.1)
     assert (found.verdict, found.causes, found.withdrawn) == ("none", (), None)
     assert all(a.verdict == "none" and a.causes == () for a in found.axes)
     assert "coulomb_friction@1 explains a little" in found.checks[-1]
-    # What removes most of what there is stands, and so does what is large where it was found.
-    assert judged(small, stages(0.055, 0.0502)).verdict == "explained"
-    assert judged(named(), stages(0.051, 0.0509)).verdict == "explained"
+    # What removes most of what there is stands, what is large where it was found, and what nothing tells.
+    assert judged(small, stages(0.051, 0.0509), removed=0.6) == small
+    assert judged(named(), stages(0.051, 0.0509), removed=0.1) == named()
+    assert judged(small, stages(0.051, 0.0509)) == small
     # What leaves a log above the floor is judged as ever.
-    assert judged(small, stages(0.5, 0.45)).verdict == "unknown"
+    assert judged(small, stages(0.5, 0.45), removed=0.1).verdict == "unknown"
 
 
 def test_causes_that_leave_more_than_the_refit_alone_are_withdrawn():

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.errors import InputError
 from axisight.fitting import Weighting
 from axisight.gap.closed_loop import ClosedLoopFitter, Record
 from axisight.gap.feedback import controller_response, loop_responses
 from axisight.gap.noise import Floor, position_noise_std, torque_density
+from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import simulated_positions
 from axisight.gap.targets import Commanded
@@ -42,6 +44,7 @@ class TargetsView(View):
     """Simulator and machine driven by the same targets, positions compared."""
 
     by_targets = True
+    fitter: TargetsFitter
 
     def __init__(self, commanded: Commanded, logs: list[Log], settings: Settings) -> None:
         self._commanded = commanded
@@ -64,6 +67,17 @@ class TargetsView(View):
         of, step = self._commanded, self._commanded.step
         positions = simulated_positions(of.robot, AS_GIVEN, logs, threads=settings.threads)
         return [x - of.fine(x[::step]) for x in positions]
+
+    def removed_there(self, found: Search, logs: Sequence[Log]) -> float | None:
+        """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove."""
+        there = self.fitter.along(_records(logs, self._between_samples(logs, self.settings)))
+        try:
+            before = there.loss([], found.baseline)
+            left = there.loss(found.model.free, found.model)
+        except InputError:
+            return None
+        above = before - float(there.counted_by_axis() @ self.floor.expected)
+        return (before - left) / above if above > 0 else 0.0
 
     def _floor(self, robot: Robot, logs: list[Log], settings: Settings) -> Floor:
         """Return the floor: noise of the sensors as the gains take it, and errors of formulas.

@@ -39,6 +39,7 @@ def carried_over(
     settings: Settings,
     own: OwnAxes | None = None,
     bent: float = 0.0,
+    removed: float | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -47,7 +48,8 @@ def carried_over(
     log stands above the floor; and nothing is said where the noise estimated from the logs is
     larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
-    of their tolerance, where that counts.
+    of their tolerance, where that counts. ``removed``: share of what weighted residuals of the validation
+    logs have above noise that the causes remove; None where it is not known.
     """
     withdrawn = None
     if gap.floor > _ABSURD * gap.refitted:
@@ -59,7 +61,7 @@ def carried_over(
     elif own is not None:
         # Another motion may leave more of what nothing explains, and ask as much of the causes.
         withdrawn = _no_fall_there(own, stages, names)
-    elif conclusion.causes and _of_no_size(conclusion, stages):
+    elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings) or _out_of_shape(bent)
@@ -81,20 +83,13 @@ def carried_over(
     )
 
 
-def _of_no_size(conclusion: Conclusion, stages: Stages) -> bool:
+def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:
     """Whether causes explain what the simulator leaves anyway: no log stands above what passes for the floor.
 
     Half of what there is of them on the validation logs would do to let them stand.
     """
     small = all(a.excess <= _FACTOR**2 - 1.0 for a in conclusion.axes)
-    if not small or np.any(above_floor(stages.refitted, stages.floor) > 0):
-        return False
-    places = {c.axis for c in conclusion.causes}
-    axes = [a.axis - 1 for a in conclusion.axes if None in places or a.axis in places]
-    before, left, floor = (
-        float(_squares(s)[:, axes].mean()) for s in (stages.refitted, stages.after, stages.floor)
-    )
-    return before - left < _HALF * (before - floor) or before <= floor
+    return small and removed < _HALF and not np.any(above_floor(stages.refitted, stages.floor) > 0)
 
 
 def _nothing(conclusion: Conclusion) -> Conclusion:

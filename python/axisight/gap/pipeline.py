@@ -397,7 +397,10 @@ def _assemble(
     nominal, tolerances = robot_parameters(robot), view.fitter.tolerances
     share = bent_for(view.fitter, found)
     left = remainder_of(reach.judged, judged, reach.left, settings)
-    conclusion = carried_over(conclusion, reach.judged, judged, names, settings, own, share)
+    removed = view.removed_there(found, held_logs) if conclusion.causes else None
+    conclusion = carried_over(
+        conclusion, reach.judged, judged, names, settings, own, share, removed
+    )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(
         conclusion,

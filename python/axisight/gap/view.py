@@ -123,6 +123,14 @@ class View(ABC):
         """Return the same of the noise that the robot file states, whatever the logs have."""
         return self.noises(logs, first_run)
 
+    def removed_there(self, found: Search, logs: Sequence[Log]) -> float | None:
+        """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove.
+
+        None where it is not known: plain torques say little of what is small and slow.
+        """
+        del found, logs
+        return None
+
     def followed(self, found: Search, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that causes remove on ``logs`` that they are kept on.
 
