@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from axisight import Effect, Log, Robot, diagnose, load_robot, read_log, simulate
-from axisight.errors import InputError, LogError
+from axisight.errors import InputError, LogError, RobotError
 from axisight.gap.simulated import simulated_positions
 from axisight.gap.targets import _earlier, between, with_commands
 from axisight.gap.torques import AS_GIVEN
@@ -229,3 +229,21 @@ def test_logs_are_read_without_torque_where_they_have_targets(tmp_path: Path) ->
     pd.DataFrame(table).to_parquet(path)
     with pytest.raises(LogError, match="position_ref_2"):
         read_log(path)
+
+
+def test_steps_are_stated_whole(tmp_path: Path) -> None:
+    text = simulator(tmp_path).toml
+    for key in ("step", "step_inertia"):
+        path = tmp_path / f"without_{key}.toml"
+        path.write_text(re.sub(rf"^{key} = .*\n", "", text, flags=re.MULTILINE))
+        with pytest.raises(RobotError, match=rf"{key}: expected"):
+            load_robot(path)
+
+
+def test_inertia_that_steps_take_and_no_motor_has_is_told(tmp_path: Path) -> None:
+    """Explicit gains of speed at 2 ms take 0.117 kg m^2 from the first motor, here of 0.05."""
+    arm = replace(NOMINAL, step_s=0.002, integrator="Euler").with_changed("armature", 1, 0.05)
+    found = with_commands(simulator(tmp_path, arm), [arm.log(1)])
+    assert found is not None
+    assert found.short_of_inertia == (1,)
+    assert found.robot.parameters()["j1.motor_inertia"] == 0.0

@@ -22,7 +22,6 @@ from axisight.storage import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
 _KEY = b"axisight.excitation"
-_DAMAGED = (pa.ArrowException,)
 _KINDS = (".csv", ".mat", ".parquet")
 
 
@@ -95,7 +94,7 @@ def read_references(path: Path | str) -> References:
         raise InputError(f"{source}: expected references with their design: {error}") from None
     except InputError:
         raise
-    except (*_DAMAGED, OSError, ValueError, KeyError, TypeError, NotImplementedError) as e:
+    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as e:
         raise InputError(
             f"{source}: expected references with their design: {short(repr(e), 200)}"
         ) from None

@@ -165,9 +165,17 @@ class TargetsView(View):
     def remarks(self) -> tuple[str, ...]:
         """Say what was compared."""
         rate = 1.0 / (self.robot.sample_time_s * self._commanded.step)
-        return (
+        said = (
             f"No torque was logged: positions are compared under the same targets, up to "
-            f"{_BAND * rate:.3g} Hz, and their errors told as the torque that the stated gains make of them.",
+            f"{_BAND * rate:.3g} Hz, and their errors told as the torque that the stated gains make of them."
+        )
+        short = ", ".join(map(str, self._commanded.short_of_inertia))
+        if not short:
+            return (said,)
+        return (
+            said,
+            f"The simulator's steps take more inertia than the motor has on axis {short} (speed gains that are "
+            f"explicit): it is taken as none, and the simulator is reproduced less well there.",
         )
 
 

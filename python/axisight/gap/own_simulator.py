@@ -107,12 +107,17 @@ def _paired(log: Log, own: Log) -> Log:
 
 @dataclass(frozen=True)
 class Difference:
-    """What the user's simulator is off the model along each log: torques [Nm] and positions [rad], (n, n_axes)."""
+    """What the user's simulator is off the model along each log: (n, n_axes) each.
 
+    ``torques_nm`` as they are compared, ``positions_rad`` of the motors; ``theirs_nm``: torques of the
+    user's simulator.
+    """
+
+    theirs_nm: tuple[Array, ...]
     torques_nm: tuple[Array, ...]
     positions_rad: tuple[Array, ...]
 
-    def off(self, logs: Sequence[Log]) -> list[Log]:
+    def taken_from(self, logs: Sequence[Log]) -> list[Log]:
         """Return logs with it taken off: what is left to the model is the gap of the user's simulator.
 
         To first order of the difference, for the loop of the machine answers to both.
@@ -125,37 +130,42 @@ class Difference:
 
 
 def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:
-    """Return what ``simulated`` logs are off the model of ``view``, in closed loop."""
+    """Return what ``simulated`` logs are off the model of ``view``.
+
+    By inverse dynamics both go the motion of the log, and positions differ by nothing.
+    """
+    theirs = tuple(view.measured(own) for own in simulated)
     ours = view.torques(AS_GIVEN, simulated)
-    moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
+    moved = [own.position_rad for own in simulated]
+    if view.mode == "closed_loop":
+        moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
     return Difference(
-        tuple(view.measured(own) - torque for own, torque in zip(simulated, ours, strict=True)),
+        theirs,
+        tuple(their - our for their, our in zip(theirs, ours, strict=True)),
         tuple(own.position_rad - x for own, x in zip(simulated, moved, strict=True)),
     )
 
 
 def reproduction(
-    view: View, logs: Sequence[Log], simulated: Sequence[Log], settings: Settings
+    view: View, logs: Sequence[Log], off: Difference, settings: Settings
 ) -> Reproduction:
-    """Return how far the model of ``view`` reproduces ``simulated``.
+    """Return how far the model of ``view`` reproduces the user's simulator, which is ``off`` it by so much.
 
     In closed loop the difference can be taken off the logs; by inverse dynamics the two go other ways.
     """
-    theirs = [view.measured(own) for own in simulated]
-    ours = view.torques(AS_GIVEN, simulated)
-    differences = [their - our for their, our in zip(theirs, ours, strict=True)]
     real = [view.measured(log) for log in logs]
     taken_off = view.mode == "closed_loop"
-    model = theirs if taken_off else view.torques(AS_GIVEN, logs)
+    model = off.theirs_nm if taken_off else view.torques(AS_GIVEN, logs)
     errors = [a - b for a, b in zip(real, model, strict=True)]
-    about_mean = [their - their.mean(axis=0) for their in theirs]
+    about_mean = [their - their.mean(axis=0) for their in off.theirs_nm]
     noises = view.noises(logs, 0)
-    items = [ErrorLog(*each) for each in zip(logs, differences, noises, strict=True)]
+    items = [ErrorLog(*each) for each in zip(logs, off.torques_nm, noises, strict=True)]
     bands = band_map(items, settings.block_s)
     regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
+    size = _rms(off.torques_nm)
     return Reproduction(
-        _rms(differences) / np.maximum(_rms(about_mean), 1e-300),
-        _rms(differences) / np.maximum(_rms(errors), 1e-300),
+        size / np.maximum(_rms(about_mean), 1e-300),
+        size / np.maximum(_rms(errors), 1e-300),
         taken_off,
         findings(bands, regimes, settings.significance),
     )

@@ -168,10 +168,11 @@ class _Inputs:
             beside = own_simulator.paired(logs, simulated)
         else:
             as_logged = own_simulator.paired(commanded.as_logged(), simulated)
-            beside = commanded.commanded(as_logged)
-        found = own_simulator.reproduction(view, logs, beside, settings)
+            beside = commanded.of(as_logged)
+        off = own_simulator.difference(view, beside, settings)
+        found = own_simulator.reproduction(view, logs, off, settings)
         if found.taken_off:
-            logs = own_simulator.difference(view, beside, settings).off(logs)
+            logs = off.taken_from(logs)
         if commanded is not None:
             # What the controller commands follows from the positions that are left.
             commanded = commanded.along(logs)

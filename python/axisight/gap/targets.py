@@ -35,18 +35,20 @@ class Commanded:
     """Logs at the rate of the controller, their torque what it commands along them.
 
     ``robot``: at rest where the logs begin, its controller with the references that they have;
-    ``step``: samples of the controller per sample that was logged.
+    ``step``: samples of the controller per sample that was logged; ``short_of_inertia``: axes (from 1)
+    of which the simulator's steps take more inertia than the motor has.
     """
 
     robot: Robot
     logs: tuple[Log, ...]
     step: int
+    short_of_inertia: tuple[int, ...] = ()
 
     def as_logged(self) -> list[Log]:
         """Return the logs at their own rate."""
         return [_every(log, self.step) for log in self.logs]
 
-    def commanded(self, logs: Sequence[Log]) -> list[Log]:
+    def of(self, logs: Sequence[Log]) -> list[Log]:
         """Return other logs of the logs' own rate as these are."""
         return [_commanded(self.robot, log, self.step) for log in logs]
 
@@ -85,7 +87,8 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     at_start = robot.with_operating_point(start * robot.gear_ratio)
     machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
     begun = at_their_poses(machine, logs)
-    return Commanded(machine, tuple(_commanded(machine, log, step) for log in begun), step)
+    told = tuple(_commanded(machine, log, step) for log in begun)
+    return Commanded(machine, told, step, tuple(short_of_inertia(robot)))
 
 
 def _as_its_steps_make_it(robot: Robot) -> Robot:
@@ -94,13 +97,25 @@ def _as_its_steps_make_it(robot: Robot) -> Robot:
         return robot
     own, added = robot.parameters(), robot.stepped[1]
     names = [robot.axis_parameter(axis, "motor_inertia") for axis in robot.axis_numbers()]
-    # Explicit damping takes inertia away, which is the motor's as long as it has any.
+    # Explicit damping takes inertia away, the motor's as long as it has any: `short_of_inertia` says where not.
     changed = {
         name: max(own[name] + float(more), 0.0)
         for name, more in zip(names, added, strict=True)
         if name is not None
     }
     return robot.with_parameters(changed)
+
+
+def short_of_inertia(robot: Robot) -> list[int]:
+    """Return the axes (from 1) of which a simulator's steps take more inertia than the motor has."""
+    if robot.stepped is None:
+        return []
+    own, out = robot.parameters(), []
+    for axis, more in zip(robot.axis_numbers(), robot.stepped[1], strict=True):
+        name = robot.axis_parameter(axis, "motor_inertia")
+        if name is not None and own[name] + float(more) < 0:
+            out.append(axis)
+    return out
 
 
 def _earlier(target: Array, samples: float) -> Array:

@@ -71,12 +71,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
             SimulationInput::Tracking => run.measured,
             _ => reference,
         };
-        Record {
-            input,
-            target: run.command,
-            certainty: None,
-            start: None,
-        }
+        Record::new(input, run.command)
     };
     let records = LOGS.iter().map(record).collect();
     let mut problem = SimulationErrorProblem {
@@ -304,12 +299,7 @@ fn courses_that_do_not_serve_are_left_alone() {
     let rows = exact.records.iter().map(|r| r.input.len() / 3);
     let other = SimulationErrorProblem {
         records: rows
-            .map(|n| Record {
-                input: vec![0.0; n],
-                target: vec![0.0; n],
-                certainty: None,
-                start: None,
-            })
+            .map(|n| Record::new(vec![0.0; n], vec![0.0; n]))
             .collect(),
         weighting: vec![flat(1.0)],
         parameters: Vec::new(),

@@ -39,12 +39,7 @@ fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Record> {
         let input = torque(robot, n, size);
         let noise = measurement_noise(seed, run, n, 1, sigma);
         let target = trace(&plant, robot, Drive::Torque(&[&input]), &[&noise], METHOD).measured;
-        Record {
-            input,
-            target,
-            certainty: None,
-            start: None,
-        }
+        Record::new(input, target)
     };
     [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)]
         .map(log)
@@ -172,12 +167,7 @@ fn three_axes_come_back_from_reference_driven_torque() {
     });
     let problem = SimulationErrorProblem {
         parameters: parameters.collect(),
-        records: vec![Record {
-            input,
-            target,
-            certainty: None,
-            start: None,
-        }],
+        records: vec![Record::new(input, target)],
         robot,
         effects: Vec::new(),
         input: SimulationInput::Reference,

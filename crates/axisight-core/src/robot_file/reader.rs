@@ -345,12 +345,14 @@ fn read_controller(
             let switches = ["velocity_feedforward", "gravity_compensation", "continuous"];
             let steps = ["step", "step_inertia"];
             section.only(&[&["kind", "kp", "kd"][..], &switches, &steps].concat())?;
-            let stepped = match section.find(steps[0]) {
-                None => None,
-                Some(_) => Some(Stepped {
+            // One without the other says half of what a simulator does.
+            let stepped = if steps.iter().any(|key| section.find(key).is_some()) {
+                Some(Stepped {
                     step: section.number(steps[0], Bound::Positive, "s")?,
                     inertia: section.per_axis(steps[1], n_axes, "kg m^2")?,
-                }),
+                })
+            } else {
+                None
             };
             let known = section.flag(switches[1], false)?;
             Ok(Controller::PdPosition {

@@ -37,6 +37,18 @@ pub struct Record {
     pub start: Option<Vec<f64>>,
 }
 
+impl Record {
+    /// A log that counts everywhere and begins at the operating point.
+    pub fn new(input: Vec<f64>, target: Vec<f64>) -> Self {
+        Self {
+            input,
+            target,
+            certainty: None,
+            start: None,
+        }
+    }
+}
+
 /// What drives the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulationInput {
