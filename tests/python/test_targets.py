@@ -236,7 +236,7 @@ def test_steps_are_stated_whole(tmp_path: Path) -> None:
     for key in ("step", "step_inertia"):
         path = tmp_path / f"without_{key}.toml"
         path.write_text(re.sub(rf"^{key} = .*\n", "", text, flags=re.MULTILINE))
-        with pytest.raises(RobotError, match=rf"{key}: expected"):
+        with pytest.raises(RobotError, match=rf"missing key `controller.{key}`"):
             load_robot(path)
 
 
