@@ -776,7 +776,7 @@ def fit_inverse_dynamics(
 
     ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm],
     certainty [1]) of shape (n_samples, n_axes), motor side, one per log; the certainty, from 0 to 1,
-    is a factor on the error of its sample. ``weighting`` has one entry per axis.
+    is a factor on the weighted error of its sample. ``weighting`` has one entry per axis.
     ``warm`` holds Jacobian columns from an earlier fit, as for `fit_simulation`.
     ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
     """

@@ -9,7 +9,7 @@ import pytest
 from axisight import Robot, Settings, diagnose
 from axisight.gap import verdict_schema
 from axisight.gap.cutoff import chosen_filtering, highest_cutoff_hz
-from axisight.gap.inverse import predicted_torque
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import AS_GIVEN
 from rigid_arm import COULOMB_NM, VISCOUS, arm, arm_toml, log_of, motion
 

@@ -8,11 +8,12 @@ import pytest
 from axisight import Settings, diagnose
 from axisight.errors import InputError
 from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
-from axisight.gap.inverse import InverseView, predicted_torque
+from axisight.gap.inverse import InverseView
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.modes import view_of
 from axisight.gap.motion import Filtering, motion
 from axisight.gap.repeats import repeated_std_nm
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
 from axisight.gap.torques import AS_GIVEN
 from gap_data import bare_axis
@@ -137,7 +138,7 @@ def test_repeats_are_the_floor():
 
     logs = [repeat(k) for k in range(3)]
     filtering = Filtering(10.0)
-    torques = np.array([filtering(log)[3] for log in logs])
+    torques = np.array([filtering.compared(log.torque_nm, log.sample_time_s) for log in logs])
     expected = np.sqrt(np.mean(np.var(torques, axis=0, ddof=1), axis=0))
     assert repeated_std_nm(logs, filtering) == pytest.approx(expected, rel=1e-12)
     noise = InverseNoise.of(ROBOT, logs, filtering, 0)

@@ -5,7 +5,7 @@ import pytest
 
 from axisight import load_robot
 from axisight.errors import InputError, RobotError
-from axisight.gap.inverse import predicted_torque
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import AS_GIVEN
 from axisight.rigid_body import USUAL_TERMS, TorqueModel, identified_bodies
 from axisight.robot_file import Provenance, load_identified, write_identified

@@ -27,8 +27,8 @@ from axisight import (
 )
 from axisight.fitting import effect_parameter
 from axisight.frequency_fit import model_response, planned_information
-from axisight.gap.inverse import predicted_torque
 from axisight.gap.motion import motion
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.robot_file import Provenance, identified, write_identified

@@ -11,8 +11,8 @@ import pytest
 
 from axisight import Effect, Robot, load_robot
 from axisight.errors import InputError
-from axisight.gap.inverse import predicted_torque
 from axisight.gap.result import Cause, Interval
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import Variant
 from axisight.write_back import write_model
 from import_data import MJCF, URDF, changed, written

@@ -89,7 +89,7 @@ def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:
     Half of what there is of them on the validation logs would do to let them stand.
     """
     small = all(a.excess <= _FACTOR**2 - 1.0 for a in conclusion.axes)
-    return small and removed < _HALF and not np.any(above_floor(stages.refitted, stages.floor) > 0)
+    return small and removed < _HALF and not np.any(above_floor(stages.refitted, stages) > 0)
 
 
 def _nothing(conclusion: Conclusion) -> Conclusion:
@@ -112,12 +112,25 @@ def _nothing(conclusion: Conclusion) -> Conclusion:
     )
 
 
-def above_floor(left: Stage, floor: Stage) -> Array:
+def above_floor(left: Stage, stages: Stages) -> Array:
     """Return by how much mean squares (n_logs, n_axes) exceed what passes for the floor [1].
 
-    Where it is positive, log and axis stand above the floor by more than the errors of formulas.
+    Where it is positive, log and axis stand above the floor by more than the errors of formulas and
+    what is left open.
     """
-    return _squares(left) - _FACTOR**2 * _squares(floor) - _SEEN**2
+    passing = _FACTOR**2 * _squares(stages.floor) + _SEEN**2
+    return _squares(left) - passing - (0.0 if stages.open is None else _squares(stages.open))
+
+
+def open_check(stages: Stages) -> tuple[str, ...]:
+    """Say what stands above the noise because it cannot be known."""
+    if stages.open is None or stages.after.mean() <= _FACTOR**2 * stages.floor.mean() + _SEEN**2:
+        return ()
+    share = percent(float(np.sqrt(stages.open.mean())))
+    return (
+        f"Where motors stand or turn round, dry friction holds any torque in its band: up to {share} of the "
+        "torque is left open there, counts as gap, and speaks for or against nothing.",
+    )
 
 
 def _squares(stage: Stage) -> Array:
@@ -182,7 +195,7 @@ def _no_fall_there(own: OwnAxes, stages: Stages, names: Sequence[str]) -> str | 
 def _above_floor(stages: Stages, names: Sequence[str]) -> str | None:
     """Say where the re-fitted simulator leaves more than noise."""
     left, noise = _squares(stages.refitted), _squares(stages.floor)
-    excess = above_floor(stages.refitted, stages.floor)
+    excess = above_floor(stages.refitted, stages)
     if not np.any(excess > 0):
         return None
     log, axis = divmod(int(np.argmax(excess)), excess.shape[1])

@@ -17,11 +17,11 @@ from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.feedback import loop_responses
-from axisight.gap.inverse import predicted_torque
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
 from axisight.gap.own_controller import other_controllers
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques, simulated_torques

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.motion import Filtering, Motion, has_velocity
+from axisight.gap.motion import Filtering, Motion, has_velocity, motion
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -70,31 +70,31 @@ def chosen_filtering(
     if best is None:
         # Relative changes count: an axis that nothing predicts does not choose for the others.
         errors = [
-            np.log(np.maximum(held_out_error(logs, _tried(float(f)), predict), 1e-300)).sum()
-            for f in grid
+            np.log(np.maximum(held_out_error(logs, predict, float(f)), 1e-300)).sum() for f in grid
         ]
         best = float(grid[int(np.argmin(errors))])
     available = has_velocity(logs) if measured is None else measured
     if not available.any():
         return Filtering(best)
     position, velocity = (
-        held_out_error(logs, _tried(best, tuple(axes)), predict)
+        held_out_error(logs, predict, best, tuple(axes))
         for axes in (np.zeros_like(available), available)
     )
     better = available & (velocity < (1 - _CLEARLY) * position)
     return Filtering(best, tuple(bool(x) for x in better))
 
 
-def _tried(cutoff_hz: float, measured: tuple[bool, ...] = ()) -> Filtering:
-    """Return a filtering on trial: with plain ends, which speak against cutoffs that smear far."""
-    return Filtering(cutoff_hz, measured, curved=False)
-
-
 def held_out_error(
-    logs: Sequence[Log], filtering: Filtering, predict: Callable[[Motion], Array]
+    logs: Sequence[Log],
+    predict: Callable[[Motion], Array],
+    cutoff_hz: float,
+    measured: Sequence[bool] = (),
 ) -> Array:
-    """Return the squared error on the other half, relative to the torque's, of every axis (n_axes,)."""
-    moved = [filtering(log) for log in logs]
+    """Return the squared error on the other half, relative to the torque's, of every axis (n_axes,).
+
+    From motions with plain ends, which speak against cutoffs that smear far.
+    """
+    moved = [motion(log, cutoff_hz, measured, curved=False) for log in logs]
     rigid = np.concatenate([predict(m) for m in moved])
     speed = np.concatenate([m[1] for m in moved])
     torque = np.concatenate([log.torque_nm for log in logs])

@@ -67,12 +67,16 @@ def stage(
 
 @dataclass(frozen=True)
 class Stages:
-    """The simulator as given, re-fitted, with the causes; and what a perfect one would leave."""
+    """The simulator as given, re-fitted, with the causes; and what a perfect one would leave.
+
+    ``open``: what it may leave beyond that, where torques cannot be known; None where nothing is open.
+    """
 
     given: Stage
     refitted: Stage
     after: Stage
     floor: Stage
+    open: Stage | None = None
 
 
 def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:

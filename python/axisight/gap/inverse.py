@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +18,9 @@ from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
 from axisight.gap.noise import Floor
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.settings import Settings
-from axisight.gap.standstill import certainty, dry_friction_nm, open_torque_nm
+from axisight.gap.standstill import alike, certainty, dry_friction_nm, open_torque_nm, standing
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View
 from axisight.logs import Log
@@ -28,6 +29,10 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 
+# Of the table of the low-pass, linear in between: it follows the gain to a few ten-thousandths.
+_FREQUENCIES = 200
+# Mean square distance of a uniform band from one of its ends is four times that from its middle.
+_FROM_ONE_END = 2.0
 # Natural step of effects, as a share of their typical size.
 _STEP = 1e-3
 
@@ -52,13 +57,20 @@ class InverseView(View):
             measured=has_velocity([*logs, *held_out]),
             highest_hz=rigid_below_hz(robot),
         )
+        self._sample_time_s = logs[0].sample_time_s
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
         floor = inverse_floor(logs, self.noise, settings)
         motions = [self.filtering(log) for log in logs]
+        self._dry_friction_nm = dry_friction_nm(motions, _without_effects(robot))
         fitter = InverseDynamicsFitter(
             robot,
             motions,
-            certainties(robot, motions, floor.weighting),
+            certainties(
+                motions,
+                self._dry_friction_nm,
+                floor.weighting,
+                lambda x: self.filtering.spread(x, self._sample_time_s),
+            ),
             floor.weighting,
             settings.tolerances_of(robot),
             block_s(logs, self.filtering.cutoff_hz, settings),
@@ -69,11 +81,15 @@ class InverseView(View):
 
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque."""
-        return self.filtering(log)[3]
+        return self._low_passed(log.torque_nm)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return the predicted torque of every log."""
-        return [predicted_torque(self.robot, variant, self.filtering(x)) for x in logs]
+        """Return the predicted torque of every log, low-passed as the measured one."""
+        moved = (self.filtering(x) for x in logs)
+        return [self._low_passed(predicted_torque(self.robot, variant, at)) for at in moved]
+
+    def _low_passed(self, torque_nm: Array) -> Array:
+        return self.filtering.compared(torque_nm, self._sample_time_s)
 
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
@@ -81,6 +97,14 @@ class InverseView(View):
         """Return the error that noise of position and torque causes, for every log."""
         del variant
         return [self.noise.error(log, run) for run, log in enumerate(logs, start=first_run)]
+
+    def left_open(self, logs: Sequence[Log]) -> list[Array]:
+        """Return what dry friction leaves open where motors stand or turn round.
+
+        A simulator may stand at one end of the band, and the machine anywhere in it.
+        """
+        found = open_torque_nm([self.filtering(log) for log in logs], self._dry_friction_nm)
+        return [_FROM_ONE_END * x for x in found]
 
     def remarks(self) -> tuple[str, ...]:
         """Say how the logs were filtered, and what the floor is made of."""
@@ -91,7 +115,8 @@ class InverseView(View):
         elif np.isfinite(highest):
             chosen += f", below a third of the first elastic mode ({highest:.3g} Hz)"
         out = [
-            f"Motion, torque and their noise are low-passed alike at {self.filtering.cutoff_hz:.3g} Hz, {chosen}."
+            f"Torques, predicted and measured, and their noise are low-passed alike at "
+            f"{self.filtering.cutoff_hz:.3g} Hz, {chosen}; the motion an octave above."
         ]
         axes = [str(axis) for axis, used in enumerate(self.filtering.measured, 1) if used]
         if axes:
@@ -116,15 +141,31 @@ def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
     return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
 
 
-def certainties(robot: Robot, motions: Sequence[Motion], weighting: Weighting) -> list[Array]:
-    """Return how far torques can be predicted in every sample: dry friction leaves some open."""
+def certainties(
+    motions: Sequence[Motion],
+    friction_nm: Array,
+    weighting: Weighting,
+    spread: Callable[[Array], Array],
+) -> list[Array]:
+    """Return how far low-passed torques can be predicted in every sample: dry friction leaves some open.
 
-    def rigid(at: Motion) -> Array:
-        return predicted_torque(robot.with_effects([]), AS_GIVEN, at)
-
-    left_open = open_torque_nm(motions, dry_friction_nm(motions, rigid))
+    A stretch at standstill counts as one residual. ``spread``: what the low-pass makes of what is open.
+    """
+    # Of white noise, as the weight at rest counts it.
     error_nm = 1 / (weighting.weight[:, 0] * np.sqrt(weighting.decimation))
-    return [certainty(x, error_nm) for x in left_open]
+    out = []
+    for left_open, still in zip(
+        open_torque_nm(motions, friction_nm), standing(motions), strict=True
+    ):
+        residuals = np.maximum(alike(still) / weighting.decimation, 1.0)
+        out.append(certainty(np.sqrt(residuals) * spread(left_open), error_nm))
+    return out
+
+
+def _without_effects(robot: Robot) -> Callable[[Motion], Array]:
+    """Return what a robot without its effects predicts."""
+    bare = robot.with_effects([])
+    return lambda at: predicted_torque(bare, AS_GIVEN, at)
 
 
 class InverseDynamicsFitter(ModelFitter):
@@ -150,12 +191,8 @@ class InverseDynamicsFitter(ModelFitter):
     def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""
         step = self.weighting.decimation
-        parts: list[Array] = []
-        for *_, factor in self.records:
-            # As `Weighting` decimates: each residual stands for so many samples.
-            kept = factor[: len(factor) // step * step]
-            parts += list((kept**2).reshape(-1, step, kept.shape[1]).mean(axis=1).T)
-        return np.concatenate(parts)
+        kept = (factor[: len(factor) // step * step : step] for *_, factor in self.records)
+        return np.concatenate([row for log in kept for row in log.T**2])
 
     def takes_part(self, name: str) -> bool:
         """Springs and their damping do not show in a rigid prediction."""
@@ -212,33 +249,18 @@ class InverseDynamicsFitter(ModelFitter):
         )
 
 
-def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
-    """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
-    changed = robot.with_parameters(variant.robot_values)
-    result = _core.evaluate_inverse_dynamics(
-        changed.core,
-        core_effects(variant.effects),
-        [],
-        [(*at, np.ones_like(at[3]))],
-        Weighting.flat(robot.n_axes).core(),
-        FitOptions(),
-    )
-    # The residual is prediction minus measurement, axis by axis.
-    residual = result.residual.reshape(robot.n_axes, -1).T
-    return np.asarray(residual + at[3])
-
-
 def inverse_floor(logs: Sequence[Log], noise: InverseNoise, settings: Settings) -> Floor:
     """Return the floor of a predicted torque: its noise, and the errors of formulas."""
-    log = logs[0]
-    rate = 1.0 / log.sample_time_s
+    rate = 1.0 / logs[0].sample_time_s
     variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
-    noise_variance = np.var(noise.error(log, 0), axis=0)
+    # What is drawn scatters by a few percent from log to log, and what is estimated from it too.
+    noise_variance = np.mean([noise.error(x, i).var(axis=0) for i, x in enumerate(logs)], axis=0)
     total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
-    decimation = max(1, int(rate / (2 * noise.filtering.cutoff_hz)))
-    weighting = Weighting(
-        np.zeros(1), 1 / np.sqrt(total)[:, None] / np.sqrt(decimation), decimation
-    )
+    filtering = noise.filtering
+    decimation = max(1, int(rate / (2 * filtering.cutoff_hz)))
+    frequency_hz = np.linspace(0.0, rate / (2 * decimation), _FREQUENCIES)
+    weight = filtering.gain(frequency_hz) / np.sqrt(decimation * total)[:, None]
+    weighting = Weighting(frequency_hz, weight, decimation)
     flat = np.ones((len(variance), 1))
     return Floor(
         noise.position_std_rad,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
@@ -16,22 +17,55 @@ Motion = tuple[Array, Array, Array, Array]
 """Position, velocity, acceleration and torque, each (n, n_axes), motor side."""
 
 
+# The motion's own low-pass lies this far above the cutoff: it takes 0.4 % of the motion there.
+_ABOVE = 2.0
+# Of the rate of a log, up to which a low-pass is one.
+_BELOW_NYQUIST = 0.45
+# Periods of the cutoff after which its low-pass has forgotten all but a thousandth.
+_RINGS = 3.0
+# The low-pass of `axisight.logs.lowpass`: fourth order, forward and backward.
+_ORDER = 8
+
+
 @dataclass(frozen=True)
 class Filtering:
-    """How a motion is made of a log.
+    """How a motion is made of a log, and torques compared.
 
-    ``cutoff_hz`` of the low-pass, the same on all signals; ``measured`` (n_axes): whether velocity
-    and acceleration of an axis come from its measured velocity instead of its position; ``curved``:
-    whether motion goes on beyond the ends as curved as it is there.
+    Torques predicted and measured pass the same low-pass of ``cutoff_hz``: what friction makes of a
+    reversal is smeared on both sides alike. The motion that a torque is predicted from passes one an
+    octave above. ``measured`` (n_axes): whether velocity and acceleration of an axis come from its
+    measured velocity instead of its position.
     """
 
     cutoff_hz: float
     measured: tuple[bool, ...] = ()
-    curved: bool = True
 
     def __call__(self, log: Log) -> Motion:
-        """Return the motion of a log."""
-        return motion(log, self.cutoff_hz, self.measured, curved=self.curved)
+        """Return the motion of a log, and its torque as it is."""
+        cutoff_hz = self.motion_cutoff_hz(log.sample_time_s)
+        position, velocity, acceleration, _ = motion(log, cutoff_hz, self.measured)
+        return position, velocity, acceleration, np.ascontiguousarray(log.torque_nm)
+
+    def motion_cutoff_hz(self, sample_time_s: float) -> float:
+        """Return the cutoff of the low-pass that the motion itself passes."""
+        highest = max(self.cutoff_hz, _BELOW_NYQUIST / sample_time_s)
+        return min(_ABOVE * self.cutoff_hz, highest)
+
+    def compared(self, torque_nm: Array, sample_time_s: float) -> Array:
+        """Return a torque (n, n_axes), predicted or measured, as it is compared."""
+        return lowpass(torque_nm, sample_time_s, self.cutoff_hz)
+
+    def spread(self, size_nm: Array, sample_time_s: float) -> Array:
+        """Return how large (n, n_axes) `compared` leaves a torque of that size and unknown sign at most."""
+        reach = round(_RINGS / (self.cutoff_hz * sample_time_s))
+        impulse = np.zeros((4 * reach + 1, 1))
+        impulse[2 * reach] = 1.0
+        answer = np.abs(self.compared(impulse, sample_time_s)[reach : 3 * reach + 1, 0])
+        return np.asarray(scipy.ndimage.convolve1d(size_nm, answer, axis=0, mode="nearest"))
+
+    def gain(self, frequency_hz: Array) -> Array:
+        """Return the gain of `compared` (n_freq,)."""
+        return np.asarray(1 / (1 + (frequency_hz / self.cutoff_hz) ** _ORDER))
 
 
 def motion(

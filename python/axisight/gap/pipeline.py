@@ -19,7 +19,7 @@ from axisight.fitting import robot_parameters
 from axisight.gap import own_simulator
 from axisight.gap.beyond import beyond_torque
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
-from axisight.gap.carried import carried_over
+from axisight.gap.carried import carried_over, open_check
 from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.coarse import with_coarse_encoders
 from axisight.gap.detection import detection_limits
@@ -313,6 +313,7 @@ def _reach(
     simulators = (AS_GIVEN, refit, *variants)
     with ThreadPoolExecutor(settings.threads) as pool:
         noises = pool.submit(view.noises, logs, len(view.logs))
+        left_open = view.left_open(logs)
         before, *steps = pool.map(lambda v: view.torques(v, logs), simulators)
         noise = noises.result()
 
@@ -330,7 +331,9 @@ def _reach(
         for a, b in zip(earlier, stages, strict=False)
     ]
     remaining = zip(logs, _errors(steps[-1], measured), noise, strict=True)
-    reached = Stages(given, refitted, after, floor)
+    reached = Stages(
+        given, refitted, after, floor, None if left_open is None else measure(left_open)
+    )
     return Reach(
         reached,
         with_chance(view, found, logs, reached, simulators[-1], measure),
@@ -433,6 +436,7 @@ def _assemble(
         checks=(
             *conclusion.checks,
             *chance_check(reach.stages, reach.judged),
+            *open_check(reach.stages),
             *view.remarks(),
         ),
         axes=conclusion.axes,

@@ -28,7 +28,7 @@ def remainder_of(
     """
     per_axis = np.sqrt(np.maximum(gap.after_per_axis**2 - gap.floor_per_axis**2, 0.0))
     total = float(np.sqrt(max(gap.after**2 - gap.floor**2, 0.0)))
-    standing = np.any(above_floor(stages.after, stages.floor) > 0, axis=0)
+    standing = np.any(above_floor(stages.after, stages) > 0, axis=0)
     whole = all(len(x.noise) == len(x.error) for x in logs)
     if not np.any(standing) or not np.isfinite(total) or not whole:
         return Remainder(total, per_axis)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.motion import Filtering, Motion
+from axisight.gap.motion import Filtering, Motion, motion
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ def repeated_std_nm(logs: Sequence[Log], filtering: Filtering) -> Array | None:
     """
     groups: list[list[Motion]] = []
     for log in logs:
-        whole = filtering(log)
+        whole = motion(log, filtering.cutoff_hz, filtering.measured)
         for piece in _periods(log, whole):
             mine = next((g for g in groups if _same(g[0], piece)), None)
             if mine is None:

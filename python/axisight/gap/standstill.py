@@ -63,10 +63,27 @@ def open_torque_nm(motions: Sequence[Motion], friction_nm: Array) -> list[Array]
     That of a uniform band at standstill; falling with the square of the speed above a hundredth
     of the largest of all motions.
     """
+    return [still * friction_nm / np.sqrt(3) for still in standing(motions)]
+
+
+def standing(motions: Sequence[Motion]) -> list[Array]:
+    """Return how far every sample stands, from 0 to 1 [(n, n_axes)]: a half at a hundredth of the top speed."""
     lengths = np.cumsum([len(m[1]) for m in motions])[:-1]
     speed = np.concatenate([m[1] for m in motions])
-    still = 1 - np.stack([direction(v) ** 2 for v in speed.T], axis=1)
-    return np.split(still * friction_nm / np.sqrt(3), lengths)
+    return np.split(1 - np.stack([direction(v) ** 2 for v in speed.T], axis=1), lengths)
+
+
+def alike(still: Array) -> Array:
+    """Return how many samples stand together with each (n, n_axes), one where the axis moves.
+
+    What is open is one and the same torque, or law, all along such a stretch.
+    """
+    out = np.ones(still.shape)
+    for axis, stands in enumerate(still.T > 0.5):
+        stretch, count = scipy.ndimage.label(stands)
+        if count:
+            out[stands, axis] = np.bincount(stretch)[stretch[stands]]
+    return out
 
 
 def certainty(open_nm: Array, error_nm: Array) -> Array:

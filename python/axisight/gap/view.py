@@ -119,6 +119,14 @@ class View(ABC):
         where it goes round a loop.
         """
 
+    def left_open(self, logs: Sequence[Log]) -> list[Array] | None:
+        """Return what a torque may differ by from the predicted one without anything missing, on each log.
+
+        Standard deviation in every sample (n, n_axes) [Nm]. None where nothing is left open.
+        """
+        del logs
+        return None
+
     def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return the same of the noise that the robot file states, whatever the logs have."""
         return self.noises(logs, first_run)

@@ -29,7 +29,7 @@ pub struct MotionRecord {
     pub acceleration: Vec<f64>,
     /// Motor torque [Nm].
     pub torque: Vec<f64>,
-    /// Factor on the error of each sample, from 0 to 1: how far a torque can be predicted there.
+    /// Factor on the weighted error of each sample, from 0 to 1: how far a torque can be predicted there.
     pub certainty: Vec<f64>,
 }
 
@@ -137,14 +137,6 @@ impl InverseDynamics {
                 *y -= record.torque[k * n_axes + axis];
             }
         }
-        for quantity in &mut series {
-            for (axis, values) in quantity.iter_mut().enumerate() {
-                let factors = record.certainty[axis..].iter().step_by(n_axes);
-                for (x, factor) in values.iter_mut().zip(factors) {
-                    *x *= factor;
-                }
-            }
-        }
         let n_samples = record.torque.len() / n_axes;
         let mut out = vec![Vec::new(); series.len()];
         for (axis, weighting) in self.weighting.iter().enumerate() {
@@ -163,6 +155,13 @@ impl InverseDynamics {
                 out[first].splice(start.., a);
                 if second != first {
                     out[second].splice(start.., b);
+                }
+            }
+            for target in &mut out {
+                let step = n_axes * weighting.decimation;
+                let factors = record.certainty[axis..].iter().step_by(step);
+                for (x, factor) in target[start..].iter_mut().zip(factors) {
+                    *x *= factor;
                 }
             }
         }

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.gate.torque_fit import TorqueFit, torque_fit
-from axisight.gap.inverse import predicted_torque
 from axisight.gap.motion import Motion
+from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import AS_GIVEN
 from axisight.robot import Robot
 
