@@ -1,35 +1,15 @@
-"""The commands ``axisight check``, ``schema`` and ``effects``: what a log, a verdict, the library is."""
+"""The commands ``axisight schema`` and ``effects``: what a verdict, what the library is."""
 
 from __future__ import annotations
 
 from json import dumps
-from pathlib import Path
-from typing import Annotated
 
 import typer
 from rich.table import Table
 
-from axisight.cli.common import OUT, Columns, MaxBytes, Untrusted, errors
+from axisight.cli.common import OUT
 from axisight.effects import effect_table
 from axisight.gap import verdict_schema
-from axisight.logs import check_log, render
-from axisight.logs.untrusted import check_log_inside
-
-
-def check_command(
-    log: Annotated[Path, typer.Argument(help="Log to check.")],
-    columns: Columns = None,
-    untrusted: Untrusted = False,
-    max_bytes: MaxBytes = None,
-) -> None:
-    """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
-    with errors():
-        if untrusted:
-            check_log_inside(log)
-        found = check_log(log, columns, max_bytes=max_bytes)
-        OUT.print(render(found))
-        if not found.ok:
-            raise typer.Exit(1)
 
 
 def schema_command() -> None:

@@ -49,7 +49,7 @@ _COMMANDS = {
         "shrinks.",
     ),
     "check": (
-        "about:check_command",
+        "check:check_command",
         "Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels.",
     ),
     "columns": (

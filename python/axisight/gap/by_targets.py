@@ -164,11 +164,7 @@ class TargetsView(View):
 
     def remarks(self) -> tuple[str, ...]:
         """Say what was compared."""
-        rate = 1.0 / (self.robot.sample_time_s * self._commanded.step)
-        said = (
-            f"No torque was logged: positions are compared under the same targets, up to "
-            f"{_BAND * rate:.3g} Hz, and their errors told as the torque that the stated gains make of them."
-        )
+        said = what_is_compared(1.0 / (self.robot.sample_time_s * self._commanded.step))
         short = ", ".join(map(str, self._commanded.short_of_inertia))
         if not short:
             return (said,)
@@ -177,6 +173,14 @@ class TargetsView(View):
             f"The simulator's steps take more inertia than the motor has on axis {short} (speed gains that are "
             f"explicit): it is taken as none, and the simulator is reproduced less well there.",
         )
+
+
+def what_is_compared(rate_hz: float) -> str:
+    """Return a sentence that says what is compared of logs of a rate [Hz]."""
+    return (
+        f"No torque was logged: positions are compared under the same targets, up to {_BAND * rate_hz:.3g} Hz, "
+        "and their errors told as the torque that the stated gains make of them."
+    )
 
 
 # Of a sample of the controller: how well it is known when a target takes effect. Simulators and drives

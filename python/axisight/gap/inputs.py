@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +117,24 @@ def _check_at_rest(log: Log, start_s: float) -> None:
         )
 
 
+def read_beside(
+    model: str,
+    paths: Sequence[Path],
+    columns: Path | None,
+    load: Callable[..., Robot] = load_robot,
+    *,
+    max_bytes: int | None = None,
+) -> tuple[Robot, list[Log]]:
+    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it.
+
+    ``columns`` and ``max_bytes`` as in `read_log`. Raises LogError for a log that is none of this robot.
+    """
+    # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
+    robot = load_robot(model) if is_model_file(model) else load(model)
+    logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in paths]
+    return _loaded(load, model, logs) if is_model_file(model) else robot, logs
+
+
 def _loaded(load: Callable[..., Robot], source: Path | str, logs: Sequence[Log]) -> Robot:
     """Return a robot; one of a model file has the sample time of its logs, unless its drive data say one."""
     if not is_model_file(source):
@@ -148,12 +165,8 @@ def _read(
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
-    # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
-    robot = load_robot(model) if is_model_file(model) else load(model)
-    read = partial(read_log, columns=columns, robot=robot, max_bytes=max_bytes)
-    logs, held = [read(p) for p in paths], [read(p) for p in validation]
-    if is_model_file(model):
-        robot = _loaded(load, model, [*logs, *held])
+    robot, read = read_beside(model, [*paths, *validation], columns, load, max_bytes=max_bytes)
+    logs, held = read[: len(paths)], read[len(paths) :]
     if not held:
         if len(logs) < 2:
             raise InputError("--validation: expected a log to hold out, or at least two logs")

@@ -72,6 +72,7 @@ def check_log(
         findings.append(Finding("ok", "rate", f"uniform at {rate:.6g} Hz for {seconds:.6g} s"))
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("warning", "map", note) for note in found.notes]
+    findings += _without_torque(found)
     why = "not a native column, not used" if found.pattern is None else "not used by the map"
     findings += [Finding("ok", short(name, 200), why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
@@ -81,6 +82,19 @@ def check_log(
     if rate is not None and grid.stamps_s is None:
         findings += _look_at_units(found, 1.0 / rate)
     return LogReport(path, tuple(findings), rate, grid.n_samples, len(found.columns.axis))
+
+
+def _without_torque(found: Gathered) -> list[Finding]:
+    """Say what can be done with positions and their targets, where no torque was logged."""
+    axes = found.columns.axis
+    if any(x.torque is not None or x.position_ref is None for x in axes):
+        return []
+    message = (
+        "none: a diagnosis compares positions under the same targets, with a robot that is told positions: an "
+        "MJCF with <position> actuators, or kp and kd of a controller pd_position in the drive data; torque "
+        "sensors and constants do not show"
+    )
+    return [Finding("ok", "torque", message)]
 
 
 def _usable(values: Floats | None) -> bool:

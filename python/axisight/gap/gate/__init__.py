@@ -2,6 +2,7 @@
 
 from axisight.gap.faults import MEANINGS, Finding, RefusedInputError
 from axisight.gap.gate.inspect import (
+    check_by_targets,
     check_fit_inputs,
     check_inputs,
     pass_gate,
@@ -12,6 +13,7 @@ __all__ = [
     "MEANINGS",
     "Finding",
     "RefusedInputError",
+    "check_by_targets",
     "check_fit_inputs",
     "check_inputs",
     "pass_gate",

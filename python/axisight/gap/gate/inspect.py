@@ -37,13 +37,20 @@ def pass_gate_by_targets(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
 ) -> tuple[Finding, ...]:
     """Return the same of logs whose torque is what the controller commands along them, at their own rate."""
+    findings = check_by_targets(robot, estimation, validation)
+    if refused(findings):
+        raise RefusedInputError(findings)
+    return findings
+
+
+def check_by_targets(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+) -> tuple[Finding, ...]:
+    """Return every fault of such logs that shows without a fit."""
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
     found += _of_each(check_log_alone, logs)
-    found += check_copies(estimation, validation)
-    if refused(found):
-        raise RefusedInputError(tuple(found))
-    return tuple(found)
+    return (*found, *check_copies(estimation, validation))
 
 
 def check_inputs(

@@ -1,0 +1,74 @@
+"""The command ``axisight check``: what a log shows for itself, and beside a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.cli.common import OUT, Columns, MaxBytes, Untrusted, errors, say
+from axisight.cli.robot import load_simulator
+from axisight.errors import InputError, LogError
+from axisight.gap import Finding
+from axisight.gap.beside import look_beside
+from axisight.gap.faults import refused
+from axisight.gap.inputs import read_beside
+from axisight.logs import LogReport, check_log, render
+from axisight.logs.untrusted import check_log_inside
+
+
+def check_command(
+    log: Annotated[Path, typer.Argument(help="Log to check.")],
+    columns: Columns = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="robot.toml, URDF, MJCF or preset: say too what a diagnosis would refuse or doubt.",
+        ),
+    ] = None,
+    untrusted: Untrusted = False,
+    max_bytes: MaxBytes = None,
+) -> None:
+    """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
+    with errors():
+        if untrusted:
+            check_log_inside(log)
+        found = check_log(log, columns, max_bytes=max_bytes)
+        OUT.print(render(found))
+        fits = found.ok and (robot is None or _fits(robot, found, columns, max_bytes))
+        if not fits:
+            raise typer.Exit(1)
+
+
+def _fits(model: str, alone: LogReport, columns: Path | None, max_bytes: int | None) -> bool:
+    """Say what a diagnosis would refuse, flag and compare; False where it would refuse."""
+    try:
+        robot, (log,) = read_beside(
+            model, [alone.path], columns, load_simulator, max_bytes=max_bytes
+        )
+    except LogError as error:
+        say(f"refused: {error}")
+        return False
+    try:
+        beside = look_beside(robot, log)
+    except InputError as error:
+        say(f"refused: {error}")
+        return False
+    for finding in beside.findings:
+        if not _told(finding, alone):
+            say(f"{'refused' if finding.severity == 'refuse' else 'flagged'}: {finding}")
+    if refused(beside.findings):
+        say(f"a diagnosis with {model} would be refused")
+        return False
+    say(f"beside {model}: {beside.compared}")
+    return True
+
+
+def _told(finding: Finding, alone: LogReport) -> bool:
+    """Whether the table of the log for itself has a doubt already; what is refused is said as a diagnosis says it."""
+    return finding.severity == "flag" and any(
+        seen.severity != "ok" and seen.axis == finding.axis and seen.message in finding.message
+        for seen in alone.findings
+    )

@@ -1,0 +1,47 @@
+"""One log beside a simulator: what a diagnosis would compare, and what it would say before it fits anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.by_targets import what_is_compared
+from axisight.gap.faults import Finding, refused
+from axisight.gap.gate import check_by_targets, check_inputs
+from axisight.gap.recovered import SAYS, with_references
+from axisight.gap.targets import with_commands
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What would be compared, in a sentence, empty where nothing would be; and every fault that shows."""
+
+    compared: str
+    findings: tuple[Finding, ...]
+
+
+def look_beside(robot: Robot, log: Log) -> Beside:
+    """Return what a diagnosis would do with a log of a robot.
+
+    Raises InputError as `with_commands`, where a log without torque cannot be compared with this robot.
+    """
+    commanded = with_commands(robot, [log])
+    if commanded is not None:
+        findings = check_by_targets(commanded.robot, commanded.as_logged(), [])
+        compared = what_is_compared(log.sample_rate_hz)
+    else:
+        findings = check_inputs(robot, [log], [])
+        compared = "" if refused(findings) else _torques(robot, log)
+    return Beside("" if refused(findings) else compared, findings)
+
+
+def _torques(robot: Robot, log: Log) -> str:
+    if is_closed_loop(robot, [log]):
+        return "Torques are compared in closed loop: under the logged references and the stated controller."
+    if with_references(robot, [log]) is not None:
+        return SAYS
+    return (
+        "Torques are compared by inverse dynamics: without a controller, along the logged motion."
+    )
