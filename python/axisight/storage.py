@@ -6,7 +6,7 @@ import os
 import secrets
 import stat
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from axisight.errors import InputError, OutputError
@@ -55,12 +55,18 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def check_targets(
-    targets: Mapping[str, Path | None], *, inputs: Iterable[Path] = (), overwrite: bool = True
+    targets: Mapping[str, Path | None],
+    *,
+    inputs: Iterable[Path] = (),
+    replaces: Mapping[str, Sequence[str]] | None = None,
+    force: bool = False,
 ) -> None:
     """Raise OutputError, naming the option, for outputs of a command that could not be written after its work.
 
-    ``targets``: by option, None where it was not given; no two may be one file. ``inputs`` and ``overwrite`` as
-    in `check_target`.
+    ``targets``: by option, None where it was not given; no two may be one file. ``inputs`` as in `check_target`.
+    ``replaces``: by option, how files end that are earlier results of it; other files are replaced with
+    ``force`` only, and what people work on, a model or a map, has none that are. Options that are not in it have
+    names, or endings, that are the command's own.
     """
     read = list(inputs)
     seen: dict[Path, str] = {}
@@ -68,7 +74,9 @@ def check_targets(
         if target is None:
             continue
         try:
-            check_target(target, inputs=read, overwrite=overwrite)
+            check_target(target, inputs=read)
+            if not force and replaces is not None and option in replaces:
+                _check_replaced(target, replaces[option])
         except OutputError as error:
             raise OutputError(f"{option}: {error}") from None
         other = seen.setdefault(_followed(target), option)
@@ -76,6 +84,14 @@ def check_targets(
             raise OutputError(
                 f"{option}: expected another file than {other}, got {target} for both"
             )
+
+
+def _check_replaced(target: Path, endings: Sequence[str]) -> None:
+    """Raise OutputError for a file that is there and does not end as a result that may be made anew."""
+    path = _followed(target)
+    if path.is_file() and path.suffix.lower() not in endings:
+        kind = f" and is no {' or '.join(endings)}" if endings else ""
+        raise OutputError(f"{target} exists{kind}: choose another name, or --force replaces it")
 
 
 def check_target(

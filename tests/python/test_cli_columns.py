@@ -50,9 +50,9 @@ def test_guess_never_overwrites_unasked(log, tmp_path):
     out = tmp_path / "columns.toml"
     out.write_text("mine")
     text = run("columns", "guess", log, "-o", out, code=2)
-    assert "exists: choose another name or pass --overwrite" in text
+    assert "exists: choose another name, or --force replaces it" in text
     assert out.read_text() == "mine"
-    run("columns", "guess", log, "-o", out, "--overwrite")
+    run("columns", "guess", log, "-o", out, "--force")
     assert out.read_text() != "mine"
 
 

@@ -35,8 +35,8 @@ def test_a_model_becomes_a_robot_file(tmp_path: Path):
     assert not np.allclose(loaded.gravity(q), plain.gravity(q))
     # Nothing is written over unasked.
     status, said = run("robot", "import", path, "-o", out)
-    assert (status, "--overwrite" in said) == (2, True)
-    assert run("robot", "import", path, "-o", out, "--overwrite")[0] == 0
+    assert (status, "--force" in said) == (2, True)
+    assert run("robot", "import", path, "-o", out, "--force")[0] == 0
     assert load_robot(out).gravity(q) == pytest.approx(plain.gravity(q))
 
 

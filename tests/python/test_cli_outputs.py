@@ -6,6 +6,7 @@ import os
 import shutil
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from axisight import Diagnosis
 from axisight.cli import app
 from axisight.cli import diagnose as command
 from axisight.cli.demo import write_demo_case
+from axisight.gap import Interval
+from columns_data import maker_columns, write_csv
 from diagnosis_data import explained
 from import_data import URDF, written
 
@@ -118,9 +121,9 @@ def test_names_of_files_are_no_markup(case, quick, tmp_path, monkeypatch, name):
     [
         ("excite", "--robot", "irb6600_like", "--out", "FILE/a.csv"),
         ("columns", "guess", "LOG", "-o", "FILE/a.toml"),
-        ("columns", "guess", "LOG", "--overwrite", "-o", "LOG"),
+        ("columns", "guess", "LOG", "--force", "-o", "LOG"),
         ("robot", "import", "LOG", "-o", "FILE/a.toml"),
-        ("robot", "import", "LOG", "--overwrite", "-o", "LOG"),
+        ("robot", "import", "LOG", "--force", "-o", "LOG"),
         ("identify", "rigid-body", "irb6600_like", "LOG", "--out", "FILE/a.toml"),
         ("identify", "rigid-body", "irb6600_like", "LOG", "--force", "--out", "LOG"),
         ("identify", "axis", "LOG", "LOG", "--force", "--out", "LOG"),
@@ -160,3 +163,62 @@ def test_what_numpy_warns_of_is_not_shown(case, monkeypatch):
         warnings.simplefilter("always")
         run("diagnose", case)
     assert seen == []
+
+
+def test_results_are_replaced_and_what_people_work_on_is_not(case, quick):
+    """What the command makes anew ends as it does; anything else, a model above all, only by force."""
+    for option, name in (("--json", "v.json"), ("--report", "r.html")):
+        (case / name).write_text("an earlier result")
+        run("diagnose", case, option, case / name)
+        assert (case / name).read_text() != "an earlier result"
+    kept = ("new.toml", "arm.urdf", "arm.xml", "run.csv", "run.parquet", "notes.txt", "none")
+    for name in kept:
+        (case / name).write_text("mine")
+        link = case / f"{name}.json"
+        link.symlink_to(case / name)
+        for target in (case / name, link):
+            said = run("diagnose", case, "--json", target, status=2)
+            assert "--json: " in said
+            assert "exists and is no .json: choose another name, or --force replaces it" in said
+        assert (case / name).read_text() == "mine"
+    run("diagnose", case, "--json", case / "notes.txt", "--force")
+    assert (case / "notes.txt").read_text() != "mine"
+    assert "is no .html or .htm" in run("diagnose", case, "--report", case / "v.json", status=2)
+
+
+def test_a_model_is_replaced_by_force_only_and_signals_are(case, monkeypatch):
+    found = explained()
+    size = {"coulomb_nm": Interval(0.4, 0.3, 0.5)}
+    causes = [replace(found.causes[0], effect="coulomb_friction", axis=1, parameters=size)]
+    monkeypatch.setattr(command, "diagnose", lambda **_more: replace(found, causes=causes))
+    model = case / "new.toml"
+    model.write_text("mine")
+    said = run("diagnose", case, "--write-model", model, status=2)
+    assert "--write-model: " in said
+    assert "exists: choose another name, or --force replaces it" in said
+    assert model.read_text() == "mine"
+    assert "model: " in run("diagnose", case, "--write-model", model, "--force")
+    assert "coulomb_friction" in model.read_text()
+    signals = case / "s.parquet"
+    signals.write_text("earlier")
+    # There are none in the diagnosis that stands in for the work: they come to be written.
+    assert "exists" not in run("diagnose", case, "--signals", signals, status=2)
+
+
+def test_what_is_read_is_replaced_by_no_force(case, no_work):
+    for name in ("logs/moves.parquet", "robot.toml", "case.toml"):
+        assert "got an input" in run("diagnose", case, "--json", case / name, "--force", status=2)
+
+
+def test_one_word_replaces_files(case):
+    log = case / "logs" / "moves.parquet"
+    (case / "x.csv").write_text("mine")
+    said = run("simulate", "irb6600_like", log, "--out", case / "x.csv", status=2)
+    assert "--out: " in said
+    assert "is no .parquet" in said
+    own = write_csv(case / "own.csv", maker_columns("abb", 6))
+    for make in (("columns", "guess", own), ("robot", "import", written(case, URDF))):
+        out = case / f"made_{make[0]}.toml"
+        run(*make, "-o", out)
+        assert "exists: choose another name, or --force" in run(*make, "-o", out, status=2)
+        run(*make, "-o", out, "--force")

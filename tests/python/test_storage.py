@@ -83,6 +83,20 @@ def test_outputs_of_a_command_are_named_and_differ(tmp_path):
         storage.check_targets({"--json": tmp_path})
 
 
+def test_what_an_output_replaces_is_told_by_its_ending(tmp_path):
+    old, log = tmp_path / "old.JSON", tmp_path / "run.csv"
+    for path in (old, log):
+        path.write_text("")
+    results = {"--json": (".json",), "-o": ()}
+    storage.check_targets({"--json": old, "-o": tmp_path / "new.toml"}, replaces=results)
+    storage.check_targets({"--out, page": log}, replaces=results)
+    for option, target, words in (("--json", log, " and is no .json"), ("-o", old, "")):
+        expected = f"^{option}: .*exists{words}: choose another name, or --force replaces it"
+        with pytest.raises(InputError, match=expected):
+            storage.check_targets({option: target}, replaces=results)
+        storage.check_targets({option: target}, replaces=results, force=True)
+
+
 @posix
 def test_a_link_is_followed(tmp_path):
     (tmp_path / "there").mkdir()

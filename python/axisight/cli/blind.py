@@ -12,7 +12,7 @@ import typer
 
 from axisight.blind import judged_cases, markdown, summary
 from axisight.blind.page import render_score
-from axisight.cli.common import bars, errors, say, write_each
+from axisight.cli.common import Force, bars, errors, say, write_each
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
 from axisight.storage import check_folder, check_targets, write_whole
@@ -90,10 +90,13 @@ def score_command(
     out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
     json: Annotated[Path | None, typer.Option(help="Write all of it here.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write it here as a page.")] = None,
+    force: Force = False,
 ) -> None:
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
     with errors():
-        check_targets({"--out": out, "--json": json, "--html": html})
+        results = {"--out": (".md",), "--json": (".json",), "--html": (".html", ".htm")}
+        targets = {"--out": out, "--json": json, "--html": html}
+        check_targets(targets, replaces=results, force=force)
         judged = judged_cases(cases, truth, verdicts)
         score = summary(judged)
         text = markdown(score)

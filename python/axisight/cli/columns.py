@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import check_new, errors, say
+from axisight.cli.common import Force, errors, say
 from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
 from axisight.robot import load_robot
-from axisight.storage import write_whole
+from axisight.storage import check_targets, write_whole
 
 columns_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
@@ -49,12 +49,12 @@ def guess_command(
             help="robot.toml, URDF, MJCF or preset: number, names and kinds of axes.",
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace a file that exists.")] = False,
+    force: Force = False,
 ) -> None:
     """Propose a column map from names and numbers, with the reason of every choice beside it."""
     with errors():
         given = [log, *(Path(x) for x in (robot,) if x)]
-        check_new(out, overwrite=overwrite, inputs=given)
+        check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
         found = guess_columns(log, None if robot is None else load_robot(robot))
         if out is None:
             typer.echo(found.text, nl=False)

@@ -15,7 +15,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from axisight.cli.stopping import exit_status
 from axisight.errors import AxisightError, InputError, OutputError
-from axisight.storage import check_target
 
 OUT = Console()
 ERR = Console(stderr=True)
@@ -43,6 +42,11 @@ MaxBytes = Annotated[
     typer.Option(
         help="Most memory that reading one log may take, in bytes. Default: by the size of its files."
     ),
+]
+
+
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace files that exist, also what is no earlier result.")
 ]
 
 
@@ -115,11 +119,3 @@ def numbers(option: str, text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
-
-
-def check_new(target: Path | None, *, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
-    """Raise OutputError as `check_target` for a file to write; None is the screen."""
-    if target is not None:
-        if target.is_file() and not overwrite:
-            raise OutputError(f"{target} exists: choose another name or pass --overwrite")
-        check_target(target, inputs=inputs)

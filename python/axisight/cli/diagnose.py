@@ -15,6 +15,7 @@ import axisight
 from axisight import report as pages
 from axisight.cli.common import (
     Columns,
+    Force,
     From,
     MaxBytes,
     To,
@@ -29,12 +30,20 @@ from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
-from axisight.gap.inputs import read_inputs
+from axisight.gap.inputs import Inputs, read_inputs
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
 from axisight.robot import Robot
 from axisight.storage import check_targets
+
+# How files end that an output may replace unasked: what the command makes anew.
+_RESULTS = {
+    "--json": (".json",),
+    "--report": (".html", ".htm"),
+    "--signals": (".parquet", ".mcap"),
+    "--write-model": (),
+}
 
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
@@ -123,6 +132,7 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
         ),
     ] = None,
+    force: Force = False,
     untrusted: Untrusted = False,
     max_bytes: MaxBytes = None,
     start_s: From = 0.0,
@@ -157,6 +167,7 @@ def diagnose_command(
             "--write-model": write_model,
             "--signals": signals,
             "--simulated": simulated,
+            "--force": force,
             "--untrusted": untrusted,
             "--max-bytes": max_bytes,
             "--from": start_s,
@@ -193,11 +204,12 @@ def diagnose_command(
         }
         for path in () if next_experiment is None else experiment_files(next_experiment):
             targets[f"--next-experiment, {path.name}"] = path
-        check_targets(targets, inputs=[*inputs.files(), *_described(case_or_logs, columns)])
+        read = [*inputs.files(), *_described(case_or_logs, columns)]
+        check_targets(targets, inputs=read, replaces=_RESULTS, force=force)
         if write_model is not None:
-            axisight.write_back.check_target(inputs.robot_source, write_model)
+            axisight.write_back.check_target(inputs.robot_source, write_model, overwrite=force)
         if signals is not None:
-            axisight.signal_files.check_target(signals)
+            axisight.signal_files.check_target(signals, overwrite=True)
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -223,7 +235,7 @@ def diagnose_command(
         if next_experiment is not None:
             writes.append(partial(_write_experiment, found, next_experiment))
         if write_model is not None:
-            made = partial(_write_model, found, inputs.robot_source, inputs.robot, write_model)
+            made = partial(_write_model, found, inputs, write_model, force=force)
             writes.append(made)
         if signals is not None:
             writes.append(partial(_write_signals, found, signals))
@@ -236,15 +248,17 @@ def _described(given: Sequence[Path], columns: Path | None) -> list[Path]:
 
 
 def _write_signals(found: Diagnosis, target: Path) -> None:
-    say(f"signals: {axisight.signal_files.write_signals(found.signals, target)}")
+    say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
 
 
-def _write_model(found: Diagnosis, source: Path | str, robot: Robot, target: Path) -> None:
+def _write_model(found: Diagnosis, inputs: Inputs, target: Path, *, force: bool) -> None:
     """Write the simulator with its causes, and say which of them it has no place for."""
     if not found.causes:
         say("no model was written: no cause was named")
         return
-    made = axisight.write_back.write_model(source, robot, found.causes, target)
+    made = axisight.write_back.write_model(
+        inputs.robot_source, inputs.robot, found.causes, target, overwrite=force
+    )
     say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
     for label in made.left_out:
         say(f"no place in it for {label}: {made.why[label]}")

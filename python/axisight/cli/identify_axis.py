@@ -10,10 +10,9 @@ import typer
 from numpy.typing import NDArray
 
 import axisight
-from axisight.cli.common import errors, say
+from axisight.cli.common import Force, errors, say
 from axisight.cli.identify_common import (
     Columns,
-    Force,
     Out,
     Unchecked,
     band,

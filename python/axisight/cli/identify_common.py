@@ -42,7 +42,6 @@ Unchecked = Annotated[
     bool,
     typer.Option("--unchecked", help="Take logs in which `axisight check` finds errors."),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
 
 
 def load_source(robot: str) -> Robot:
@@ -121,10 +120,8 @@ def check_out(
     if out is None:
         return
     targets = {"--out": out, "--out, sidecar": sidecar_path(out)}
-    for path in () if force else targets.values():
-        if path.is_file():
-            raise OutputError(f"--out: {path} exists; --force replaces it")
-    check_targets(targets, inputs=[*logs, *(x for x in (columns,) if x)])
+    inputs = [*logs, *(x for x in (columns,) if x)]
+    check_targets(targets, inputs=inputs, replaces=dict.fromkeys(targets, ()), force=force)
 
 
 def options(ctx: typer.Context) -> dict[str, Any]:

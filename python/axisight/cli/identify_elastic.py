@@ -14,9 +14,8 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, errors, numbers, say
+from axisight.cli.common import OUT, Force, errors, numbers, say
 from axisight.cli.identify_common import (
-    Force,
     Out,
     check_out,
     load_source,

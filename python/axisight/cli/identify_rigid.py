@@ -12,10 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, From, To, errors, say
+from axisight.cli.common import OUT, Force, From, To, errors, say
 from axisight.cli.identify_common import (
     Columns,
-    Force,
     Out,
     Unchecked,
     check_out,

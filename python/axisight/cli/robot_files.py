@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import check_new, errors, say
+from axisight.cli.common import Force, errors, say
 from axisight.cli.robot import say_import
 from axisight.errors import InputError
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import Payload
 from axisight.robot_import.load import drive_data
-from axisight.storage import write_whole
+from axisight.storage import check_targets, write_whole
 
 robot_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
@@ -55,12 +55,12 @@ def import_command(
             help="Load mounted by hand: mass, and its centre in the frame of the last link [m].",
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace a file that exists.")] = False,
+    force: Force = False,
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
     with errors():
         given = [model, *(x for x in (drives,) if x)]
-        check_new(out, overwrite=overwrite, inputs=given)
+        check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
         data = drive_data(model, drives)
         if payload is not None:
             data = data.model_copy(update={"payload": _payload(payload)})

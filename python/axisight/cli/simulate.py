@@ -11,7 +11,7 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli.common import Columns, From, To, errors, numbers, say
+from axisight.cli.common import Columns, Force, From, To, errors, numbers, say
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.gap.inputs import part_of
@@ -63,11 +63,12 @@ def simulate_command(
     ] = 0.0,
     start_s: From = 0.0,
     stop_s: To = None,
+    force: Force = False,
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
         given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
-        check_targets({"--out": out}, inputs=given)
+        check_targets({"--out": out}, inputs=given, replaces={"--out": (".parquet",)}, force=force)
         machine = load_simulator(robot, parse_effects(effect))
         used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
         inputs = _inputs(used, machine, torque=torque)
