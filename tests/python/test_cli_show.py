@@ -41,6 +41,19 @@ def test_a_diagnosis_says_it_all(shown):
         assert words in text, words
 
 
+def test_positions_are_told_as_what_the_gains_command(shown):
+    found = explained()
+    text = shown(replace(found, gap=replace(found.gap, compared="positions")))
+    for words in (
+        "compared: Positions under the same targets, their errors told as the torque",
+        "sqrt(sum of squared errors / sum of squared commanded torques)",
+        "remains above noise: 3.7 % of the commanded torque",
+    ):
+        assert words in text, words
+    assert "of the torque" not in text.replace(found.headline, "")
+    assert "compared: " not in shown(found)
+
+
 def test_what_is_not_there_is_not_said(shown):
     text = shown(replace(of("none"), gap=replace(of("none").gap, pooled=None)))
     for words in ("pooled", "remains", "finding", "next experiment", "re-fitted within", "cause"):

@@ -49,6 +49,9 @@ def test_the_reason_is_looked_for_in_the_torque() -> None:
         assert finding.name == "gap_beyond_torque"
         assert finding.axis == 1
         assert reason in finding.message
+    (told,) = beyond_torque(replace(wide, compared="positions"), [good])
+    assert told.field == "position_1"
+    assert "the torque that the gains command along the logged positions" in told.message
     broke_off = replace(wide, before_per_axis=np.array([np.nan]))
     assert "broke off" in beyond_torque(broke_off, [good])[0].message
     assert beyond_torque(gap(0.5, 0.4, 0.3, 0.1, 1), [good]) == ()

@@ -1,5 +1,7 @@
 """Effects and causes in sentences."""
 
+from dataclasses import replace
+
 import pytest
 
 from axisight.effects import Effect, effect_table, noun, phrase, title
@@ -48,6 +50,21 @@ def conclusion(verdict: str, *rivals: str) -> Conclusion:
 )
 def test_an_effect_has_its_article_and_capitals(effect, words):
     assert phrase(effect) == words
+
+
+@pytest.mark.parametrize("verdict", ["none", "unknown", "explained", "undecidable"])
+@pytest.mark.parametrize("causes", [[], [cause("payload")]])
+def test_positions_have_a_gap_of_their_own(verdict, causes):
+    if verdict in ("explained", "undecidable") and not causes:
+        return
+    of = gap(0.3, 0.3, 0.06, 0.05, 3)
+    rivals = ["payload", "link_mass@2"] if verdict == "undecidable" else []
+    by_torque = headline(conclusion(verdict, *rivals), of, causes, ())
+    positions = replace(of, compared="positions")
+    text = headline(conclusion(verdict, *rivals), positions, causes, ())
+    assert "of the torque" in by_torque
+    expected = by_torque.replace("of the torque", "of the commanded torque")
+    assert text == expected.replace("the gap on", "the gap of positions on")
 
 
 @pytest.mark.parametrize("name", effect_table())

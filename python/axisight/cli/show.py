@@ -8,6 +8,7 @@ from rich.table import Table
 
 from axisight.cli.common import OUT, say
 from axisight.gap import Diagnosis, Gap, Interval, Where
+from axisight.gap.compared import FROM_POSITIONS, torque_of
 from axisight.gap.headline import in_order, percent
 from axisight.gap.own_simulator import said
 from axisight.report.limits import limit_table
@@ -43,8 +44,10 @@ def _show_comparison(found: Diagnosis) -> None:
     cutoff_hz = found.provenance.get("cutoff_hz")
     if cutoff_hz is not None:
         say(f"compared: by inverse dynamics, below {cutoff_hz:.3g} Hz (--cutoff-hz)")
+    if found.gap.compared == "positions":
+        say(f"compared: {FROM_POSITIONS}")
     if found.simulator is not None:
-        say(said(found.simulator))
+        say(said(found.simulator, found.gap.compared))
 
 
 def _show_places(found: Diagnosis) -> None:
@@ -54,7 +57,7 @@ def _show_places(found: Diagnosis) -> None:
     if left is None or not left.where:
         return
     varies = "" if left.varies_with is None else f"; it varies with {left.varies_with}"
-    say(f"remains above noise: {_percent(left.gap)} of the torque{varies}")
+    say(f"remains above noise: {_percent(left.gap)} of the {torque_of(found.gap.compared)}{varies}")
     for place in left.where:
         say(f"remains: {_place(place)}")
 
@@ -99,7 +102,8 @@ def _gaps(found: Diagnosis) -> Table:
         p = gap.pooled
         pooled = (p.before, p.refitted, p.after, p.floor)
         table.add_row("pooled", "", *(_percent(x) for x in pooled))
-        table.caption = "pooled: sqrt(sum of squared errors / sum of squared torques)"
+        squared = f"{torque_of(gap.compared)}s"
+        table.caption = f"pooled: sqrt(sum of squared errors / sum of squared {squared})"
     return table
 
 

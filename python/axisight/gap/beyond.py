@@ -7,12 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.compared import Compared
 from axisight.gap.faults import Finding
 from axisight.gap.result import Gap
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
+_WHAT: dict[Compared, tuple[str, str]] = {
+    "torques": ("the logged torque", "torque_cmd"),
+    "positions": ("the torque that the gains command along the logged positions", "position"),
+}
 # Ten times the torque: no effect that a simulator lacks does that.
 LARGEST = 10.0
 # A torque whose scatter is so small a share of its size hardly changes.
@@ -25,17 +30,18 @@ def beyond_torque(gap: Gap, logs: Sequence[Log]) -> tuple[Finding, ...]:
     """Return a finding for every axis whose simulator is off by more than ten times the torque, or broke off."""
     off = gap.before_per_axis
     axes = np.flatnonzero(~(off <= LARGEST))
-    return tuple(_finding(int(axis), float(off[axis]), logs) for axis in axes)
+    return tuple(_finding(int(axis), float(off[axis]), logs, gap.compared) for axis in axes)
 
 
-def _finding(axis: int, off: float, logs: Sequence[Log]) -> Finding:
+def _finding(axis: int, off: float, logs: Sequence[Log], compared: Compared) -> Finding:
+    what, column = _WHAT[compared]
     how = (
-        "is off by more than ten times what the logged torque scatters"
+        f"is off by more than ten times what {what} scatters"
         if np.isfinite(off)
         else "broke off: its loop is unstable along these logs"
     )
     message = f"axis {axis + 1}: the simulator {how}; {_reason(axis, logs)}"
-    return Finding("gap_beyond_torque", "flag", message, None, axis + 1, f"torque_cmd_{axis + 1}")
+    return Finding("gap_beyond_torque", "flag", message, None, axis + 1, f"{column}_{axis + 1}")
 
 
 def _reason(axis: int, logs: Sequence[Log]) -> str:

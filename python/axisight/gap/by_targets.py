@@ -44,6 +44,7 @@ class TargetsView(View):
     """Simulator and machine driven by the same targets, positions compared."""
 
     by_targets = True
+    compared = "positions"
     fitter: TargetsFitter
 
     def __init__(self, commanded: Commanded, logs: list[Log], settings: Settings) -> None:

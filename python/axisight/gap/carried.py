@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.by_axis import OwnAxes
+from axisight.gap.compared import torque_of
 from axisight.gap.edge import BENT
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
@@ -54,7 +55,7 @@ def carried_over(
     withdrawn = None
     if gap.floor > _ABSURD * gap.refitted:
         withdrawn = (
-            f"No verdict: the noise estimated from the logs ({percent(gap.floor)} of the torque) is "
+            f"No verdict: the noise estimated from the logs ({percent(gap.floor)} of the {torque_of(gap.compared)}) is "
             f"larger than the gap ({percent(gap.refitted)}): look for faults in the data, such as "
             f"glitches, frozen or missing samples, with `axisight check`."
         )
@@ -128,8 +129,8 @@ def open_check(stages: Stages) -> tuple[str, ...]:
         return ()
     share = percent(float(np.sqrt(stages.open.mean())))
     return (
-        f"Where motors stand or turn round, dry friction holds any torque in its band: up to {share} of the "
-        "torque is left open there, counts as gap, and speaks for or against nothing.",
+        f"Where motors stand or turn round, dry friction holds any torque in its band: up to {share} "
+        f"of the {torque_of(stages.compared)} is left open there, counts as gap, and speaks for or against nothing.",
     )
 
 
@@ -142,8 +143,8 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
     if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
         return (
             f"What explains the estimation logs does not carry over to the validation logs: there the "
-            f"simulator re-fitted within its tolerances leaves {percent(gap.refitted)} of the torque, with it "
-            f"{percent(gap.after)}."
+            f"simulator re-fitted within its tolerances leaves {percent(gap.refitted)} "
+            f"of the {torque_of(gap.compared)}, with it {percent(gap.after)}."
         )
     # Where little stands above the noise, what is left of it is the noise of the floor.
     if gap.after**2 - gap.floor**2 <= settings.smallest_gain * gap.floor**2:
@@ -155,15 +156,15 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
     if share >= 0.5 * settings.explained_share:
         return (
             f"What explains part of the gap leaves too much of it: on the validation logs it goes from "
-            f"{percent(gap.before)} to {percent(gap.after)} of the torque, {percent(gap.floor)} would be "
-            f"noise. Something else is missing."
+            f"{percent(gap.before)} to {percent(gap.after)} of the {torque_of(gap.compared)}, "
+            f"{percent(gap.floor)} would be noise. Something else is missing."
         )
     before, after = _squares(stages.given), _squares(stages.after)
     log, axis = divmod(int(np.argmax(after - before)), after.shape[1])
     return (
         f"What explains the estimation logs does not carry over to the validation logs: with it the "
-        f"gap goes from {percent(gap.before)} to {percent(gap.after)} of the torque; on axis {axis + 1} of "
-        f"{names[log]} from {percent(float(np.sqrt(before[log, axis])))} to "
+        f"gap goes from {percent(gap.before)} to {percent(gap.after)} of the {torque_of(gap.compared)}; "
+        f"on axis {axis + 1} of {names[log]} from {percent(float(np.sqrt(before[log, axis])))} to "
         f"{percent(float(np.sqrt(after[log, axis])))}."
     )
 
@@ -188,7 +189,8 @@ def _no_fall_there(own: OwnAxes, stages: Stages, names: Sequence[str]) -> str | 
     before, after = (percent(float(np.sqrt(x[log]))) for x in (given, left))
     return (
         f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
-        f"logs: with it the gap of the axis goes from {before} to {after} of the torque on {names[log]}."
+        f"logs: with it the gap of the axis goes from {before} to {after} of the "
+        f"{torque_of(stages.compared)} on {names[log]}."
     )
 
 
@@ -202,6 +204,6 @@ def _above_floor(stages: Stages, names: Sequence[str]) -> str | None:
     return (
         f"No effect is missing on the estimation logs, but that does not carry over to the validation "
         f"logs: on axis {axis + 1} of {names[log]} the simulator leaves "
-        f"{percent(float(np.sqrt(left[log, axis])))} of the torque unexplained; sensor noise alone leaves "
-        f"{percent(float(np.sqrt(noise[log, axis])))}."
+        f"{percent(float(np.sqrt(left[log, axis])))} of the {torque_of(stages.compared)} unexplained; sensor noise "
+        f"alone leaves {percent(float(np.sqrt(noise[log, axis])))}."
     )

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.compared import torque_of
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.search import Search
@@ -60,6 +61,7 @@ def chance_check(stages: Stages, judged: Stages) -> tuple[str, ...]:
     apart = percent(float(np.sqrt(judged.floor.mean())))
     return (
         f"With its causes the machine takes another course at the least disturbance: by noise alone two "
-        f"runs of the validation logs would differ by {apart} of the torque, and no simulator can come "
-        f"closer. Kept on these logs, it explains at least {100 * _FOLLOWED:.0f} % of what there is to explain.",
+        f"runs of the validation logs would differ by {apart} of the {torque_of(stages.compared)}, and no simulator "
+        f"can come closer. Kept on these logs, it explains at least {100 * _FOLLOWED:.0f} % of what there is to "
+        "explain.",
     )

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from axisight.effects import Effect, article, noun, phrase
 from axisight.effects.stated import STEPS
 from axisight.gap.beyond import LARGEST
+from axisight.gap.compared import gap_of, torque_of
 from axisight.gap.result import Cause, Gap, Where
 from axisight.gap.verdict import Conclusion
 
@@ -23,22 +24,23 @@ def headline(
     place = f" The gap lies mainly on axis {where[0].axis}." if where else ""
     if conclusion.withdrawn is not None:
         return f"{conclusion.withdrawn}{place}"
+    of = f"of the {torque_of(gap.compared)}"
     if conclusion.verdict == "none":
         return (
             f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
-            f"{percent(gap.refitted)} of the torque unexplained; sensor noise alone leaves {percent(gap.floor)}."
+            f"{percent(gap.refitted)} {of} unexplained; sensor noise alone leaves {percent(gap.floor)}."
         )
     if conclusion.verdict == "unknown" and causes:
         missing = named(causes, own, len(gap.before_per_axis))
         return (
             f"The simulator lacks {missing}, and something else that no known effect explains well: "
-            f"the gap on held-out data goes from {percent(gap.before)} to {percent(gap.after)} of the "
-            f"torque, {percent(gap.floor)} would be noise.{place}"
+            f"the {gap_of(gap.compared)} on held-out data goes from {percent(gap.before)} to "
+            f"{percent(gap.after)} {of}, {percent(gap.floor)} would be noise.{place}"
         )
     if conclusion.verdict == "unknown":
         return (
             f"The simulator misses something that no known effect explains well: "
-            f"{percent(gap.before)} of the torque is unexplained, {percent(gap.floor)} would be noise.{place}"
+            f"{percent(gap.before)} {of} is unexplained, {percent(gap.floor)} would be noise.{place}"
         )
     return _of_causes(conclusion, gap, causes, own)
 
@@ -50,16 +52,18 @@ def _of_causes(
     missing = named(causes, own, len(gap.before_per_axis))
     if causes and len(steps) == len(causes):
         return (
-            f"The simulator lacks {missing}: the steps of the encoders are the noise at which the gap of "
-            f"{percent(gap.refitted)} of the torque stands (noise and steps: {percent(gap.floor)})."
+            f"The simulator lacks {missing}: the steps of the encoders are the noise at which the "
+            f"{gap_of(gap.compared)} of {percent(gap.refitted)} of the {torque_of(gap.compared)} stands "
+            f"(noise and steps: {percent(gap.floor)})."
         )
     others = [c for c in causes if c not in steps]
     added = "it" if len(others) == 1 else "them"
     if steps:
         added = named(others, own, len(gap.before_per_axis))
     shrinks = (
-        f"adding {added} shrinks the gap on held-out data from {percent(gap.before)} to "
-        f"{percent(gap.after)} of the torque (noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
+        f"adding {added} shrinks the {gap_of(gap.compared)} on held-out data from {percent(gap.before)} to "
+        f"{percent(gap.after)} of the {torque_of(gap.compared)} "
+        f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
         rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])

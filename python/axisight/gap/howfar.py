@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.compared import Compared
 from axisight.gap.result import Gap, Interval, Overlay, Pooled
 from axisight.gap.torques import combine, relative_squares
 from axisight.logs import Log
@@ -77,6 +78,7 @@ class Stages:
     after: Stage
     floor: Stage
     open: Stage | None = None
+    compared: Compared = "torques"
 
 
 def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
@@ -90,7 +92,18 @@ def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
         combine(s.per_log()) for s in every
     )
     pooled = Pooled(*(s.pooled for s in every)) if one_unit else None
-    return Gap(before, refit, left, noise, before_axes, refit_axes, left_axes, noise_axes, pooled)
+    return Gap(
+        before,
+        refit,
+        left,
+        noise,
+        before_axes,
+        refit_axes,
+        left_axes,
+        noise_axes,
+        pooled,
+        stages.compared,
+    )
 
 
 def gap_reduction(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
+from axisight.gap.compared import Compared, torque_of
 from axisight.gap.faults import Finding
 from axisight.gap.result import Reproduction
 from axisight.gap.settings import Settings
@@ -34,7 +35,7 @@ def differs(found: Reproduction) -> NDArray[np.int64]:
     return np.flatnonzero(large & np.isin(np.arange(len(large)), places))
 
 
-def said(found: Reproduction) -> str:
+def said(found: Reproduction, compared: Compared = "torques") -> str:
     """Return a sentence about how far the model reproduces the user's simulator."""
     axes = ", ".join(f"axis {i + 1}: {100 * x:.2g} %" for i, x in enumerate(found.per_axis))
     whose = (
@@ -42,7 +43,7 @@ def said(found: Reproduction) -> str:
         if found.taken_off
         else "the gap is that of the model"
     )
-    return f"The model differs from your simulator by {axes} of its torque; {whose}."
+    return f"The model differs from your simulator by {axes} of its {torque_of(compared)}; {whose}."
 
 
 def noted(found: Reproduction) -> list[Finding]:

@@ -22,6 +22,7 @@ from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over, open_check
 from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.coarse import with_coarse_encoders
+from axisight.gap.compared import Compared
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
@@ -131,7 +132,7 @@ def diagnose(
     if signals:
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
-    checks = (*out.checks, *inputs.says(view.mode))
+    checks = (*out.checks, *inputs.says(view.mode, view.compared))
     out = replace(out, simulator=inputs.simulator, checks=checks)
     logged = "recovered" if inputs.recovered else "logged"
     out.provenance["references"] = logged if view.mode == "closed_loop" else None
@@ -186,11 +187,11 @@ class _Inputs:
             simulator=found,
         )
 
-    def says(self, mode: str) -> tuple[str, ...]:
+    def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
         """Return what is to be known of the logs."""
         own_poses = any(log.start_rad is not None for log in self.estimation)
         said = [
-            "" if self.simulator is None else own_simulator.said(self.simulator),
+            "" if self.simulator is None else own_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
             SAYS if self.recovered else "",
         ]
@@ -332,7 +333,12 @@ def _reach(
     ]
     remaining = zip(logs, _errors(steps[-1], measured), noise, strict=True)
     reached = Stages(
-        given, refitted, after, floor, None if left_open is None else measure(left_open)
+        given,
+        refitted,
+        after,
+        floor,
+        None if left_open is None else measure(left_open),
+        view.compared,
     )
     return Reach(
         reached,

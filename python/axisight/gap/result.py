@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.gap.compared import Compared
 from axisight.gap.faults import Finding
 from axisight.gap.separate.experiment import Experiment
 from axisight.storage import write_whole
@@ -54,7 +55,8 @@ class Gap:
     within their tolerances, no effect added; ``after``: with the causes added;
     ``floor``: what a perfect model would still leave (sensor noise). The
     ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where axes that turn
-    and axes that slide cannot be summed.
+    and axes that slide cannot be summed. Where ``compared`` is ``"positions"``, torques are what the stated gains
+    command along those of machine and simulator.
     """
 
     before: float
@@ -66,6 +68,7 @@ class Gap:
     after_per_axis: Array
     floor_per_axis: Array
     pooled: Pooled | None = None
+    compared: Compared = "torques"
 
 
 @dataclass(frozen=True)
@@ -334,6 +337,7 @@ def _gap(gap: Gap) -> dict[str, Any]:
         **{stage: getattr(gap, stage) for stage in _STAGES},
         "pooled": None if gap.pooled is None else asdict(gap.pooled),
         "per_axis": {stage: getattr(gap, f"{stage}_per_axis").tolist() for stage in _STAGES},
+        "compared": gap.compared,
     }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
+from axisight.gap.compared import Compared
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
@@ -34,6 +35,7 @@ class View(ABC):
 
     by_targets: ClassVar[bool] = False
     """Whether positions are compared under the same targets, not torques."""
+    compared: ClassVar[Compared] = "torques"
 
     mode: Mode
     robot: Robot

@@ -20,6 +20,7 @@ NO_VALUE = "–"
 SIGNIFICANT_SE = 3.0
 """Standard errors above which a cell of a map counts, unless the map's attrs say otherwise."""
 
+_FROM_POSITIONS = ", from positions"
 _REGIMES = {"abs_speed": "speed magnitude", "speed": "speed", "accel": "acceleration"}
 
 
@@ -151,16 +152,21 @@ def after_words(diagnosis: Diagnosis) -> str:
 
 
 def torque_unit(diagnosis: Diagnosis, axis: int) -> str:
-    """``Nm`` or ``N``, from ``provenance["axis_kinds"]``; without that, both are named."""
+    """``Nm`` or ``N``, from ``provenance["axis_kinds"]``; without that, both are named.
+
+    Where positions were compared it says so: what the stated gains command along them is no torque that was logged.
+    """
     kinds = diagnosis.provenance.get("axis_kinds")
+    unit = "Nm; N if prismatic"
     if isinstance(kinds, list | tuple) and 1 <= axis <= len(kinds):
-        return "N" if kinds[axis - 1] == "prismatic" else "Nm"
-    return "Nm; N if prismatic"
+        unit = "N" if kinds[axis - 1] == "prismatic" else "Nm"
+    return unit + (_FROM_POSITIONS if diagnosis.gap.compared == "positions" else "")
 
 
 def torque_word(unit: str) -> str:
-    """What a quantity in ``unit`` is called."""
-    return "motor force" if unit == "N" else "motor torque"
+    """What a quantity in ``unit``, as `torque_unit` has it, is called."""
+    kind = "force" if unit.removesuffix(_FROM_POSITIONS) == "N" else "torque"
+    return f"{'commanded' if unit.endswith(_FROM_POSITIONS) else 'motor'} {kind}"
 
 
 @dataclass(frozen=True)
