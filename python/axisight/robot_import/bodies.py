@@ -77,7 +77,7 @@ class Drive:
     ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
     ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero; ``servo``
     of an actuator that is told positions, its gains of position [Nm/rad] and speed [Nm s/rad], motor side;
-    ``gain`` is a motor's torque per command.
+    ``gain`` is a motor's torque per command; ``effort`` [Nm] the limit of the joint, 0 where none is said.
     """
 
     gear_ratio: float = 1.0
@@ -87,6 +87,7 @@ class Drive:
     spring: float = 0.0
     servo: tuple[float, float] | None = None
     gain: float = 1.0
+    effort: float = 0.0
 
 
 @dataclass(frozen=True)

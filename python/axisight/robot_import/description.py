@@ -11,6 +11,7 @@ from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING, TORQUE_CONSTANT
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Mass, Pose, joined
 from axisight.robot_import.chain import Chain, ChainJoint
+from axisight.robot_import.classes import with_rotors
 from axisight.robot_import.drives import DriveData, JointDrive, Payload
 
 # Of the simulators that read such files; logs say another where they have one.
@@ -30,6 +31,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
             raise RobotError(
                 f"drive data: joint.{name}: expected one of {', '.join(names)}, got {name!r}"
             )
+    drives, by_class = with_rotors(chain.joints, drives)
     joints = list(chain.joints)
     last = _loaded(joints[-1].mass, drives.payload, chain.end)
     tables, effects = [], []
@@ -82,6 +84,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
     head = [
         f"imported from {source}",
         *chain.notes,
+        *by_class,
         *_defaults(tables, drives, controller, servos),
     ]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)

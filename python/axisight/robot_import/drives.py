@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -20,6 +20,9 @@ def _not_zero(value: float) -> float:
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+RobotClass = Literal["cobot", "industrial", "desktop"]
 
 
 class _Strict(BaseModel):
@@ -54,11 +57,13 @@ class Payload(_Strict):
 class DriveData(_Strict):
     """The file: all of it may be left out.
 
+    ``robot_class``, ``class`` in the file, says which typical rotors stand for those that nothing says;
     ``base``, ``tip``: links between which the chain runs; ``sample_time`` [s]; ``position_noise_std``
     [rad], motor side; ``operating_point`` [rad or m] of the driven joints; ``controller`` and
     ``tolerances`` as in a robot file; ``joint`` by name.
     """
 
+    robot_class: RobotClass | None = Field(default=None, alias="class")
     base: str | None = None
     tip: str | None = None
     sample_time: _Positive | None = None

@@ -195,14 +195,15 @@ def _mass(link: Element) -> Mass | None:
 
 
 def _drive(joint: Element, ratio: float) -> Drive:
-    dynamics = joint.find("dynamics")
+    dynamics, limit = joint.find("dynamics"), joint.find("limit")
+    effort = 0.0 if limit is None else limit.number("effort", 0.0)
     if dynamics is None:
-        return Drive(gear_ratio=ratio)
+        return Drive(gear_ratio=ratio, effort=effort)
     found = {name: dynamics.number(name, 0.0) for name in ("damping", "friction")}
     for name, value in found.items():
         if value < 0:
             raise RobotError(f"{dynamics.where}: {name}: expected zero or more, got {value:g}")
-    return Drive(ratio, damping=found["damping"], friction=found["friction"])
+    return Drive(ratio, damping=found["damping"], friction=found["friction"], effort=effort)
 
 
 def _limits(joint: Element, kind: str) -> tuple[float, float] | None:
