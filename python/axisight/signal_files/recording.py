@@ -52,7 +52,9 @@ def _write(writer: Any, types: Any, folder: str, data: xr.Dataset) -> None:
     for name in data.data_vars:
         topic = f"{folder}/{str(name).removesuffix('_torque_nm')}"
         connection = writer.add_connection(topic, _STATE, typestore=types)
-        for stamp, effort in zip(stamps.tolist(), data[name].values, strict=True):
+        # Row by row in memory: filtered signals may lie column by column, which no message takes.
+        efforts = np.ascontiguousarray(data[name].values)
+        for stamp, effort in zip(stamps.tolist(), efforts, strict=True):
             seconds, rest = divmod(stamp, 1_000_000_000)
             time = known["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
             header = known["std_msgs/msg/Header"](stamp=time, frame_id="")
