@@ -8,8 +8,8 @@ from axisight.effects import Effect, effect_table, noun, phrase, title
 from axisight.gap.headline import headline, named
 from axisight.gap.result import Cause, Interval
 from axisight.gap.verdict import Conclusion
-from axisight.report.wording import plain_name
-from diagnosis_data import gap
+from axisight.report.wording import plain_name, torque_unit, torque_word
+from diagnosis_data import explained, gap
 
 ONE = Interval(1.0, 1.0, 1.0)
 
@@ -65,6 +65,16 @@ def test_positions_have_a_gap_of_their_own(verdict, causes):
     assert "of the torque" in by_torque
     expected = by_torque.replace("of the torque", "of the commanded torque")
     assert text == expected.replace("the gap on", "the gap of positions on")
+
+
+def test_torques_from_positions_say_so():
+    logged = explained()
+    told = replace(logged, gap=replace(logged.gap, compared="positions"))
+    slides = replace(told, provenance={"axis_kinds": ["prismatic"]})
+    units = [torque_unit(x, 1) for x in (logged, told, slides)]
+    assert units == ["Nm", "Nm, from positions", "N, from positions"]
+    words = [torque_word(unit) for unit in (*units, "N")]
+    assert words == ["motor torque", "commanded torque", "commanded force", "motor force"]
 
 
 @pytest.mark.parametrize("name", effect_table())

@@ -11,7 +11,6 @@ import pytest
 
 from axisight.gap import Interval, result
 from axisight.report import render_report, save_report
-from axisight.report.wording import torque_unit, torque_word
 from diagnosis_data import VERDICTS, explained, hostile, of, one_prismatic
 
 
@@ -59,16 +58,6 @@ def test_text_from_outside_cannot_become_markup():
     plain = len([t for t in parsed(render_report(explained())).tags if t == "script"])
     assert len([t for t in parsed(page).tags if t == "script"]) == plain
     assert "<script>alert" not in page
-
-
-def test_torques_from_positions_say_so():
-    logged = explained()
-    told = replace(logged, gap=replace(logged.gap, compared="positions"))
-    slides = replace(told, provenance={"axis_kinds": ["prismatic"]})
-    units = [torque_unit(x, 1) for x in (logged, told, slides)]
-    assert units == ["Nm", "Nm, from positions", "N, from positions"]
-    words = [torque_word(unit) for unit in (*units, "N")]
-    assert words == ["motor torque", "commanded torque", "commanded force", "motor force"]
 
 
 def test_values_stand_beside_the_headline():
