@@ -24,6 +24,8 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
 def opened(path: Path, *flags: str, width: int = 1200) -> tuple[str, list[str]]:
     """What Chromium prints of a page, and what the page left on the console."""
     command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+    # Containers have little shared memory.
+    command += ["--disable-dev-shm-usage"]
     command += ["--enable-logging=stderr", f"--window-size={width},5000"]
     command += ["--allow-file-access-from-files", "--virtual-time-budget=3000"]
     command += [f"--user-data-dir={path.parent / 'profile'}", *flags, path.as_uri()]
