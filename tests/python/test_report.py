@@ -9,6 +9,7 @@ import pytest
 from axisight.gap import Interval, result
 from axisight.report import render_report, save_report
 from axisight.report.figures import MAX_OVERLAYS
+from axisight.report.wording import standard_errors
 from diagnosis_data import VERDICTS, explained, named_everywhere, of, one_prismatic, overlay
 from pages import Page, assert_strict
 
@@ -115,3 +116,9 @@ def test_a_failed_write_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="disk full"):
         save_report(explained(), tmp_path / "report.html")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_less_than_zero_by_nothing():
+    assert [standard_errors(x) for x in (-0.04, 0.04, -0.06, -9.9, 12.3)] == [
+        "0.0", "0.0", "−0.1", "−9.9", "12",
+    ]  # fmt: skip

@@ -162,9 +162,9 @@ def test_nothing_overlaps_or_is_cut(tmp_path, width):
 POINTING = """
 var plot = document.querySelector("details[open] .plot");
 var frame = plot.querySelector(".frame").getBoundingClientRect();
-function point(kind, share) {
+function point(kind, share, type) {
   plot.dispatchEvent(new PointerEvent(kind, { clientX: frame.left + share * frame.width,
-    clientY: frame.top + 20, pointerType: "mouse", button: 0, pointerId: 1 }));
+    clientY: frame.top + 20, pointerType: type || "mouse", button: 0, pointerId: 1 }));
 }
 function ticks() {
   var texts = plot.querySelectorAll(".times text");
@@ -183,6 +183,9 @@ point("pointermove", 0);
 told.push(plot.parentNode.querySelector(".readout").textContent);
 plot.dispatchEvent(new MouseEvent("dblclick"));
 told.push(ticks());
+point("pointerdown", 0.5, "touch");
+point("pointerleave", 0.5, "touch");
+told.push(plot.parentNode.querySelector(".readout").textContent);
 var box = plot.parentNode.querySelector(".show-before");
 box.click();
 told.push(getComputedStyle(plot.querySelector("path.before")).display);
@@ -195,7 +198,7 @@ def test_values_under_the_pointer_and_a_closer_look(tmp_path):
     diagnosis = explained()
     page = render_report(diagnosis)
     found = told(page, tmp_path / "report.html", POINTING).split("|")
-    all_ticks, middle, near_ticks, at_start, again, before, after = found
+    all_ticks, middle, near_ticks, at_start, again, touched, before, after = found
     assert all_ticks == again == "0 2 4 6 8 10"
     assert near_ticks == "6.0 6.5 7.0 7.5 8.0 8.5"
     overlay = diagnosis.overlays[1]
@@ -203,7 +206,7 @@ def test_values_under_the_pointer_and_a_closer_look(tmp_path):
     measured, error = (
         x[near] for x in (overlay.measured_nm, overlay.before_nm - overlay.measured_nm)
     )
-    for text in (middle, at_start):
+    for text in (middle, at_start, touched):
         words = r"At (.*) s: measured (.*) Nm, before .* Nm; error before (.*) Nm, after .* Nm"
         at, value, off = (float(x.replace("−", "-")) for x in re.fullmatch(words, text).groups())
         assert at == pytest.approx(6.0, abs=0.01)

@@ -116,6 +116,7 @@
       }
     });
     plot.addEventListener("pointerdown", function (event) {
+      read(across(event));
       // A finger scrolls the page.
       if (event.pointerType !== "mouse" || event.button !== 0) { return; }
       begun = across(event);
@@ -130,7 +131,9 @@
       chosen.setAttribute("width", 0);
     });
     plot.addEventListener("dblclick", function () { look(0, 1); });
-    plot.addEventListener("pointerleave", function () {
+    plot.addEventListener("pointerleave", function (event) {
+      // What a finger asked for is read when it is gone.
+      if (event.pointerType === "touch") { return; }
       cursor.setAttribute("visibility", "hidden");
       readout.textContent = HINT;
     });
