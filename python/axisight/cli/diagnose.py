@@ -281,7 +281,6 @@ def diagnosis_writes(
         say(f"verdict: {target}")
 
     def page(target: Path) -> None:
-        # Brings plotly: only for those who ask for a page.
         pages.save_report(found, target)
         say(f"report: {target}")
 
