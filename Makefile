@@ -15,6 +15,8 @@
 PYTHON ?= python3.11
 VENV ?= .venv
 CARGO ?= cargo
+# Files of Python tests that run beside one another.
+JOBS ?= 2
 FUZZ ?= 10000
 KILLS ?= 100
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -57,7 +59,7 @@ test-rust:
 
 test-python: $(STAMPS)/test-tools
 	$(BIN)/python -m mypy.stubtest axisight._core
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses $(JOBS) --dist loadfile
 
 lint: $(STAMPS)/test-tools
 	$(CARGO) fmt --all --check

@@ -1,6 +1,7 @@
 """Made-up diagnoses, one per verdict, shared by the report and plot tests."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -10,6 +11,7 @@ from axisight.gap.result import (
     AxisVerdict,
     Candidate,
     Cause,
+    DetectionLimit,
     Diagnosis,
     Finding,
     Gap,
@@ -235,3 +237,34 @@ def hostile() -> Diagnosis:
         findings=(Finding("parameter_at_edge", "flag", bad, field=bad),),
         remainder=Remainder(0.1, np.full(3, 0.1), (Where(2, 0.5, (1.0, 2.0), bad, bad),), bad),
     )  # fmt: skip
+
+
+def named_everywhere(text: str) -> Diagnosis:
+    """A diagnosis that has every part, each of its texts replaced by ``text``."""
+    base = replace(
+        explained(),
+        detection_limits=(DetectionLimit("payload", None, "mass_kg", 0.2, "kg"),),
+        equivalent=(("torque_constant@2", "payload"),),
+        next_experiment="Hold still.",
+    )
+    # These two are one of a few words each.
+    return replace(_named(base, text), mode=base.mode, verdict=base.verdict)
+
+
+def _named(value, text: str):
+    if isinstance(value, str):
+        return text
+    if is_dataclass(value):
+        return replace(
+            value, **{f.name: _named(getattr(value, f.name), text) for f in fields(value) if f.init}
+        )
+    if isinstance(value, Mapping):
+        return {f"{text}{i}": _named(x, text) for i, x in enumerate(value.values())}
+    if isinstance(value, tuple | list):
+        return type(value)(_named(x, text) for x in value)
+    if isinstance(value, xr.Dataset):
+        worded = [n for n, c in value.coords.items() if c.dtype.kind in "UO"]
+        return value.assign_coords(
+            {n: [f"{text}{i}" for i in range(value.sizes[n])] for n in worded}
+        )
+    return value

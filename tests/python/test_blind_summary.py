@@ -13,6 +13,7 @@ from axisight.blind.page import render_score
 from axisight.blind.score import Judged
 from axisight.blind.summary import summary
 from axisight.errors import InputError
+from pages import assert_strict
 
 
 def judged(
@@ -152,6 +153,7 @@ def test_the_page_marks_what_is_right_and_wrong():
     # Right: play, friction, nothing and the tone that is unknown; wrong: the two others.
     assert cells.classes.count("right") == 4
     assert cells.classes.count("wrong") == 2
+    assert_strict(page)
     assert page == render_score("<b>mine</b>", summary(CASES))
     assert "Nothing." in render_score("x", summary(CASES[:1]))
 

@@ -95,6 +95,19 @@ def test_certainty_is_a_factor_on_the_weighted_error_and_its_slopes(robot, recor
     np.testing.assert_array_equal(part.jacobian, whole.jacobian * kept)
 
 
+def test_certainty_is_a_factor_on_the_weighted_error_of_a_predicted_torque(robot):
+    moved = np.zeros((1500, 1))
+    noise = np.random.default_rng(0).normal(size=(1500, 1))
+    certainty = np.linspace(0.0, 1.0, 1500)[:, None]
+    whole, part = (
+        _core.evaluate_inverse_dynamics(
+            robot.core, [], [], [(moved, moved, moved, noise, factor)], LOOP.core(), FitOptions()
+        ).residual
+        for factor in (np.ones_like(certainty), certainty)
+    )
+    np.testing.assert_array_equal(part, whole * certainty[: 1500 // 7 * 7 : 7, 0])
+
+
 @pytest.mark.parametrize(
     "certainty", [np.full((1500, 1), 1.1), np.full((1500, 1), np.nan), np.ones((1499, 1))]
 )

@@ -18,6 +18,7 @@ from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_flee
 from axisight.robot import load_robot
 from gap_data import bare_axis, logs_of, scattered
 from montecarlo_data import dask_cluster, kill
+from pages import assert_strict
 
 QUICK = Settings(bootstrap=50)
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -123,6 +124,7 @@ def test_a_page_shows_all_and_escapes(fleet, verdicts):
     table = fleet_table(fleet_cases(fleet), verdicts[1])
     table.loc[table["case"] == "packer/day_1", "headline"] = "<b>bad</b>"
     page = render_fleet("hall <3>", table, trends(table))
+    assert_strict(page)
     assert page == render_fleet("hall <3>", table, trends(table))
     assert "8 cases of 2 machines: 1 error" in page
     assert "hall &lt;3&gt;" in page and "&lt;b&gt;bad" in page and "<b>bad" not in page

@@ -125,3 +125,17 @@ def test_noise_larger_than_the_gap_is_a_fault_of_the_data():
     found = judged(named(), stages(0.5, 0.06, noise=0.9))
     assert found.verdict == "unknown"
     assert "No verdict" in (found.withdrawn or "")
+
+
+def test_a_gap_that_nobody_sees_is_below_whatever_noise():
+    """A simulation diagnosed by itself: sharp motions pass for noise, and nothing is missing."""
+    nothing = replace(named(), verdict="none", causes=(), effects=())
+    assert judged(nothing, stages(0.01, 0.01, noise=0.03)).verdict == "none"
+
+
+def test_what_is_left_open_stands_above_no_floor():
+    nothing = replace(named(), verdict="none", causes=(), effects=())
+    seen = stages(0.2, 0.2, noise=0.05)
+    assert judged(nothing, seen).verdict == "unknown"
+    opened = stage([log()], [0.3 * np.ones((N, 1))], 1.0)
+    assert judged(nothing, replace(seen, open=opened)).verdict == "none"

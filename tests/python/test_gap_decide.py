@@ -318,6 +318,16 @@ def test_few_stretches_count_for_less():
     assert few.significance(before, before - fall) == pytest.approx(2.2, abs=0.05)
 
 
+@pytest.mark.filterwarnings("error")
+def test_losses_of_simulations_that_diverged_have_a_significance():
+    none = np.zeros(4, int)
+    few = Layout(none, np.arange(4), none, np.full(4, 10))
+    fall = 4.0 / np.sqrt(4) + np.array([-1.0, 1.0, -1.0, 1.0]) * np.sqrt(3 / 4)
+    before = np.full(4, 1e202)
+    assert few.significance(before, before - 1e200 * fall) == pytest.approx(2.2, abs=0.05)
+    assert few.significance(np.zeros(4), np.zeros(4)) == 0.0
+
+
 def test_that_one_log_shows_an_effect_and_another_does_not_is_no_doubt_of_it():
     log = np.repeat([0, 1, 2], 8)
     layout = Layout(np.zeros(24, int), np.arange(24), log, np.full(24, 10))

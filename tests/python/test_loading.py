@@ -12,7 +12,7 @@ from axisight.cli import app
 from axisight.cli.application import _COMMANDS, load_command
 
 # Libraries that take longer to load than a command takes to answer.
-DEAR = ("dask", "matplotlib", "pandas", "plotly", "scipy", "xarray", "zarr")
+DEAR = ("dask", "matplotlib", "pandas", "scipy", "xarray", "zarr")
 
 
 def loaded_by(code: str) -> set[str]:
@@ -46,7 +46,7 @@ def test_help_loads_nothing_dear():
 
 
 def test_a_diagnosis_loads_no_plots():
-    assert not loaded_by("import axisight.cli.diagnose") & {"dask", "matplotlib", "plotly", "zarr"}
+    assert not loaded_by("import axisight.cli.diagnose") & {"dask", "matplotlib", "zarr"}
 
 
 @pytest.mark.parametrize("name", _COMMANDS)

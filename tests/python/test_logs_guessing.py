@@ -397,6 +397,8 @@ def test_what_cannot_be_guessed_lists_the_columns(tmp_path, columns, words):
         ("tau_J_d[3]", ("torque", True, None, None, 3)),
         ("AIPos.A1", ("position", False, None, None, 1)),
         ("ASPos.A1", ("position", True, None, None, 1)),
+        ("PositionCmptd3", ("position", True, None, None, 3)),
+        ("tau_calculated_3", ("torque", True, None, None, 3)),
         ("MACur.A6", ("current", None, None, None, 6)),
         ("GearTorque.A6", ("torque", None, None, "joint", 6)),
         ("joint_temperatures_4", ("temperature", None, None, "joint", 4)),

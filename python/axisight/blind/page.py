@@ -59,7 +59,7 @@ def render_score(name: str, score: dict[str, Any]) -> str:
             for m in score["misses"]
         ],
     }
-    return rendered("score.html.j2", page)
+    return rendered("score.html.j2", page, styles=("score.css",))
 
 
 def _carried_over(found: dict[str, Any] | None) -> list[dict[str, str]]:

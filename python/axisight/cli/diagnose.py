@@ -97,6 +97,12 @@ def diagnose_command(
             help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
         ),
     ] = None,
+    despite: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name of a fault of the logs that is refused: flag it and go on, e.g. rows_missing (repeatable)."
+        ),
+    ] = None,
     max_causes: Annotated[
         int, typer.Option(min=0, help="Stop after so many causes.")
     ] = Settings.max_causes,
@@ -162,6 +168,7 @@ def diagnose_command(
             "--report": report,
             "--tolerance": tolerance,
             "--threads": threads,
+            "--despite": despite,
             "--effect": effect,
             "--next-experiment": next_experiment,
             "--write-model": write_model,
@@ -214,6 +221,7 @@ def diagnose_command(
             seed=seed,
             cutoff_hz=cutoff_hz,
             max_causes=max_causes,
+            despite=tuple(despite or ()),
             threads=threads or os.cpu_count() or 1,
         )
         given = _tolerances(tolerance or [], inputs.robot)
@@ -287,7 +295,6 @@ def diagnosis_writes(
         say(f"verdict: {target}")
 
     def page(target: Path) -> None:
-        # Brings plotly: only for those who ask for a page.
         pages.save_report(found, target)
         say(f"report: {target}")
 

@@ -39,7 +39,7 @@ def render_fleet(name: str, table: pd.DataFrame, series: Sequence[Trend]) -> str
         "heads": [{"title": title, "num": num} for title, num in _HEADS],
         "rows": [_row(row) for row in table.to_dict("records")],
     }
-    return rendered("fleet.html.j2", page)
+    return rendered("fleet.html.j2", page, styles=("fleet.css",), script="fleet.js")
 
 
 def _headline(table: pd.DataFrame, growing: int) -> str:

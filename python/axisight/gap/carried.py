@@ -47,13 +47,13 @@ def carried_over(
     A cause whose addition does not shrink the validation gap is withdrawn; where nothing stands above the
     floor there, and hardly anything on the estimation logs, it is none. *None* is withdrawn where a
     log stands above the floor; and nothing is said where the noise estimated from the logs is
-    larger than the gap. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
+    larger than a gap that is seen. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
     of their tolerance, where that counts. ``removed``: share of what weighted residuals of the validation
     logs have above noise that the causes remove; None where it is not known.
     """
     withdrawn = None
-    if gap.floor > _ABSURD * gap.refitted:
+    if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = (
             f"No verdict: the noise estimated from the logs ({percent(gap.floor)} of the {torque_of(gap.compared)}) is "
             f"larger than the gap ({percent(gap.refitted)}): look for faults in the data, such as "

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from axisight.errors import CaseError, LogError
+from axisight.errors import CaseError, InputError, LogError
 
 GateSeverity = Literal["refuse", "flag"]
 
@@ -75,6 +75,23 @@ MEANINGS: dict[str, str] = {
 """Every name, and what it stands for. Names are part of the interface: they are never changed."""
 
 
+NEEDED = frozenset(
+    {
+        "axes_differ",
+        "sample_time_differs",
+        "rates_differ",
+        "time_in_ms",
+        "time_in_us",
+        "file_unreadable",
+        "log_too_short",
+        "not_finite",
+        "time_not_increasing",
+        "time_jitter",
+    }
+)
+"""What a diagnosis cannot do without, whatever anybody says."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """One fault of a simulator or its logs, found by the gate or by the re-fit.
@@ -117,6 +134,24 @@ class RefusedInputError(CaseError, LogError):
         refused = [f for f in findings if f.severity == "refuse"]
         more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
         super().__init__(f"{refused[0]}{more}")
+
+
+def flagged(findings: Iterable[Finding], names: Collection[str]) -> list[Finding]:
+    """Return the findings with those of ``names`` flagged where they were refused."""
+    return [
+        replace(f, severity="flag", message=f"{f.message} (taken despite that, as asked for)")
+        if f.severity == "refuse" and f.name in names
+        else f
+        for f in findings
+    ]
+
+
+def check_names(names: Collection[str]) -> None:
+    """Raise InputError for what is no name of a fault that a diagnosis can be made with."""
+    for name in names:
+        if name not in MEANINGS or name in NEEDED:
+            known = ", ".join(n for n in MEANINGS if n not in NEEDED)
+            raise InputError(f"despite: expected names among {known}, got {name!r}")
 
 
 def refused(findings: Iterable[Finding]) -> bool:

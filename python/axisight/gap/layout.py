@@ -101,6 +101,8 @@ def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:
 
     The standard error of a stratified mean: scatter within each log, pooled.
     """
+    # A simulation that diverges leaves what has no square.
+    x = x / max(float(np.abs(x).max()), 1e-300)
     own = [x[logs == log] for log in np.unique(logs)]
     if max(len(part) for part in own) < 2:
         own = [x]

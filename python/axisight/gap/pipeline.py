@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -106,7 +106,7 @@ def diagnose(
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
-    inputs = _passed(machine, fit_logs, held_logs)
+    inputs = _passed(machine, fit_logs, held_logs, chosen.despite)
     progress("looking at the logs", 1, 1)
     view = inputs.view(chosen)
     if simulated:
@@ -198,17 +198,19 @@ class _Inputs:
         return tuple(filter(None, said))
 
 
-def _passed(robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]) -> _Inputs:
+def _passed(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], despite: Collection[str]
+) -> _Inputs:
     """Return simulator and logs behind the gate, with commands and references where none were logged."""
     logs, n = [*estimation, *validation], len(estimation)
     commanded = with_commands(robot, logs)
     if commanded is not None:
         logged = commanded.as_logged()
-        noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:])
+        noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:], despite)
         robot, logs = commanded.robot, list(commanded.logs)
     else:
         logs = at_their_poses(robot, logs)
-        noted = pass_gate(robot, logs[:n], logs[n:])
+        noted = pass_gate(robot, logs[:n], logs[n:], despite)
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
     return _Inputs(robot, logs[:n], logs[n:], noted, commanded, recovered is not None)

@@ -46,7 +46,8 @@ class Settings:
     ``largest_scatter`` above the floor counts as scatter of the simulator.
     ``explained_share``: below it, the causes found do not explain the gap.
     ``cutoff_hz``: of the low-pass on motion and torque in inverse dynamics; None chooses it
-    from the data. ``seed`` rules every random choice.
+    from the data. ``despite``: names of faults of the logs that would be refused, and are flagged
+    only. ``seed`` rules every random choice.
     """
 
     tolerances: Mapping[str, float] | None = None
@@ -62,6 +63,7 @@ class Settings:
     significance: float = 3.0
     false_alarms: float = 0.05
     cutoff_hz: float | None = None
+    despite: tuple[str, ...] = ()
     bootstrap: int = 1000
     seed: int = 0
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -77,5 +79,6 @@ class Settings:
         names = [f.name for f in fields(self) if f.name != "threads"]
         return {
             **{name: getattr(self, name) for name in names},
+            "despite": list(self.despite),
             "tolerances": dict(self.tolerances_of(robot)),
         }

@@ -1,6 +1,6 @@
 """A diagnosis in words, figures and one page.
 
-The page brings plotly and jinja2; it is loaded when first asked for.
+The page brings jinja2; it is loaded when first asked for.
 """
 
 from __future__ import annotations

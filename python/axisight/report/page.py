@@ -8,9 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
-
 from axisight.effects import effect_table
 from axisight.gap.headline import in_order
 from axisight.gap.result import (
@@ -24,14 +21,8 @@ from axisight.gap.result import (
     VerdictKind,
     Where,
 )
-from axisight.palette import cell_colors
-from axisight.report.figures import (
-    TOP,
-    first_overlay,
-    overlay_items,
-    page_json,
-    ranking_figure,
-)
+from axisight.report.colors import shade
+from axisight.report.figures import TOP, overlays_by_log, ranking_bars
 from axisight.report.limits import limit_table
 from axisight.report.template import rendered
 from axisight.report.wording import (
@@ -77,7 +68,7 @@ def render_report(diagnosis: Diagnosis) -> str:
 
     The same diagnosis gives the same text. All names and sentences are escaped.
     """
-    return rendered("report.html.j2", _page(diagnosis))
+    return rendered("report.html.j2", _page(diagnosis), styles=("figures.css",), script="report.js")
 
 
 def save_report(diagnosis: Diagnosis, path: Path | str) -> None:
@@ -87,7 +78,7 @@ def save_report(diagnosis: Diagnosis, path: Path | str) -> None:
 
 def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     badge, meaning = _VERDICTS[diagnosis.verdict]
-    logs, items, left_out = overlay_items(diagnosis)
+    logs, left_out = overlays_by_log(diagnosis)
     ranking = ranked(diagnosis)
     return {
         "name": diagnosis.name,
@@ -108,11 +99,8 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "causes": [_cause(cause) for cause in in_order(diagnosis.causes)],
         "ranking": [_candidate(c) for c in ranking],
         "top": TOP,
-        "ranking_json": Markup(page_json(ranking_figure(diagnosis).to_plotly_json())),
+        "bars": ranking_bars(diagnosis),
         "logs": logs,
-        "axes": sorted({item["axis"] for item in items}),
-        "overlays_json": Markup(page_json({"first": first_overlay(diagnosis), "items": items})),
-        "n_overlays": len(items),
         "overlays_left_out": left_out,
         "alternatives": [_candidate(c) for c in diagnosis.alternatives],
         "equivalent": [[title_of_label(label) for label in g] for g in diagnosis.equivalent],
@@ -121,7 +109,6 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "refit": _refit(diagnosis.refit),
         "provenance": _flat(diagnosis.provenance),
         "settings": _flat(diagnosis.settings),
-        "plotly": Markup(get_plotlyjs()),
     }
 
 
@@ -221,9 +208,7 @@ def _maps(maps: list[GapMap]) -> dict[str, Any]:
     ticks = [limit * i / 4 for i in range(5)]
     return {
         "threshold": number(maps[0].threshold, 2) if maps else NO_VALUE,
-        "scale": [
-            {"color": cell_colors(tick, limit)[0], "label": percent(tick, 2)} for tick in ticks
-        ],
+        "scale": [{"shade": shade(tick, limit), "label": percent(tick, 2)} for tick in ticks],
         "shown": [
             {"title": m.title, "columns": m.columns, "rows": _map_rows(m, limit)} for m in maps
         ],
@@ -237,7 +222,6 @@ def _map_rows(m: GapMap, limit: float) -> list[dict[str, Any]]:
         for j, column in enumerate(m.columns):
             share, errors = float(m.share[i, j]), float(m.significance[i, j])
             kind = "absent" if math.isnan(share) else "counts" if m.significant[i, j] else "muted"
-            background, ink = cell_colors(share, limit)
             told = (
                 "no data"
                 if kind == "absent"
@@ -246,8 +230,7 @@ def _map_rows(m: GapMap, limit: float) -> list[dict[str, Any]]:
             )
             cells.append(
                 {
-                    "kind": kind,
-                    "style": f"background:{background};color:{ink}" if kind == "counts" else "",
+                    "kind": f"{kind} {shade(share, limit)}" if kind == "counts" else kind,
                     "share": cell_percent(share),
                     "errors": "" if kind == "absent" else f"{standard_errors(errors)}σ",
                     "told": f"Axis {axis}, {column}: {told}",

@@ -1,14 +1,27 @@
-"""Pages from templates: everything escaped, nothing left out silently."""
+"""Pages from templates: everything escaped, nothing left out silently, nothing fetched or foreign run."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib import resources
 from typing import Any
 
 import jinja2
+from markupsafe import Markup
+
+from axisight.report.colors import palette_css
 
 
-def rendered(name: str, page: dict[str, Any]) -> str:
-    """Return the template ``name`` of this package filled in; raises jinja2.UndefinedError for a gap."""
+def rendered(
+    name: str, page: dict[str, Any], *, styles: Sequence[str] = (), script: str | None = None
+) -> str:
+    """Return the template ``name`` of this package filled in; raises jinja2.UndefinedError for a gap.
+
+    ``styles`` and ``script`` name further files beside it. The page may use these and what all
+    pages share, known by their hashes; whatever else stands in it is not run, and nothing is fetched.
+    """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("axisight.report", "templates"),
         autoescape=True,
@@ -16,4 +29,28 @@ def rendered(name: str, page: dict[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(name).render(page).strip() + "\n"
+    style = "\n".join([palette_css(), *map(_source, ("page.css", *styles))])
+    code = None if script is None else _source(script)
+    own = {
+        "policy": _policy(style, code),
+        "style": Markup(style),
+        "script": None if code is None else Markup(code),
+    }
+    return environment.get_template(name).render(page | own).strip() + "\n"
+
+
+def _source(name: str) -> str:
+    return resources.files("axisight.report").joinpath("templates", name).read_text("utf-8")
+
+
+def _policy(style: str, script: str | None) -> str:
+    """Return the content policy of a page whose only style and script have these texts."""
+    rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
+    rules.append(f"style-src '{_digest(style)}'")
+    if script is not None:
+        rules.append(f"script-src '{_digest(script)}'")
+    return "; ".join(rules)
+
+
+def _digest(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

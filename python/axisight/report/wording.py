@@ -109,7 +109,8 @@ def standard_errors(value: float) -> str:
     """A significance in standard errors: one decimal below ten, whole above."""
     if not math.isfinite(value):
         return _not_finite(value)
-    return _minus(f"{value:.1f}" if abs(value) < 9.95 else f"{value:.0f}")
+    # What is added takes the sign off a zero.
+    return _minus(f"{round(value, 1) + 0.0:.1f}" if abs(value) < 9.95 else f"{value:.0f}")
 
 
 def interval_texts(interval: Interval, scale: float = 1.0) -> tuple[str, str]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from axisight.fitting.simulation_error import is_closed_loop
-from axisight.gap.faults import Finding, RefusedInputError, refused
+from axisight.gap.faults import Finding, RefusedInputError, check_names, flagged, refused
 from axisight.gap.gate.closed_loop import check_closed_loop
 from axisight.gap.gate.copies import check_copies
 from axisight.gap.gate.inverse_checks import check_inverse
@@ -21,67 +21,93 @@ from axisight.robot import Robot
 
 
 def pass_gate(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], taken: Collection[str] = ()
 ) -> tuple[Finding, ...]:
     """Return what is to be said of a simulator and its logs; raise RefusedInputError if they cannot be.
 
     Arguments as in :func:`check_inputs`.
     """
-    findings = check_inputs(robot, estimation, validation)
+    findings = check_inputs(robot, estimation, validation, despite=taken)
     if refused(findings):
         raise RefusedInputError(findings)
     return findings
 
 
 def pass_gate_by_targets(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], taken: Collection[str] = ()
 ) -> tuple[Finding, ...]:
     """Return the same of logs whose torque is what the controller commands along them, at their own rate."""
-    findings = check_by_targets(robot, estimation, validation)
+    findings = check_by_targets(robot, estimation, validation, despite=taken)
     if refused(findings):
         raise RefusedInputError(findings)
     return findings
 
 
 def check_by_targets(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    *,
+    despite: Collection[str] = (),
 ) -> tuple[Finding, ...]:
-    """Return every fault of such logs that shows without a fit."""
+    """Return every fault of such logs that shows without a fit; ``despite`` as in :func:`check_inputs`."""
+    check_names(despite)
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
     found += _of_each(check_log_alone, logs)
-    return (*found, *check_copies(estimation, validation))
+    found += check_copies(estimation, validation)
+    return tuple(flagged(found, despite))
 
 
 def check_inputs(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    *,
+    despite: Collection[str] = (),
 ) -> tuple[Finding, ...]:
     """Return every fault of a simulator and its logs that shows without a fit.
 
     ``robot``: the simulator; ``estimation``, ``validation``: logs of it. First what the robot file says
     of all logs, then each log for itself, then logs against one another, then against the simulator:
     by the controller's law in closed loop, by inverse dynamics otherwise. What is refused at one of
-    these stages is not taken further, for what follows rests on it.
+    these stages is not taken further, for what follows rests on it. ``despite``: names of faults that
+    are flagged only. Raises InputError for one that no diagnosis can be made with.
     """
+    check_names(despite)
+    found: list[Finding] = []
+    for stage in (_machine, _logs, _against_simulator, _at_last):
+        found += flagged(stage(robot, estimation, validation), despite)
+        if refused(found):
+            break
+    return tuple(found)
+
+
+_Logs = Sequence[Log]
+
+
+def _machine(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
+    return check_machine(robot, [*estimation, *validation])
+
+
+def _logs(_robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
+    alone = _of_each(check_log_alone, [*estimation, *validation])
+    return [*alone, *check_copies(estimation, validation)]
+
+
+def _against_simulator(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
     logs = [*estimation, *validation]
-    found = check_machine(robot, logs)
-    if refused(found):
-        return tuple(found)
-    found += _of_each(check_log_alone, logs)
-    found += check_copies(estimation, validation)
-    if refused(found):
-        return tuple(found)
-    found += _references(robot, logs)
     closed = is_closed_loop(robot, logs)
-    if closed:
-        found += _closed_loop(robot, logs)
-    else:
-        found += check_inverse(robot, logs)
-    if refused(found):
-        return tuple(found)
-    if closed:
-        found += check_start(robot, logs)
-    return (*found, *check_noise(robot, logs))
+    return [
+        *_references(robot, logs),
+        *(_closed_loop(robot, logs) if closed else check_inverse(robot, logs)),
+    ]
+
+
+def _at_last(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
+    logs = [*estimation, *validation]
+    start = check_start(robot, logs) if is_closed_loop(robot, logs) else []
+    return [*start, *check_noise(robot, logs)]
 
 
 def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding, ...]:

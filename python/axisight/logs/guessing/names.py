@@ -35,7 +35,8 @@ _QUANTITIES = {word: quantity for quantity, words in _WORDS.items() for word in 
 _PLACES = {"joint", "joints", "axis", "state", "action"}
 _MEASURED = _words("actual act measured meas feedback fb present real ist")
 _WANTED = _words(
-    "target ref reference cmd command commanded des desired set setpoint goal soll planned action"
+    "target ref reference cmd command commanded des desired set setpoint goal soll planned action computed cmptd "
+    "calc calculated"
 )
 # What is none of an axis, or no measurement: of the tool, computed by a model, a bound.
 _OTHER = _words(
