@@ -247,8 +247,10 @@ def named_everywhere(text: str) -> Diagnosis:
         equivalent=(("torque_constant@2", "payload"),),
         next_experiment="Hold still.",
     )
-    # These two are one of a few words each.
-    return replace(_named(base, text), mode=base.mode, verdict=base.verdict)
+    named = _named(base, text)
+    # These three are one of a few words each.
+    gap = replace(named.gap, compared=base.gap.compared)
+    return replace(named, mode=base.mode, verdict=base.verdict, gap=gap)
 
 
 def _named(value, text: str):

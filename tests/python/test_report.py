@@ -122,3 +122,13 @@ def test_nothing_is_less_than_zero_by_nothing():
     assert [standard_errors(x) for x in (-0.04, 0.04, -0.06, -9.9, 12.3)] == [
         "0.0", "0.0", "−0.1", "−9.9", "12",
     ]  # fmt: skip
+
+
+def test_the_page_says_what_is_compared_and_how_fits_ended():
+    base = of("explained")
+    page = render_report(base)
+    assert "measured and simulated motor torque, relative to the rms of the" in page
+    assert "max_iterations" not in page
+    positions = replace(base, gap=replace(base.gap, compared="positions"))
+    page = render_report(positions)
+    assert "positions, told as the torque that the stated gains command" in page

@@ -13,6 +13,7 @@ from axisight.report.curves import path, thin
 from axisight.report.scale import Scale
 from axisight.report.wording import (
     after_words,
+    fit_words,
     number,
     percent,
     probability,
@@ -48,7 +49,7 @@ def ranking_bars(diagnosis: Diagnosis) -> list[dict[str, str]]:
             "probability": probability(c.probability),
             "told": f"{title_of(c)}: probability {probability(c.probability)}, "
             f"held-out score {percent(c.score)}, "
-            f"significance {standard_errors(c.significance)} standard errors, {c.status}",
+            f"significance {standard_errors(c.significance)} standard errors, {fit_words(c.status)}",
         }
         for c in ranked(diagnosis)[:TOP]
     ]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from axisight.effects import effect_table
+from axisight.gap.compared import torque_of
 from axisight.gap.headline import in_order
 from axisight.gap.result import (
     Candidate,
@@ -30,6 +31,7 @@ from axisight.report.wording import (
     GapMap,
     after_words,
     cell_percent,
+    fit_words,
     gap_maps,
     interval_texts,
     number,
@@ -62,6 +64,11 @@ _MODES = {
     "inverse_dynamics": "Inverse dynamics: torque predicted from the measured motion.",
 }
 
+_COMPARED = {
+    "torques": "measured and simulated motor torque",
+    "positions": "measured and simulated positions, told as the torque that the stated gains command",
+}
+
 
 def render_report(diagnosis: Diagnosis) -> str:
     """Return the diagnosis as one HTML page with everything it needs inside.
@@ -80,6 +87,8 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     badge, meaning = _VERDICTS[diagnosis.verdict]
     logs, left_out = overlays_by_log(diagnosis)
     ranking = ranked(diagnosis)
+    measured = "measured" if diagnosis.gap.compared == "torques" else ""
+    remainder = diagnosis.remainder
     return {
         "name": diagnosis.name,
         "headline": diagnosis.headline,
@@ -87,13 +96,17 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "badge": badge,
         "meaning": meaning,
         "mode": _MODES[diagnosis.mode],
+        "compared": _COMPARED[diagnosis.gap.compared],
+        "torque": f"{measured} {torque_of(diagnosis.gap.compared)}".strip(),
         "numbers": _numbers(diagnosis),
         "gap_rows": _gap_rows(diagnosis),
         "pooled": diagnosis.gap.pooled is not None,
         "values": _values(diagnosis.causes),
         "findings": [str(finding) for finding in diagnosis.findings],
         "where": _places(diagnosis.where),
-        "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
+        "remainder": None
+        if remainder is None
+        else _remainder(remainder, torque_of(diagnosis.gap.compared)),
         "limits": limit_table(diagnosis.detection_limits, len(diagnosis.gap.before_per_axis)),
         "maps": _maps(gap_maps(diagnosis)),
         "causes": [_cause(cause) for cause in in_order(diagnosis.causes)],
@@ -166,13 +179,13 @@ def _places(places: Sequence[Where]) -> list[dict[str, str]]:
     ]
 
 
-def _remainder(remainder: Remainder) -> dict[str, Any]:
+def _remainder(remainder: Remainder, torque: str) -> dict[str, Any]:
     if not remainder.where:
         text = "Nothing stands out of the floor on the held-out logs with what was found."
     else:
         varies = remainder.varies_with
         text = (
-            f"With what was found {percent(remainder.gap)} of the torque on the held-out logs "
+            f"With what was found {percent(remainder.gap)} of the {torque} on the held-out logs "
             f"remain above the floor{'' if varies is None else f'; that varies with {varies}'}."
         )
     return {"text": text, "where": _places(remainder.where)}
@@ -265,7 +278,7 @@ def _candidate(candidate: Candidate) -> dict[str, str]:
         "probability": probability(candidate.probability),
         "score": percent(candidate.score),
         "significance": standard_errors(candidate.significance),
-        "status": candidate.status,
+        "status": fit_words(candidate.status),
     }
 
 

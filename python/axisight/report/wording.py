@@ -29,6 +29,21 @@ def plain_name(name: str) -> str:
     return title(name)
 
 
+_FITS = {
+    "loss_converged": "converged",
+    "step_converged": "converged",
+    "exact": "exact",
+    "max_iterations": "as far as it counts",
+    "stalled": "no step lowers it",
+    "shown_by_the_logs": "shown by the logs",
+}
+
+
+def fit_words(status: str) -> str:
+    """How the fit of a candidate ended: one that is not a cause is fitted as far as its rank needs."""
+    return _FITS.get(status, status)
+
+
 def place(axis: int | None, axes: tuple[int, int] | None = None) -> str:
     """``axis 2``, ``axes 5 and 6``, or ``whole arm``."""
     if axes is not None:
