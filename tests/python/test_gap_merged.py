@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from axisight import Effect, Settings
+from axisight import Effect, Settings, load_robot
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.decide import likelier
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import layout_of
 from axisight.gap.merged import one_for_several, several_together
-from gap_data import bare_axis, logs_of
+from gap_data import bare_axis, log_of, logs_of, reference
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
 COULOMB = FreeEffect(
@@ -73,3 +73,29 @@ def test_a_number_more_costs_as_in_the_ranking():
     assert likelier(1.0, 3.0, than=(1.001 * worth, 2.0))
     assert not likelier(1.0, 3.0, than=(0.999 * worth, 2.0))
     assert likelier(1.0, 2.0, than=(1.0, 3.0))
+
+
+def test_a_link_that_is_heavier_and_off_its_centre_is_a_load():
+    """What a mass on the last link does is what two changes of that link do, and is met more often."""
+    robot = load_robot("irb6600_like")
+    machine = [Effect("payload", None, {"mass_kg": 100.0, "x_m": 0.7, "y_m": 0.05, "z_m": 0.25})]
+    n = int(3.0 / robot.sample_time_s)
+    logs = []
+    for run in range(2):
+        wanted = [reference("multisine", 3 * run + i, n, robot.sample_time_s) for i in range(3)]
+        logs.append(log_of(robot, machine, np.hstack(wanted), run))
+    view = ClosedLoopView(robot, logs, Settings(block_s=0.5))
+    parts = [
+        FreeEffect(Effect("link_mass", 3, {"relative_change": 0.1}), ("relative_change",)),
+        FreeEffect(
+            Effect("link_com", 3, {"x_m": 0.0, "y_m": 0.0, "z_m": 0.0}), ("x_m", "y_m", "z_m")
+        ),
+    ]
+    model = view.fitter.fit(parts)
+    assert list(several_together(model)) == [(3, "load")]
+    floor = view.floor.expected[model.axis] * model.size
+    options = view.candidates(model, axes=[3])
+    one = one_for_several(view.fitter, model, options, floor, layout_of(model), view.settings)
+    assert one is not None
+    assert one[0].trial.label == "payload"
+    assert one[1].axis == 2

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,11 @@ from axisight.gap.trials import settled
 Array = NDArray[np.float64]
 
 
+# Share of what several explain that one in their place may leave more: by what formulas of a gear differ, and
+# by what is left of other laws, where loads are rigid bodies.
+_DIFFER = {GEAR: FORMULA_ERROR, "load": 1e-4}
+
+
 def one_for_several(
     fitter: ModelFitter,
     model: Evidence,
@@ -46,8 +52,8 @@ def one_for_several(
     """Return the first effect that does what several of its axis and family do; None without.
 
     ``options``: the candidates, which are tried in their place, as is each of the several; ``floor``
-    (n_blocks,): loss of noise alone. It has fewer numbers, and may leave a little more; of laws of a gear
-    what formulas of one effect differ by.
+    (n_blocks,): loss of noise alone. It has fewer numbers (a load no more), and may leave a little more; of laws
+    of a gear and of loads what formulas of one effect differ by.
     """
     for (axis, family), several in several_together(model).items():
         rest = [f for f in model.free if f not in several]
@@ -56,36 +62,42 @@ def one_for_several(
         new = [
             o
             for o in options
-            if o.effect.axis == axis
+            if o.effect.axis in (axis, None)
             and effect_info(o.effect.name).family == family
             and o.effect.label not in labels
         ]
         # One of them may do it alone from where it is now, and could not from its start.
-        others = [o for o in (*new, *several) if numbers(o) < count]
+        most = count if family == "load" else count - 1
+        others = [o for o in (*new, *several) if numbers(o) <= most]
         try:
             without = fitter.fit(rest, model, lazy=True)
         except InputError:
             continue
         trials = [t for o in others if (t := _tried(fitter, rest, o, without)) is not None]
+        # A load shows on every axis that carries it, and has to do on all.
+        place, judged = axis - 1, layout
+        if family == "load":
+            place, judged = 0, replace(layout, axis=np.zeros_like(layout.axis))
+        here = judged.axis == place
         standing = stand(
             _best_settled(fitter, trials),
             held_out_loss(without),
             floor,
-            layout,
-            axis - 1,
+            judged,
+            place,
             explained_share=settings.explained_share,
         )
         if standing is None:
             continue
-        here = layout.axis == axis - 1
+        standing = replace(standing, axis=axis - 1)
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
-        best = standing.best.trial
-        alone = float(best.held_out[here].sum())
-        mends = (
-            family == GEAR and not fitter.adds_up and alone - both < FORMULA_ERROR * (none - both)
-        )
-        if mends or likelier(alone, best.cost, than=(both, count)):
-            return standing.best, standing
+        for ranked in tuple(standing.ranked):
+            alone = float(ranked.trial.held_out[here].sum())
+            mends = not fitter.adds_up and alone - both < _DIFFER.get(family, 0.0) * (none - both)
+            if mends or likelier(alone, ranked.trial.cost, than=(both, count)):
+                return standing.best, standing
+            # What leaves more than that is none in their place.
+            standing = standing.without(ranked.trial.label)
     return None
 
 

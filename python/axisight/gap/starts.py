@@ -306,20 +306,21 @@ def _limit(trial: Trial) -> FreeEffect:
 
 
 def _point_mass(trial: Trial) -> FreeEffect | None:
-    """Begin at the centre of mass of the last link that has one, or beside it; a single axis shows none.
+    """Begin at the centre of mass of the last link that has one, or beside it.
 
-    There a mass is one of the link, which the re-fit may have all of; beside it, it is not.
+    There a mass is one of the link, which the re-fit may have all of; beside it, it is not. Of a single
+    axis it is as good as a link that is heavier or has another centre, which is said where it leads.
     """
     joints = trial.robot.joints
-    if len(joints) == 1:
+    links = [j.link for j in joints if j.link is not None]
+    if not links:
         return None
-    x, y, z = next(j.link.com_m for j in reversed(joints) if j.link is not None)
+    x, y, z = links[-1].com_m
     reach = sum(float(np.linalg.norm(j.origin_m)) for j in joints) or 1.0
     centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
     # Tools reach about as far as the last links do.
     spread = 0.3 * reach
     # What is taken off a link leaves some of it, re-fitted or not.
-    last = next(j.link.mass_kg for j in reversed(joints) if j.link is not None)
     top = next(p.upper for p in trial.info.parameters if p.name == "mass_kg")
     beside = [
         {**centre, name: value + side * 0.5 * spread}
@@ -330,7 +331,7 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
         trial.effect({"mass_kg": 0.0, **centre}),
         ("mass_kg", "x_m", "y_m", "z_m"),
         {name: (value, spread) for name, value in centre.items()},
-        {"mass_kg": (-0.8 * float(last), top)},
+        {"mass_kg": (-0.8 * float(links[-1].mass_kg), top)},
         tuple(beside),
     )
 

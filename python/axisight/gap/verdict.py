@@ -79,7 +79,7 @@ def conclude(
     gap = stands_out and _significant(found, settings)
     if not accepted and not shown:
         verdict: VerdictKind = "unknown" if gap else "none"
-    elif explained < settings.explained_share and (accepted or gap):
+    elif (accepted or gap) and _too_little(found, explained, settings):
         verdict = "unknown"
     else:
         verdict = "undecidable" if open_groups else "explained"
@@ -116,6 +116,20 @@ def conclude(
         ),
         effects=effects,
     )
+
+
+# What the right law leaves of what it explains, whoever writes its formula, and mean square above the
+# floor up to which more than that is noise and scatter of the simulator.
+_OF_A_LAW = 0.1
+_OF_NOISE = 4.0
+
+
+def _too_little(found: Search, explained: float, settings: Settings) -> bool:
+    """Whether causes explain too little, or leave so much of what is seen that they stand for another law."""
+    if explained < settings.explained_share:
+        return True
+    left = float(found.left().sum() / found.layout.samples().sum())
+    return not found.by_axis and explained < 1.0 - _OF_A_LAW and left > _OF_NOISE
 
 
 def _or_another(cause: NamedCause) -> NamedCause:
