@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import Diagnosis, Effect, Log, diagnose, load_robot
-from axisight.gap.motion import motion
+from axisight.gap.motion import Filtering
 from axisight.logs import lowpass
 from axisight.mujoco import apply
 from axisight.write_back import Written, write_model
@@ -229,7 +229,8 @@ def gap_in_mujoco(path: Path, log: Log, cutoff_hz: float, effects: tuple[Effect,
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     delivered = GEAR * model.actuator_gainprm[:, 0]
-    angle, speed, acceleration, torque = motion(log, cutoff_hz)
+    filtering = Filtering(cutoff_hz)
+    angle, speed, acceleration, torque = filtering(log)
     found = np.empty_like(torque)
     for k in range(len(torque)):
         data.qpos[:], data.qvel[:] = angle[k] / GEAR, speed[k] / GEAR
@@ -239,8 +240,8 @@ def gap_in_mujoco(path: Path, log: Log, cutoff_hz: float, effects: tuple[Effect,
         if effects:
             asked -= apply(model, data, effects, gear_ratio=1 / GEAR)
         found[k] = asked / delivered
-    squares = (found - torque) ** 2 / np.var(log.torque_nm, axis=0)
-    return float(np.sqrt(squares.mean()))
+    off = filtering.compared(found - torque, log.sample_time_s)
+    return float(np.sqrt((off**2 / np.var(log.torque_nm, axis=0)).mean()))
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,8 @@ def test_the_missing_friction_terms_are_named_and_sized(shared_data, example):
     }
     assert found.gap.after < 0.15 * found.gap.before
     ours = example.found_parameters(robot, found)
-    # The published fit counts samples at standstill in full; the offset, a fifth of a newton sure,
-    # feels that most.
+    # The published fit counts samples at standstill in full, the diagnosis hardly; the offset, a fifth of a
+    # newton sure, feels that most.
     for name, published in example.PUBLISHED.items():
-        assert ours[name] == pytest.approx(published, rel=0.03), name
+        sure = 0.2 if name == "offset" else 0.03 * abs(published)
+        assert ours[name] == pytest.approx(published, abs=sure), name

@@ -12,7 +12,7 @@ import pytest
 def test_the_gap_in_mujoco_is_the_promised_one(
     repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ):
-    """Within a point by inverse dynamics; a simulation does not lose a low-passed reversal of dry friction."""
+    """Within a point by inverse dynamics, or below: MuJoCo's dry friction has no corner, the one that is fitted has."""
     monkeypatch.syspath_prepend(repository / "benches")
     bench = import_module("write_back")
     machine = bench.MACHINES[name]
@@ -21,7 +21,7 @@ def test_the_gap_in_mujoco_is_the_promised_one(
     promised = out.found.gap
     assert promised.after < 0.2 * promised.before
     assert out.inverse[0] == pytest.approx(promised.before, abs=0.001)
-    assert out.inverse[1] == pytest.approx(promised.after, abs=0.01)
+    assert promised.after - 0.02 < out.inverse[1] < promised.after + 0.01
     assert out.run[0] == pytest.approx(promised.before, abs=0.05)
     assert promised.after - 0.05 < out.run[1] < promised.after + 0.01
     assert (out.made.remaining == ()) == (name != "Stribeck")
