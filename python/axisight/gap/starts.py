@@ -305,15 +305,22 @@ def _limit(trial: Trial) -> FreeEffect:
     return FreeEffect(trial.effect({"limit_nm": float(limits[np.argmax(gain)])}), ("limit_nm",))
 
 
+def _lifts(robot: Robot) -> bool:
+    """Whether gravity turns the first joint."""
+    lever = np.cross(robot.joints[0].axis, robot.gravity_m_s2)
+    return not robot.joints[0].prismatic and bool(np.linalg.norm(lever) > _SMALL_SHARE)
+
+
 def _point_mass(trial: Trial) -> FreeEffect | None:
     """Begin at the centre of mass of the last link that has one, or beside it.
 
     There a mass is one of the link, which the re-fit may have all of; beside it, it is not. Of a single
-    axis it is as good as a link that is heavier or has another centre, which is said where it leads.
+    axis that lifts it, it is as good as a link that is heavier or has another centre, which is said where
+    it leads; one that does not lift it shows no more than an inertia.
     """
     joints = trial.robot.joints
     links = [j.link for j in joints if j.link is not None]
-    if not links:
+    if not links or (len(joints) == 1 and not _lifts(trial.robot)):
         return None
     x, y, z = links[-1].com_m
     reach = sum(float(np.linalg.norm(j.origin_m)) for j in joints) or 1.0

@@ -129,7 +129,8 @@ def _too_little(found: Search, explained: float, settings: Settings) -> bool:
     if explained < settings.explained_share:
         return True
     left = float(found.left().sum() / found.layout.samples().sum())
-    return not found.by_axis and explained < 1.0 - _OF_A_LAW and left > _OF_NOISE
+    # By inverse dynamics the real thing has much that no effect explains.
+    return not found.adds_up and explained < 1.0 - _OF_A_LAW and left > _OF_NOISE
 
 
 def _or_another(cause: NamedCause) -> NamedCause:
