@@ -23,7 +23,7 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
-# Byte code is made when a module is first imported, not for all that is installed.
+# Byte code is made once, on all processors, when everything is installed.
 INSTALL := $(PIP) install --no-compile
 WHEELS := $(TARGET)/wheels
 STAMPS := $(VENV)/.stamps
@@ -138,7 +138,10 @@ $(STAMPS)/study: $(STUDY) | $(STAMPS)/installed
 	touch $@
 
 # The dependencies of an extra change only with pyproject.toml.
+# Commands that tests start import byte code, also where Python is told to write none; files of other
+# packages that are no Python are no fault here.
 $(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/test-arms $(STAMPS)/installed $(STAMPS)/study
+	-$(BIN)/python -m compileall -q -j 0 $(VENV)/lib
 	touch $@
 
 # MJCF files of arms that tests import; the package itself and what it needs are not used.
