@@ -91,7 +91,7 @@ def one_for_several(
             continue
         standing = replace(standing, axis=axis - 1)
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
-        for ranked in tuple(standing.ranked):
+        for ranked in standing.ranked:
             alone = float(ranked.trial.held_out[here].sum())
             mends = not fitter.adds_up and alone - both < _DIFFER.get(family, 0.0) * (none - both)
             if mends or likelier(alone, ranked.trial.cost, than=(both, count)):
