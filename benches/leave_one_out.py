@@ -31,6 +31,8 @@ from axisight.gap.torques import AS_GIVEN
 # Below this share of the torque's standard deviation on its axis an effect is not worth finding.
 SMALLEST_SHARE = 0.05
 PAYLOAD_SHARE = 0.8
+# Standard deviations of a 95 % interval.
+NORMAL = 1.96
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """What came out of one diagnosis. ``first``: the withheld effect is the first cause named."""
+    """What came out of one diagnosis. ``first``: the withheld effect is the first cause named.
+
+    ``value_holds``: its value is within 10 % of the identification's, or that in its interval;
+    ``agrees``: that, or it is within what the identification itself leaves open (95 %).
+    """
 
     machine: str
     withheld: str
@@ -56,6 +62,7 @@ class Row:
     first: bool
     value: str
     value_holds: bool | None
+    agrees: bool | None
     before: float
     after: float
     floor: float
@@ -99,12 +106,15 @@ def row(machine: Machine, case: Case, found: Diagnosis, seconds: float) -> Row:
     """Return what the diagnosis of a case says."""
     labels = [c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in found.causes]
     mine = [c for c, label in zip(found.causes, labels, strict=True) if label == case.label]
-    value, holds = "", None
+    value, holds, agrees = "", None, None
     if mine:
         v = mine[0].parameters[case.parameter]
-        value = f"{v.value:.4g} [{v.low:.3g}, {v.high:.3g}] for {case.value:.4g}"
-        near = abs(v.value - case.value) <= 0.1 * abs(case.value)
-        holds = near or v.low <= case.value <= v.high
+        error = machine.standard_errors.get(case.label)
+        known = "" if error is None else f" ± {NORMAL * error:.2g}"
+        value = f"{v.value:.4g} [{v.low:.3g}, {v.high:.3g}] for {case.value:.4g}{known}"
+        off = abs(v.value - case.value)
+        holds = off <= 0.1 * abs(case.value) or v.low <= case.value <= v.high
+        agrees = holds or off <= NORMAL * (error or 0.0)
     return Row(
         machine.name,
         case.label,
@@ -114,6 +124,7 @@ def row(machine: Machine, case: Case, found: Diagnosis, seconds: float) -> Row:
         bool(labels) and labels[0] == case.label,
         value,
         holds,
+        agrees,
         found.gap.before,
         found.gap.after,
         found.gap.floor,

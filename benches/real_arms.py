@@ -27,10 +27,14 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine identified from its own logs: the complete rigid simulator, and the logs."""
+    """A machine identified from its own logs: the complete rigid simulator, and the logs.
+
+    ``standard_errors``: of the friction and offsets identified, by labels as of effects.
+    """
 
     name: str
     complete: Robot
+    standard_errors: dict[str, float]
     estimation: list[Log]
     validation: list[Log]
 
@@ -67,7 +71,8 @@ def _identified(
     known: dict[str, float] | None = None,
     *,
     consistent: bool = True,
-) -> Robot:
+) -> tuple[Robot, dict[str, float]]:
+    """Return the robot as identified, and the standard errors of its friction and offsets."""
     with warnings.catch_warnings():
         # Ten seconds determine some combinations only; bodies that can exist need no more.
         warnings.simplefilter("ignore", IdentificationWarning)
@@ -84,7 +89,13 @@ def _identified(
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "robot.toml"
         write_identified(robot, out, found.identified(Provenance("least squares")))
-        return axisight.load_robot(out)
+        complete = axisight.load_robot(out)
+    errors = {}
+    for name, error in zip(found.estimate.names, found.estimate.standard_error, strict=True):
+        joint, _, quantity = name.rpartition(".")
+        if quantity in ("viscous_friction", "coulomb_friction", "torque_offset"):
+            errors[f"{quantity}@{complete.axis_names.index(joint) + 1}"] = float(error)
+    return complete, errors
 
 
 def emps(data: Path) -> Machine:
@@ -95,10 +106,10 @@ def emps(data: Path) -> Machine:
         for name in ("DATA_EMPS", "DATA_EMPS_PULSES")
     )
     known = {"carriage.motor_inertia": 0.0}
-    complete = _identified(
+    identified = _identified(
         EXAMPLES / "emps" / "robot.toml", [first], 50.0, known=known, consistent=False
     )
-    return Machine("EMPS", complete, [first], [second])
+    return Machine("EMPS", *identified, [first], [second])
 
 
 def kr300(data: Path) -> Machine:
@@ -114,7 +125,7 @@ def kr300(data: Path) -> Machine:
             np.deg2rad(x.T) / ratio for x in (rec.act_pos_mot_deg, rec.act_vel_mot_deg_per_s)
         )
         logs.append(_log(f"run {run}", 250.0, motor, rec.act_torque_abs_nm.T, speed))
-    return Machine("KR300", _identified(file, logs[:2], 8.0), logs[:2], logs[2:])
+    return Machine("KR300", *_identified(file, logs[:2], 8.0), logs[:2], logs[2:])
 
 
 def tx40(data: Path) -> Machine:
@@ -135,7 +146,7 @@ def tx40(data: Path) -> Machine:
     start = np.array([0.0, -np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
     whole = _log("motion", 500.0, motor + start / robot.gear_ratio, torque)
     parts = [whole.part(0.0, 2.5), whole.part(2.5, 5.0), whole.part(5.0, 7.5)]
-    return Machine("TX40", _identified(robot, parts[:2], 20.0), parts[:2], parts[2:])
+    return Machine("TX40", *_identified(robot, parts[:2], 20.0), parts[:2], parts[2:])
 
 
 MACHINES: dict[str, Callable[[Path], Machine]] = {"emps": emps, "kr300": kr300, "tx40": tx40}

@@ -207,7 +207,7 @@ def test_a_simulation_that_broke_off_has_no_place(base):
 def test_a_parameter_at_the_edge_is_a_finding(change, bound, words):
     fitted = SimpleNamespace(
         robot_values={"axis1.mass": 100 * (1 + change), "axis2.mass": 50.0},
-        at_bound=((None, "axis1.mass"), (0, "coulomb_nm")) if bound else (),
+        ended_at_bound=((None, "axis1.mass"), (0, "coulomb_nm")) if bound else (),
     )
     nominal = {"axis1.mass": 100.0, "axis2.mass": 50.0}
     found = parameters_at_edge(fitted, nominal, {"mass": 0.015})

@@ -29,7 +29,7 @@ def parameters_at_edge(
     for name, value in fitted.robot_values.items():
         tolerance = tolerance_of(tolerances, name) or 0.0
         change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
-        bound = (None, name) in fitted.at_bound
+        bound = (None, name) in fitted.ended_at_bound
         if bound or abs(change) >= _EDGE * tolerance:
             message = (
                 f"ended {100 * change:+.3g} % off the simulator's value, "

@@ -105,7 +105,8 @@ class Evidence(Linearized):
     fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
     ``size`` (n_blocks,) of the blocks, ``samples`` (n_blocks,) what their residuals count for in
     all: fewer where some are weighed down. ``renewed``: the sensitivities are the model's own,
-    none is another's; ``up_to_date``: all of them were computed where the fit ended.
+    none is another's; ``up_to_date``: all of them were computed where the fit ended. ``balanced``:
+    parameters at a bound where the values are those of a balanced fit, and the rest is of this one.
     """
 
     effects: tuple[Effect, ...]
@@ -123,6 +124,12 @@ class Evidence(Linearized):
     residual: Array
     columns: dict[tuple[str | None, str], _core.Column]
     up_to_date: bool = False
+    balanced: tuple[tuple[int | None, str], ...] | None = None
+
+    @property
+    def ended_at_bound(self) -> tuple[tuple[int | None, str], ...]:
+        """The parameters whose values are at a bound."""
+        return self.at_bound if self.balanced is None else self.balanced
 
     def part(self, logs: Sequence[int]) -> Evidence:
         """Return the same of some logs, by their numbers; what was fitted stays."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -187,6 +188,12 @@ class InverseDynamicsFitter(ModelFitter):
 
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
+
+    def tempered(self, factor: Array) -> ModelFitter:
+        """Return the same with the errors of every axis times a factor (n_axes,)."""
+        other = copy(self)
+        other.records = [(q, v, a, u, c * factor) for q, v, a, u, c in self.records]
+        return other
 
     def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""

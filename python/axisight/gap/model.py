@@ -157,6 +157,11 @@ class ModelFitter(ABC):
         """Return what every residual counts for (n_residuals,), from 0 to 1; None where all are one."""
         return None
 
+    def tempered(self, factor: Array) -> ModelFitter:
+        """Return the same with the errors of every axis times a factor (n_axes,)."""
+        del factor
+        return self
+
     @abstractmethod
     def _keep(self, logs: Sequence[int]) -> None:
         """Keep only some of the logs, by their numbers."""

@@ -30,6 +30,7 @@ from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
+from axisight.gap.misfit import with_balanced_values
 from axisight.gap.modes import view_of
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
@@ -114,7 +115,7 @@ def diagnose(
         view = inputs.view(chosen)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
-    found = believed_by_axis(found, view.fitter, chosen)
+    found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
     said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
@@ -387,7 +388,7 @@ def _seen(
             f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
             f"logs: it is not among the causes."
         )
-        found = without_axis(found, view.fitter, axis)
+        found = with_balanced_values(without_axis(found, view.fitter, axis), view.fitter)
 
 
 def _assemble(
