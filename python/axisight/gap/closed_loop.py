@@ -16,6 +16,7 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import highest_cutoff_hz
+from axisight.gap.encoder_steps import encoder_steps
 from axisight.gap.feedback import loop_responses
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
@@ -66,6 +67,7 @@ class ClosedLoopView(View):
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
         self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
+        self._step_rad = encoder_steps(robot, logs)
         floor, self._weights = tracking_floor(self.tracking, self._noisy, logs, settings)
         # A torque reported after the limit is what the motor got: it needs no limit once more.
         after = {limit.effect.label for limit in limits}
@@ -132,12 +134,15 @@ class ClosedLoopView(View):
     ) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
         effects = {e.label: e for e in (*self._noisy.effects, *variant.effects)}.values()
+        # Steps are no white noise: what they make of a slow motion is run.
+        stated = self.robot.position_noise_std
         return noise_torques(
             self._noisy.with_parameters(variant.robot_values).with_effects(list(effects)),
             logs,
-            self.floor.position_std_rad,
+            np.where(self._step_rad > 0, stated, self.floor.position_std_rad),
             self.settings.seed,
             first_run,
+            step_rad=self._step_rad,
             threads=self.settings.threads,
         )
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.effects.stated import STEPS
+from axisight.gap.encoder_steps import OF_A_STEP, encoder_steps
 from axisight.gap.howfar import Stage, Stages, gap_reduction
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Interval
@@ -22,8 +23,6 @@ from axisight.gap.settings import Settings
 from axisight.gap.verdict import Conclusion
 from axisight.gap.view import View
 from axisight.logs import Log
-from axisight.logs.quality import quantization
-from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -31,24 +30,6 @@ Array = NDArray[np.float64]
 _MOSTLY = 2.0
 # Of steps that every log shows.
 _SURE = 0.99
-_OF_A_STEP = 0.01
-
-
-def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
-    """Return the step of each position (n_axes,) [rad], where its noise exceeds the sensor's; else zero.
-
-    Not where the simulator has steps itself, and not where a log shows none.
-    """
-    known = {e.axis for e in robot.effects if e.name == STEPS[0] and e.acts}
-    out = np.zeros(robot.n_axes)
-    for i in range(robot.n_axes):
-        found = [quantization(log.position_rad[:, i]) for log in logs]
-        steps = [0.0 if q is None else q.step for q in found]
-        felt = 0 < robot.position_noise_std < min(steps) / np.sqrt(12.0)
-        alike = max(steps) < (1 + _OF_A_STEP) * min(steps)
-        if felt and alike and i + 1 not in known:
-            out[i] = float(np.median(steps))
-    return out
 
 
 def with_coarse_encoders(
@@ -107,7 +88,7 @@ def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Inter
 
 def _named(axis: int, step: float) -> NamedCause:
     info = effect_info(STEPS[0])
-    value = Interval(step, step * (1 - _OF_A_STEP), step * (1 + _OF_A_STEP))
+    value = Interval(step, step * (1 - OF_A_STEP), step * (1 + OF_A_STEP))
     units = {p.name: p.unit for p in info.parameters}
     return NamedCause(info.name, axis + 1, _SURE, {STEPS[1]: value}, units, info.family, _SURE)
 

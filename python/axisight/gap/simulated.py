@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import STEPS
 from axisight.errors import InputError
 from axisight.gap.poses import starts_of
 from axisight.gap.torques import Variant
@@ -80,13 +81,22 @@ def noise_torques(
     seed: int,
     first_run: int = 0,
     *,
+    step_rad: Array | None = None,
     threads: int = 0,
 ) -> list[Array]:
-    """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log."""
+    """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log.
+
+    ``step_rad`` (n_axes,): what positions with the noise are rounded to, zero where they are not.
+    """
     noise = [
         white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
         for i, log in enumerate(logs)
     ]
+    if step_rad is not None and step_rad.any():
+        steps = [Effect(STEPS[0], i + 1, {STEPS[1]: x}) for i, x in enumerate(step_rad) if x > 0]
+        clean = _along(robot, logs, threads)
+        noisy = _along(robot, logs, threads, effects=steps, noise=noise)
+        return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]
     # With noise and without in one batch: they run in lock-step.
     both = [np.zeros_like(x) for x in noise] + noise
     torques = _along(robot, [*logs, *logs], threads, noise=both)

@@ -1,0 +1,35 @@
+"""Steps of encoders that are coarser than the stated sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects.stated import STEPS
+from axisight.logs import Log
+from axisight.logs.quality import quantization
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+OF_A_STEP = 0.01
+"""By how much of a step logs of one encoder may differ in it."""
+
+
+def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
+    """Return the step of each position (n_axes,) [rad], where its noise exceeds the sensor's; else zero.
+
+    Not where the simulator has steps itself, and not where a log shows none.
+    """
+    known = {e.axis for e in robot.effects if e.name == STEPS[0] and e.acts}
+    out = np.zeros(robot.n_axes)
+    for i in range(robot.n_axes):
+        found = [quantization(log.position_rad[:, i]) for log in logs]
+        steps = [0.0 if q is None else q.step for q in found]
+        felt = 0 < robot.position_noise_std < min(steps) / np.sqrt(12.0)
+        alike = max(steps) < (1 + OF_A_STEP) * min(steps)
+        if felt and alike and i + 1 not in known:
+            out[i] = float(np.median(steps))
+    return out
