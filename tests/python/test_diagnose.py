@@ -64,13 +64,17 @@ def test_scatter_alone_is_none():
 )
 def test_a_withheld_effect_is_named(effect):
     found = run([effect])
-    assert found.verdict == "explained", found.headline
+    # A well damped current loop of second order is as good as a delay: it stays open beside it.
+    beside = {"input_delay": "current_loop"}.get(effect.name)
+    assert found.verdict == ("undecidable" if beside else "explained"), found.headline
+    assert not beside or (f"{effect.name}@1", f"{beside}@1") in found.equivalent
     assert [(c.effect, c.axis) for c in found.causes] == [(effect.name, 1)]
     cause = found.causes[0]
     # An effect that gives the very same logs has its share.
     twins = [a for a in found.alternatives if a.effect in effect_info(effect.name).twins]
-    # A current loop of second order is as good as a delay, and counts a quarter of it.
-    assert cause.probability + sum(a.probability for a in twins) > 0.75
+    # The loop counts a third of a delay, and fits a little closer.
+    least = 0.6 if beside else 0.75
+    assert cause.probability + sum(a.probability for a in twins) > least
     assert cause.gap_reduction.value > 0.9
     assert found.gap.after < 1.2 * found.gap.floor
     # With the cause in nothing stands out of the floor any more.
@@ -127,7 +131,8 @@ def test_two_effects_are_both_named():
             Effect("input_delay", 1, {"delay_s": 8e-4}),
         ]
     )
-    assert found.verdict == "explained"
+    # The delay may be a current loop.
+    assert found.verdict == "undecidable"
     assert {c.effect for c in found.causes} == {"coulomb_friction", "input_delay"}
 
 

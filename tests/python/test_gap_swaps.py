@@ -30,7 +30,7 @@ class Model:
     converged: bool = True
     fresh: bool = False
     status: str = "loss_converged"
-    at_bound: tuple = ()
+    ended_at_bound: tuple = ()
     robot_values: dict = field(init=False)
 
     def __post_init__(self):
