@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.begun import from_rest
 from axisight.gap.by_targets import what_is_compared
 from axisight.gap.faults import Finding, refused
 from axisight.gap.gate import check_by_targets, check_inputs
@@ -32,7 +33,9 @@ def look_beside(robot: Robot, log: Log) -> Beside:
         findings = check_by_targets(commanded.robot, commanded.as_logged(), [])
         compared = what_is_compared(log.sample_rate_hz)
     else:
-        findings = check_inputs(robot, [log], [])
+        begun = from_rest(robot, [log], [], [])
+        (log,) = begun.estimation
+        findings = (*begun.findings, *check_inputs(robot, [log], []))
         compared = "" if refused(findings) else _torques(robot, log)
     return Beside("" if refused(findings) else compared, findings)
 

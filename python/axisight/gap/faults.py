@@ -66,6 +66,7 @@ MEANINGS: dict[str, str] = {
     "torque_scaled": "torque by an unknown factor off: A, V or per cent of the rated torque",
     "torque_off_control_law": "a torque that is not what the robot file's controller gives",
     "gravity_flipped": "gravity of the robot file with the other sign",
+    "begins_in_motion": "a log of a loop that begins in motion",
     "position_offset": "positions count from another zero than the robot's",
     "gap_beyond_torque": "a simulator that is off by more than ten times the torque",
     "reversals_smeared": "what remains lies around reversals, which the low-pass smears",

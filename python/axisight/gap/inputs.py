@@ -6,11 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from axisight.arguments import usable_path
 from axisight.errors import InputError
-from axisight.fitting.simulation_error import is_closed_loop
 from axisight.logs import Log, read_case, read_log
 from axisight.logs.sources import files_of, is_folder_log
 from axisight.logs.untrusted import check_log_inside
@@ -72,9 +69,6 @@ def read_inputs(
         return read
     logs = (*read.estimation, *read.validation)
     cut = [part_of(log, *part) for log in logs]
-    if is_closed_loop(read.robot, logs):
-        for log in logs:
-            _check_at_rest(log, part[0])
     n = len(read.estimation)
     own = tuple(part_of(log, *part) for log in read.simulated)
     return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]), simulated=own)
@@ -87,34 +81,6 @@ def part_of(log: Log, start_s: float, stop_s: float | None) -> Log:
     except InputError as error:
         text = str(error).replace("start_s", "--from").replace("stop_s", "--to")
         raise InputError(f"{log.source}: {text}") from None
-
-
-# How long before the cut a log has to stand still, and how still, as a share of its range.
-_STILL_S = 0.1
-_STILL = 0.01
-
-
-def _check_at_rest(log: Log, start_s: float) -> None:
-    """Refuse a cut in motion: in closed loop a simulation begins at rest where the log begins."""
-    first = round(start_s / log.sample_time_s)
-    rows = slice(max(0, first - round(_STILL_S / log.sample_time_s)), first + 1)
-    position, reference = log.position_rad, log.velocity_ref_rad_s
-    # Twice differenced, motion is gone and noise of standard deviation s has 2.4 s: ten of them.
-    noise = 4 * np.std(np.diff(position, n=2, axis=0), axis=0)
-    allowed = np.maximum(_STILL * np.ptp(position, axis=0), noise)
-    off = np.abs(position[rows] - position[0]).max(axis=0)
-    moving = np.zeros(log.n_axes, bool)
-    if reference is not None:
-        largest = np.abs(reference).max(axis=0)
-        moving = np.abs(reference[rows]).max(axis=0) > _STILL * largest
-    for axis in np.flatnonzero((off > allowed) | moving):
-        unit = "m" if log.axis_kinds[axis] == "prismatic" else "rad"
-        raise InputError(
-            f"{log.source}: --from: expected a time at which every axis stands as at the start "
-            f"(in closed loop the simulator begins there, at rest), got {start_s:g} s, where axis "
-            f"{axis + 1} {'moves' if moving[axis] else f'stands {off[axis]:.3g} {unit} off'}; "
-            f"without velocity references any time will do"
-        )
 
 
 def read_beside(

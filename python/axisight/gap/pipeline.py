@@ -17,6 +17,7 @@ from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import own_simulator
+from axisight.gap.begun import from_rest
 from axisight.gap.beyond import beyond_torque
 from axisight.gap.by_axis import OwnAxes, believed_by_axis, without_axis
 from axisight.gap.carried import carried_over, open_check
@@ -107,7 +108,10 @@ def diagnose(
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
-    inputs = _passed(machine, fit_logs, held_logs, chosen.despite)
+    begun = from_rest(machine, fit_logs, held_logs, simulated)
+    simulated = begun.simulated
+    inputs = _passed(machine, begun.estimation, begun.validation, chosen.despite)
+    inputs = replace(inputs, noted=(*begun.findings, *inputs.noted))
     progress("looking at the logs", 1, 1)
     view = inputs.view(chosen)
     if simulated:

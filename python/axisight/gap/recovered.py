@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from axisight.gap.begun import begins_at_rest
 from axisight.gap.cutoff import rigid_below_hz
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -25,11 +26,6 @@ _NOISE_LEFT = 0.1
 _UPPER = 0.8
 # Of the largest speed: what would begin with less begins at rest, its weight not quite the simulator's.
 _STEP = 0.01
-# Share of its largest speed with which a motor still begins at rest, and how often the noise of a position over
-# a sample that may be: six deviations of the parabola's slope.
-_AT_REST = 0.03
-_BY_NOISE = 15.0
-
 # By how much a sample time may be off and still be that of the controller.
 _SAME_CLOCK = 1e-3
 
@@ -52,7 +48,10 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
         return None
     if np.any(np.asarray(robot.controller_gains["kp"]) <= 0):
         return None
-    if not all(_has_every_sample(log, robot) and _begins_at_rest(log, robot) for log in logs):
+    if not all(
+        _has_every_sample(log, robot) and begins_at_rest(log, robot.position_noise_std)
+        for log in logs
+    ):
         return None
     found = [reference_of(robot, log) for log in logs]
     std = robot.position_noise_std
@@ -103,14 +102,6 @@ def _solved(given: Array, share: Array) -> Array:
 
 def _has_every_sample(log: Log, robot: Robot) -> bool:
     return abs(log.sample_time_s / robot.sample_time_s - 1) < _SAME_CLOCK
-
-
-def _begins_at_rest(log: Log, robot: Robot) -> bool:
-    """Whether the motors stand where a log begins, by a parabola through its first positions."""
-    step, x, noise_std = log.sample_time_s, log.position_rad, robot.position_noise_std
-    speed = np.abs(4 * x[1] - x[2] - 3 * x[0]) / (2 * step)
-    top = np.abs(np.diff(x, axis=0)).max(axis=0) / step
-    return bool(np.all(speed < np.maximum(_AT_REST * top, _BY_NOISE * noise_std / step)))
 
 
 def _noisy(reference: Array, log: Log, noise_std: float) -> bool:

@@ -1,0 +1,145 @@
+"""Logs of a loop that begin in motion: taken from where they stand, or without their references.
+
+A simulation of the loop begins at rest. What a controller had summed up before a log is in no log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.faults import Finding
+from axisight.gap.noise import position_noise_std
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Share of its largest speed with which a motor still begins at rest, and how often the noise of a position over
+# a sample that may be: six deviations of the parabola's slope.
+_BEGINS = 0.03
+_BY_NOISE = 15.0
+# Seconds that a rest has to last; of the largest speed and its reference, below which a motor stands; and
+# deviations of the noise of a mean speed.
+_REST_S = 0.2
+_STANDS = 0.005
+_NOISES = 6.0
+# Share of a log that has to be left.
+_LEFT = 0.5
+
+
+@dataclass(frozen=True)
+class Begun:
+    """Logs for a diagnosis, and what is to be said of those that begin in motion."""
+
+    estimation: list[Log]
+    validation: list[Log]
+    simulated: list[Log]
+    findings: tuple[Finding, ...] = ()
+
+
+def from_rest(
+    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], simulated: Sequence[Log]
+) -> Begun:
+    """Return logs that begin at rest, cut where they first stand; where one never does, all without references.
+
+    ``simulated``: of the user's own simulator, one for each log or none; they are cut alike. Unchanged
+    where the loop is not simulated along the logs.
+    """
+    logs = [*estimation, *validation]
+    given = Begun(list(estimation), list(validation), list(simulated))
+    targets = all(not log.has_torque and log.position_ref_rad is not None for log in logs)
+    if any(log.n_axes != robot.n_axes for log in logs):
+        return given
+    if not targets and not is_closed_loop(robot, logs):
+        return given
+    noise = float(max(robot.position_noise_std, position_noise_std(logs).max()))
+    moving = [not begins_at_rest(log, noise) for log in logs]
+    if not any(moving):
+        return given
+    starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
+    if targets and any(s is None for s in starts):
+        # The commands along them are not known: refused where they are made.
+        return given
+    never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
+    if never:
+        bare = [replace(log, velocity_ref_rad_s=None) for log in logs]
+        n = len(estimation)
+        return Begun(bare[:n], bare[n:], list(simulated), (_without_references(never),))
+    return _cut(given, [0.0 if s is None else s for s in starts])
+
+
+def _cut(given: Begun, starts: Sequence[float]) -> Begun:
+    logs = [*given.estimation, *given.validation]
+    paired = len(given.simulated) == len(logs)
+    parts = [log.part(s) if s else log for log, s in zip(logs, starts, strict=True)]
+    sims = given.simulated
+    if paired:
+        sims = [log.part(s) if s else log for log, s in zip(sims, starts, strict=True)]
+    said = tuple(_from(log, s) for log, s in zip(logs, starts, strict=True) if s)
+    n = len(given.estimation)
+    return Begun(parts[:n], parts[n:], sims, said)
+
+
+def begins_at_rest(log: Log, noise_std: float) -> bool:
+    """Whether the motors stand where a log begins, by a parabola through its first positions.
+
+    ``noise_std`` of a position [rad].
+    """
+    step, x = log.sample_time_s, log.position_rad
+    speed = np.abs(4 * x[1] - x[2] - 3 * x[0]) / (2 * step)
+    top = np.abs(np.diff(x, axis=0)).max(axis=0) / step
+    return bool(np.all(speed < np.maximum(_BEGINS * top, _BY_NOISE * noise_std / step)))
+
+
+def first_rest_s(log: Log) -> float | None:
+    """Return where [s] all motors of a log first stand, and their references; None if too little is left."""
+    n = max(4, round(_REST_S / log.sample_time_s))
+    speed = _speeds(log, n)
+    noise = position_noise_std([log]) / (log.sample_time_s * n)
+    stands = np.all(speed <= _STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
+    if log.velocity_ref_rad_s is not None:
+        told = np.abs(log.velocity_ref_rad_s)
+        told = scipy.ndimage.maximum_filter1d(told, n, axis=0, mode="nearest")
+        stands &= np.all(told <= _STANDS * told.max(axis=0), axis=1)
+    stands[: n // 2] = False
+    places = np.flatnonzero(stands)
+    if not len(places) or places[0] > (1 - _LEFT) * log.n_samples:
+        return None
+    start = float(places[0] * log.sample_time_s)
+    try:
+        log.part(start)
+    except InputError:
+        return None
+    return start
+
+
+def _speeds(log: Log, n: int) -> Array:
+    """Return the mean speed (n_samples, n_axes) over ``n`` samples around each."""
+    mean = scipy.ndimage.uniform_filter1d(
+        np.gradient(log.position_rad, log.sample_time_s, axis=0), n, axis=0, mode="nearest"
+    )
+    return np.abs(mean)
+
+
+def _from(log: Log, start_s: float) -> Finding:
+    message = (
+        f"expected a start at rest, where a simulation of the loop begins, got one in motion: taken from "
+        f"{start_s:.4g} s, where all axes first stand"
+    )
+    return Finding("begins_in_motion", "flag", message, log.name, None, "position")
+
+
+def _without_references(names: Sequence[str]) -> Finding:
+    message = (
+        f"expected starts at rest, where a simulation of the loop begins, got starts in motion and "
+        f"no rest of {_REST_S:g} s in the first half of {', '.join(names)}: torques are predicted from the "
+        f"measured motion instead, without the references; log from rest, or leave these logs out"
+    )
+    return Finding("begins_in_motion", "flag", message, names[0], None, "position")
