@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from axisight import Effect, Log, Robot, diagnose, load_robot, read_log, simulate
 from axisight.errors import InputError, LogError, RobotError
+from axisight.gap import RefusedInputError
+from axisight.gap.gate.follows_target import check_follows_target
 from axisight.gap.simulated import simulated_positions
 from axisight.gap.targets import _earlier, between, with_commands
 from axisight.gap.torques import AS_GIVEN
@@ -249,3 +251,23 @@ def test_inertia_that_steps_take_and_no_motor_has_is_told(tmp_path: Path) -> Non
     assert found is not None
     assert found.short_of_inertia == (1,)
     assert found.robot.parameters()["j1.motor_inertia"] == 0.0
+
+
+def test_channels_that_are_another_axis_or_turned_are_refused(robot: Robot) -> None:
+    log = NOMINAL.log(1)
+    assert check_follows_target(robot, log) == []
+    swapped = replace(log, position_rad=np.ascontiguousarray(log.position_rad[:, [1, 0, 2]]))
+    found = check_follows_target(robot, swapped)
+    assert [(f.name, f.axis) for f in found] == [("axes_swapped", 1), ("axes_swapped", 2)]
+    turned = replace(log, position_rad=log.position_rad * [1.0, -1.0, 1.0])
+    assert [(f.name, f.axis) for f in check_follows_target(robot, turned)] == [("sign_flipped", 2)]
+    degrees = replace(log, position_rad=log.position_rad * [1.0, 1.0, np.degrees(1.0)])
+    (one,) = check_follows_target(robot, degrees)
+    assert (one.name, one.axis, one.severity) == ("position_in_degrees", 3, "refuse")
+    with pytest.raises(RefusedInputError, match="axes_swapped"):
+        diagnose(robot=robot, estimation=[log, swapped], validation=[NOMINAL.log(2)])
+
+
+@pytest.mark.parametrize("gap", sorted(MACHINES))
+def test_what_a_machine_lacks_is_no_wrong_channel(robot: Robot, gap: str) -> None:
+    assert check_follows_target(robot, MACHINES[gap].log(1)) == []

@@ -9,6 +9,7 @@ from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.faults import Finding, RefusedInputError, check_names, flagged, refused
 from axisight.gap.gate.closed_loop import check_closed_loop
 from axisight.gap.gate.copies import check_copies
+from axisight.gap.gate.follows_target import check_follows_target
 from axisight.gap.gate.inverse_checks import check_inverse
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.gate.machine import check_machine
@@ -56,6 +57,7 @@ def check_by_targets(
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
     found += _of_each(check_log_alone, logs)
     found += check_copies(estimation, validation)
+    found += [f for log in logs for f in check_follows_target(robot, log)]
     return tuple(flagged(found, despite))
 
 
