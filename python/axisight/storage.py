@@ -74,6 +74,8 @@ def check_targets(
         if target is None:
             continue
         try:
+            if str(target) == "-":
+                raise OutputError("expected a file, got -, the standard output")
             check_target(target, inputs=read)
             if not force and replaces is not None and option in replaces:
                 _check_replaced(target, replaces[option])

@@ -7,7 +7,7 @@ from json import dumps
 import typer
 from rich.table import Table
 
-from axisight.cli.common import OUT
+from axisight.cli.screen import OUT
 from axisight.effects import effect_table
 from axisight.gap import verdict_schema
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import gc
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from axisight.cli.screen import OUT
 from axisight.cli.stopping import exit_status
 
 # Commands, where each lives, and the first line of its help: without it the list of commands would
@@ -68,11 +72,31 @@ _COMMANDS = {
         "demo:demo_command",
         "Make a small case (a simulated machine with a withheld effect) and diagnose it.",
     ),
+    "completion": (
+        "completion:completion_command",
+        "Print the script by which bash, zsh or fish complete commands and options.",
+    ),
 }
 
 
 # Their matrices are small and their threads many: those of the linear algebra would spin beside them.
 _THREADED = ("blind", "demo", "diagnose")
+
+# All that these do is print.
+_ONLY_PRINT = ("schema", "effects", "completion", "list", "show")
+
+# What click says of several commands with names like the one that is not there.
+_FURTHER = re.compile(r"(Did you mean '[^']*')(?:, '[^']*')+\?")
+
+_NEXT_STEPS = """\
+Axisight says where a robot's simulator and its logs disagree, and which effect causes it.
+
+  axisight demo                       diagnose a small case that it makes
+  axisight check LOG --robot MODEL    see whether a log and a robot go together
+  axisight diagnose LOG LOG --model MODEL --report report.html
+                                      diagnose your own; MODEL: URDF, MJCF or robot.toml
+
+axisight --help lists all commands."""
 
 
 def load_command(name: str) -> Any:
@@ -89,7 +113,57 @@ def load_command(name: str) -> Any:
         alone = typer.Typer(add_completion=False)
         alone.command(name)(found)
         found = alone
-    return typer.main.get_command(found)
+    command = typer.main.get_command(found)
+    _add_quiet(command, name)
+    return command
+
+
+def _add_quiet(command: Any, name: str) -> None:
+    """Give a command, or all of a group, the option ``--quiet`` where more is done than printed."""
+    for own, part in getattr(command, "commands", {}).items():
+        _add_quiet(part, own)
+    if not hasattr(command, "commands") and name not in _ONLY_PRINT:
+        command.params.append(_quiet_option())
+
+
+def _quiet_option() -> Any:
+    """Return ``--quiet`` as click knows it: typer makes options for functions only."""
+    made = typer.Typer(add_completion=False)
+
+    @made.command()
+    def _(
+        _quiet: Annotated[
+            bool,
+            typer.Option(
+                "--quiet",
+                "-q",
+                callback=_be_quiet,
+                expose_value=False,
+                help="Print errors only; files are written as asked.",
+            ),
+        ] = False,
+    ) -> None: ...
+
+    return typer.main.get_command(made).params[0]
+
+
+def _be_quiet(wanted: bool) -> None:
+    if wanted:
+        OUT.be_quiet()
+
+
+@contextmanager
+def _one_suggestion() -> Iterator[None]:
+    """Of the options or commands that resemble one that is not there, suggest the nearest alone."""
+    try:
+        yield
+    except Exception as error:
+        said = vars(error)
+        if said.get("possibilities"):
+            said["possibilities"] = said["possibilities"][:1]
+        if "message" in said:
+            said["message"] = _FURTHER.sub(r"\1?", str(said["message"]))
+        raise
 
 
 class _LoadedWhenCalled(TyperGroup):
@@ -99,9 +173,15 @@ class _LoadedWhenCalled(TyperGroup):
         name, command, rest = super().resolve_command(ctx, args)
         return name, command if name is None else load_command(name), rest
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        OUT.begin()
+        with _one_suggestion():
+            return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with _one_suggestion():
+                return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             # While a command was loaded, where none of its own handlers is yet at work.
             raise typer.Exit(exit_status(stop)) from None
@@ -109,7 +189,7 @@ class _LoadedWhenCalled(TyperGroup):
 
 app = typer.Typer(
     cls=_LoadedWhenCalled,
-    no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     add_completion=False,
 )
@@ -125,9 +205,12 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    ctx: typer.Context,
     version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
     """Identify industrial robots, simulate them, and explain the sim-to-real gap."""
+    if ctx.invoked_subcommand is None:
+        typer.echo(_NEXT_STEPS)

@@ -12,10 +12,11 @@ import typer
 
 from axisight.blind import judged_cases, markdown, summary
 from axisight.blind.page import render_score
-from axisight.cli.common import Force, bars, errors, say, write_each
+from axisight.cli.common import Force, bars, complain, errors, say, write_each, write_text
+from axisight.cli.screen import OUT, is_output
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
-from axisight.storage import check_folder, check_targets, write_whole
+from axisight.storage import check_folder, check_targets
 
 blind_app = typer.Typer(
     add_completion=False,
@@ -76,7 +77,7 @@ def run_command(
         )
     failed = {name: verdict["error"] for name, verdict in found.items() if "error" in verdict}
     for name, reason in failed.items():
-        say(f"{name}: {reason}")
+        complain(f"{name}: {reason}")
     say(f"verdicts: {out}")
     if failed:
         raise typer.Exit(1)
@@ -88,14 +89,19 @@ def score_command(
     truth: Annotated[Path, typer.Option(help="Folder of what was withheld.")],
     verdicts: Annotated[Path, typer.Option(help="Folder of verdicts.")],
     out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
-    json: Annotated[Path | None, typer.Option(help="Write all of it here.")] = None,
+    json: Annotated[
+        Path | None, typer.Option(help="Write all of it here; - is standard output.")
+    ] = None,
     html: Annotated[Path | None, typer.Option(help="Write it here as a page.")] = None,
     force: Force = False,
 ) -> None:
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
     with errors():
         results = {"--out": (".md",), "--json": (".json",), "--html": (".html", ".htm")}
-        targets = {"--out": out, "--json": json, "--html": html}
+        piped = is_output(json)
+        if piped:
+            OUT.leave_output()
+        targets = {"--out": out, "--json": None if piped else json, "--html": html}
         check_targets(targets, replaces=results, force=force)
         judged = judged_cases(cases, truth, verdicts)
         score = summary(judged)
@@ -104,4 +110,4 @@ def score_command(
         files = {out: text, json: dumps(score, indent=1) + "\n"}
         if html is not None:
             files[html] = render_score(cases.resolve().name, score)
-        write_each([partial(write_whole, path, made) for path, made in files.items() if path])
+        write_each([partial(write_text, path, made) for path, made in files.items() if path])

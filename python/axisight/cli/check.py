@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import OUT, Columns, MaxBytes, Untrusted, errors, say
+from axisight.cli.common import Columns, MaxBytes, Untrusted, errors, say
 from axisight.cli.robot import load_simulator
+from axisight.cli.screen import OUT
+from axisight.cli.suggest import suggestion
 from axisight.errors import InputError, LogError
 from axisight.gap import Finding
 from axisight.gap.beside import look_beside
@@ -37,6 +39,10 @@ def check_command(
             check_log_inside(log)
         found = check_log(log, columns, max_bytes=max_bytes)
         OUT.print(render(found))
+        wrong = (item.message for item in found.findings if item.severity == "error")
+        near = next(filter(None, map(suggestion, wrong)), None)
+        if near is not None:
+            say(f"did you mean {near}?")
         fits = found.ok and (robot is None or _fits(robot, found, columns, max_bytes))
         if not fits:
             raise typer.Exit(1)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from axisight.cli.common import Force, errors, say
+from axisight.cli.screen import is_output
 from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
 from axisight.robot import load_robot
@@ -53,6 +54,7 @@ def guess_command(
 ) -> None:
     """Propose a column map from names and numbers, with the reason of every choice beside it."""
     with errors():
+        out = None if is_output(out) else out
         given = [log, *(Path(x) for x in (robot,) if x)]
         check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
         found = guess_columns(log, None if robot is None else load_robot(robot))

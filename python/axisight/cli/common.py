@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from axisight.cli.screen import BARS, ERR, OUT, is_output
 from axisight.cli.stopping import exit_status
+from axisight.cli.suggest import suggestion
 from axisight.errors import AxisightError, InputError, OutputError
-
-OUT = Console()
-ERR = Console(stderr=True)
+from axisight.storage import write_whole
 
 From = Annotated[
     float,
@@ -70,9 +69,12 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
             yield
     except AxisightError as error:
         ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
+        near = suggestion(str(error))
+        if near is not None:
+            complain(f"did you mean {near}?")
         raise typer.Exit(2) from None
     except KeyboardInterrupt as stop:
-        ERR.print(stopped, markup=False, highlight=False, soft_wrap=True)
+        complain(stopped)
         raise typer.Exit(exit_status(stop)) from None
 
 
@@ -85,7 +87,7 @@ def bars() -> Iterator[Callable[[str, int, int], None]]:
         MofNCompleteColumn(),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=ERR) as shown:
+    with Progress(*columns, console=BARS) as shown:
         tasks: dict[str, int] = {}
 
         def report(label: str, done: int, total: int) -> None:
@@ -99,6 +101,19 @@ def bars() -> Iterator[Callable[[str, int, int], None]]:
 def say(text: str) -> None:
     """Print a text as it is: names of files and of users may look like markup."""
     OUT.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def complain(text: str) -> None:
+    """Print on standard error, as it is, why a command fails: also where it is to be quiet."""
+    ERR.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text whole, or on standard output for ``-``; raises OutputError as `write_whole`."""
+    if is_output(path):
+        typer.echo(text, nl=False)
+    else:
+        write_whole(path, text)
 
 
 def write_each(writes: Sequence[Callable[[], object]]) -> None:

@@ -24,13 +24,16 @@ from axisight.cli.common import (
     errors,
     say,
     write_each,
+    write_text,
 )
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
+from axisight.cli.screen import OUT, is_output
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import Inputs, read_inputs
+from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
@@ -44,6 +47,15 @@ _RESULTS = {
     "--signals": (".parquet", ".mcap"),
     "--write-model": (),
 }
+
+
+EXIT_CODES: dict[VerdictKind, int] = {
+    "none": 0,
+    "explained": 10,
+    "unknown": 11,
+    "undecidable": 12,
+}
+"""Exit status by verdict, with ``--exit-code``: apart from those of errors, which are 1 and 2."""
 
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
@@ -82,7 +94,12 @@ def diagnose_command(
         typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
     ] = None,
     columns: Columns = None,
-    json: Annotated[Path | None, typer.Option(help="Write the verdict here.")] = None,
+    json: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the verdict here; - is standard output, and all else goes to standard error."
+        ),
+    ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
     tolerance: Annotated[
         list[str] | None,
@@ -139,6 +156,13 @@ def diagnose_command(
         ),
     ] = None,
     force: Force = False,
+    exit_code: Annotated[
+        bool,
+        typer.Option(
+            "--exit-code",
+            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable; else 0.",
+        ),
+    ] = False,
     untrusted: Untrusted = False,
     max_bytes: MaxBytes = None,
     start_s: From = 0.0,
@@ -175,6 +199,7 @@ def diagnose_command(
             "--signals": signals,
             "--simulated": simulated,
             "--force": force,
+            "--exit-code": exit_code,
             "--untrusted": untrusted,
             "--max-bytes": max_bytes,
             "--from": start_s,
@@ -185,6 +210,9 @@ def diagnose_command(
         run_fleet = import_module("axisight.cli.fleet").run_fleet
         run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
         return
+    piped = is_output(json)
+    if piped:
+        OUT.leave_output()
     with errors():
         if not case_or_logs:
             raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
@@ -204,7 +232,7 @@ def diagnose_command(
             max_bytes=max_bytes,
         )
         targets = {
-            "--json": json,
+            "--json": None if piped else json,
             "--report": report,
             "--write-model": write_model,
             "--signals": signals,
@@ -248,6 +276,8 @@ def diagnose_command(
         if signals is not None:
             writes.append(partial(_write_signals, found, signals))
         write_each(writes)
+        if exit_code:
+            raise typer.Exit(EXIT_CODES[found.verdict])
 
 
 def _described(given: Sequence[Path], columns: Path | None) -> list[Path]:
@@ -291,8 +321,9 @@ def diagnosis_writes(
     """Return what writes the verdict and the page of a diagnosis where they are asked for."""
 
     def verdict(target: Path) -> None:
-        found.save_verdict(target)
-        say(f"verdict: {target}")
+        write_text(target, found.to_json())
+        if not is_output(target):
+            say(f"verdict: {target}")
 
     def page(target: Path) -> None:
         pages.save_report(found, target)

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from axisight.cli.common import OUT, errors, numbers, say
+from axisight.cli.common import complain, errors, numbers, say
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects, with_given
+from axisight.cli.screen import OUT
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.files import reference_files
@@ -101,7 +102,7 @@ def excite_command(
         made = excite(checked, with_given(machine, given))
         _show(made)
         if made.report is not None and not made.report.ok and not force:
-            OUT.print("nothing was written; --force writes in spite of limits")
+            complain("nothing was written; --force writes in spite of limits")
             raise typer.Exit(1)
         for path in write_references(made.references, out):
             say(f"written: {path}")

@@ -10,7 +10,8 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from axisight.cli.common import OUT, bars, errors, say, write_each
+from axisight.cli.common import bars, errors, say, write_each
+from axisight.cli.screen import OUT
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_fleet, trends

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, Force, errors, numbers, say
+from axisight.cli.common import Force, errors, numbers, say
 from axisight.cli.identify_common import (
     Out,
     check_out,
@@ -24,6 +24,7 @@ from axisight.cli.identify_common import (
     provenance,
     write_robot,
 )
+from axisight.cli.screen import OUT
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import OUT, Force, From, To, errors, say
+from axisight.cli.common import Force, From, To, errors, say
 from axisight.cli.identify_common import (
     Columns,
     Out,
@@ -25,6 +25,7 @@ from axisight.cli.identify_common import (
     read_logs,
     write_robot,
 )
+from axisight.cli.screen import OUT
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
 

@@ -15,8 +15,9 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 
 from axisight import montecarlo
-from axisight.cli.common import ERR, OUT, errors, say
+from axisight.cli.common import errors, say
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects
+from axisight.cli.screen import BARS, OUT
 from axisight.effects import Effect
 from axisight.errors import StudyError
 from axisight.montecarlo.backends import available_threads
@@ -103,7 +104,7 @@ def _bar() -> Iterator[Report]:
         MofNCompleteColumn(),
         TextColumn("{task.fields[pace]}"),
     )
-    with Bars(*columns, console=ERR) as bars:
+    with Bars(*columns, console=BARS) as bars:
         task = bars.add_task("runs", total=None, pace="")
 
         def report(state: Progress) -> None:

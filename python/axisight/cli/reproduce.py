@@ -10,7 +10,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from axisight.cli.common import ERR, OUT, errors, say
+from axisight.cli.common import errors, say
+from axisight.cli.screen import BARS, OUT
 from axisight.errors import InputError
 from axisight.storage import check_folder
 
@@ -54,7 +55,7 @@ def reproduce_command(
             if error.name != "axisight_thesis":
                 raise
             raise InputError(_MISSING) from None
-        with Progress(*columns, console=ERR) as bar:
+        with Progress(*columns, console=BARS) as bar:
             task = bar.add_task(escape(name))
 
             def report(line: str) -> None:

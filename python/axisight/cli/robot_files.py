@@ -9,6 +9,7 @@ import typer
 
 from axisight.cli.common import Force, errors, say
 from axisight.cli.robot import say_import
+from axisight.cli.screen import is_output
 from axisight.errors import InputError
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import Payload
@@ -59,6 +60,7 @@ def import_command(
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
     with errors():
+        out = None if is_output(out) else out
         given = [model, *(x for x in (drives,) if x)]
         check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
         data = drive_data(model, drives)

@@ -6,7 +6,8 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from axisight.cli.common import OUT, say
+from axisight.cli.common import say
+from axisight.cli.screen import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
 from axisight.gap.compared import FROM_POSITIONS, torque_of
 from axisight.gap.headline import in_order, percent

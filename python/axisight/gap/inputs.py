@@ -128,6 +128,8 @@ def _read(
         extra = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in validation]
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
+        if paths and not paths[0].exists() and not is_folder_log(paths[0]):
+            raise InputError(f"{paths[0]}: expected a case folder or a log, got nothing")
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )

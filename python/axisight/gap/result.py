@@ -315,9 +315,13 @@ class Diagnosis:
         finite: dict[str, Any] = _finite(out)
         return finite
 
+    def to_json(self) -> str:
+        """Return the verdict as the text of its JSON file."""
+        return json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n"
+
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
-        write_whole(Path(path), json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n")
+        write_whole(Path(path), self.to_json())
 
 
 def _finite(value: Any) -> Any:

@@ -1,0 +1,114 @@
+"""Errors end with one suggestion where a name is nearly one that is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from axisight.cli import app
+from axisight.cli.suggest import suggestion
+from axisight.errors import InputError
+from axisight.fitting import robot_parameter
+from axisight.robot import load_robot
+
+MAP = """
+[time]
+name = "time_s"
+unit = "s"
+[[axis]]
+position = { name = "positon_1", unit = "rad" }
+torque = { name = "torque_cmd_1", unit = "Nm" }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{0.01 * i:.2f},{i % 7},0\n" for i in range(200))
+    Path("run1.csv").write_text(f"time_s,position_1,torque_cmd_1\n{rows}")
+    Path("map.toml").write_text(MAP)
+    Path("robot.toml").write_text("")
+    Path("arm.urdf").write_text("")
+    Path("study.toml").write_text("")
+    Path("mycase").mkdir()
+    return tmp_path
+
+
+WRONG = {
+    "diagnos": "Did you mean 'diagnose'?",
+    "identify rigid": "Did you mean 'rigid-body'?",
+    "diagnose --repor x": "--report)",
+    "--versio": "--version)",
+    "diagnose mycas": "did you mean mycase?",
+    "diagnose run1.csv --model irb6600_lik": "did you mean irb6600_like?",
+    "diagnose run1.csv --model robt.toml": "did you mean robot.toml?",
+    "diagnose run1.csv --effect backlas@1": "did you mean backlash?",
+    "columns show ur-rtd": "did you mean ur-rtde?",
+    "check run2.csv": "did you mean run1.csv?",
+    "check run1.csv --columns map.toml": "did you mean position_1?",
+    "check run1.csv --columns ur-rted": "did you mean ur-rtde?",
+    "check run1.csv --columns mop.toml": "did you mean map.toml?",
+    "excite --robot irb6600_like --kind multisin": "did you mean multisine?",
+    "robot import arn.urdf": "did you mean arm.urdf?",
+    "montecarlo studdy.toml --out x": "did you mean study.toml?",
+}
+
+
+@pytest.mark.parametrize("typed", WRONG)
+def test_what_was_meant_is_said_once(folder, typed):
+    done = CliRunner().invoke(app, typed.split())
+    assert done.exit_code in (1, 2)
+    said = " ".join(done.output.split())
+    assert WRONG[typed] in said, said
+    assert said.lower().count("did you mean") <= 1
+
+
+def test_of_several_commands_or_options_the_nearest_is_said(folder):
+    said = CliRunner().invoke(app, ["diagnose", "--fleets"]).output
+    assert "--fleet)" in said
+    for word in ("schem", "colum", "exite"):
+        said = CliRunner().invoke(app, [word]).output
+        assert said.split("Did you mean")[1].split("?")[0].count("'") == 2
+
+
+def test_nothing_is_said_where_nothing_is_near(folder):
+    for typed in ("columns show zzz", "check zzz.csv", "diagnose zzz"):
+        assert "did you mean" not in CliRunner().invoke(app, typed.split()).output.lower()
+
+
+@pytest.mark.parametrize(
+    ("message", "near"),
+    [
+        (
+            "--tolerance: expected one of mass, damping, or one of a joint (a.mass), got 'mas'",
+            "mass",
+        ),
+        ("line 3: unknown key `frictoin`; expected one of friction, mass", "friction"),
+        ("directions: expected one of t1, hadamard or a matrix, got 'hadamart'", "hadamard"),
+        (
+            "parameter `axis1.stifness`: expected one of axis1.stiffness, axis1.mass",
+            "axis1.stiffness",
+        ),
+        ("kp: expected a positive number, got -1", None),
+        ("x: expected one of a, b, got 3", None),
+        ("expected one of \x1b[2Jname, b, got '\x1b[2Jnam'", None),
+    ],
+)
+def test_names_are_taken_from_what_errors_list(message, near):
+    assert suggestion(message) == near
+
+
+def test_errors_of_the_core_are_understood():
+    with pytest.raises(InputError) as refused:
+        load_robot("irb6600_like").with_parameters({"axis1.stifness": 1.0})
+    assert suggestion(str(refused.value)) == "axis1.stiffness"
+    with pytest.raises(InputError) as refused:
+        robot_parameter(load_robot("irb6600_like"), "axis2.stifness")
+    assert suggestion(str(refused.value)) == "axis2.stiffness"
+
+
+def test_names_of_files_that_would_not_show_are_not_said(folder):
+    (folder / "run\x1b[2J.csv").write_text("")
+    assert suggestion("[Errno 2] No such file or directory: 'run\x1b[2K.csv'") != "run\x1b[2J.csv"
