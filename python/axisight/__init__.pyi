@@ -18,6 +18,9 @@ from . import (
     signal_files,
     write_back,
 )
+from .display.bars import (
+    progress_bars,
+)
 from .effects import (
     Effect,
     EffectInfo,
@@ -125,6 +128,7 @@ __all__ = [
     "plot_ranking",
     "plot_response_matrix",
     "plot_simulation",
+    "progress_bars",
     "read_case",
     "read_log",
     "records",

@@ -20,6 +20,7 @@ from axisight.calibration.geometry import (
     nominal_geometry,
 )
 from axisight.calibration.measurements import Checked, Loads, Measurement, check
+from axisight.display import html
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.statistics.evaluation import last_value
@@ -115,6 +116,17 @@ class Calibration:
     observability: float
     residual_scale: float
     errors: xr.Dataset
+
+    def _repr_html_(self) -> str:
+        """Deviations with standard errors, for notebooks."""
+        names, units = ([str(x) for x in self.table[key].values] for key in ("parameter", "unit"))
+        found = self.table
+        return html.page(
+            f"calibration: {self.status} after {self.iterations} iterations, "
+            f"residual scale {self.residual_scale:.3g}",
+            html.values(names, found["deviation"].values, found["standard_error"].values, units),
+            html.lines([self.advice] if self.advice else []),
+        )
 
 
 def calibrate(

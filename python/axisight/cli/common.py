@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from axisight.cli.screen import BARS, ERR, OUT, is_output
 from axisight.cli.stopping import exit_status
 from axisight.cli.suggest import suggestion
+from axisight.display.bars import terminal_bars
 from axisight.errors import AxisightError, InputError, OutputError
 from axisight.storage import write_whole
 
@@ -78,24 +78,9 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
         raise typer.Exit(exit_status(stop)) from None
 
 
-@contextmanager
-def bars() -> Iterator[Callable[[str, int, int], None]]:
+def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:
     """Show one bar per stage of the work."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=BARS) as shown:
-        tasks: dict[str, int] = {}
-
-        def report(label: str, done: int, total: int) -> None:
-            if label not in tasks:
-                tasks[label] = shown.add_task(label, total=total)
-            shown.update(shown.task_ids[tasks[label]], completed=done, total=total)
-
-        yield report
+    return terminal_bars(BARS)
 
 
 def say(text: str) -> None:

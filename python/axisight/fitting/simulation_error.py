@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.display import html
 from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.logs import Log
@@ -134,6 +135,14 @@ class Fitted:
     at_bound: tuple[str, ...]
     warnings: tuple[str, ...]
     core: _core.FitResult = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        """Values with standard errors, for notebooks."""
+        return html.page(
+            f"fit: {self.status} after {self.iterations} iterations",
+            html.values(self.names, self.values, self.std),
+            html.lines(self.warnings),
+        )
 
     def to_xarray(self) -> xr.Dataset:
         """Return values and uncertainty as a Dataset over ``parameter``."""

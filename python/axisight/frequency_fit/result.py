@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.display import html
 from axisight.frequency_fit.trust import Trust
 from axisight.identifiability import Combination, Identifiability
 from axisight.robot import Robot
@@ -85,6 +86,19 @@ class FrequencyFit:
     starts: pd.DataFrame = field(repr=False)
     robot: Robot = field(repr=False)
     core: _core.FrequencyFitResult = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        """Values with standard errors and 95 % intervals, for notebooks."""
+        columns = (self.values, self.std, self.interval[:, 0], self.interval[:, 1])
+        return html.page(
+            f"fit to frequency responses: {self.status} after {self.iterations} iterations, "
+            f"misfit {self.misfit:.3g}",
+            html.table(
+                ("parameter", "value", "standard error", "95 % from", "to"),
+                zip(self.names, *(map(html.number, column) for column in columns), strict=True),
+            ),
+            html.lines(self.warnings),
+        )
 
     def to_xarray(self) -> xr.Dataset:
         """Return values and uncertainty as a Dataset over ``parameter``."""

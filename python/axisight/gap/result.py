@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.display import html
 from axisight.effects import Effect
 from axisight.gap.compared import Compared
 from axisight.gap.faults import Finding
@@ -279,6 +280,31 @@ class Diagnosis:
     simulator: Reproduction | None = None
     signals: tuple[xr.Dataset, ...] = ()
 
+    def _repr_html_(self) -> str:
+        """Verdict, causes with values, and the gap by axis, for notebooks."""
+        causes = [row for cause in self.causes for row in _rows(cause)]
+        gap, verdicts = self.gap, {a.axis: a.verdict for a in self.axes}
+        stages = (
+            gap.before_per_axis,
+            gap.refitted_per_axis,
+            gap.after_per_axis,
+            gap.floor_per_axis,
+        )
+        rows = [
+            (str(i), verdicts.get(i, ""), *map(_percent, row))
+            for i, row in enumerate(zip(*stages, strict=True), start=1)
+        ]
+        whole = (gap.before, gap.refitted, gap.after, gap.floor)
+        rows.append(("all", self.verdict, *map(_percent, whole)))
+        then = [] if self.next_experiment is None else [f"next experiment: {self.next_experiment}"]
+        return html.page(
+            f"{self.name}: {self.verdict}",
+            html.lines([self.headline]),
+            html.table(("cause and its values", "value", "95 % interval", "probability"), causes),
+            html.table(("axis", "verdict", "gap before", "re-fitted", "after", "noise"), rows),
+            html.lines([*(f"finding: {finding}" for finding in self.findings), *then]),
+        )
+
     def to_verdict(self) -> dict[str, Any]:
         """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.
 
@@ -322,6 +348,25 @@ class Diagnosis:
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
         write_whole(Path(path), self.to_json())
+
+
+def _rows(cause: Cause) -> list[tuple[str, ...]]:
+    """Return a row for a cause, and one for each of its values."""
+    values = [
+        (
+            f"  {name}",
+            f"{html.number(p.value)} {unit}",
+            f"{html.number(p.low)} to {html.number(p.high)}",
+            "",
+        )
+        for name, p in cause.parameters.items()
+        for unit in (cause.units.get(name, "1"),)
+    ]
+    return [(cause.label, "", "", f"{cause.probability:.3f}"), *values]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %" if math.isfinite(share) else "-"
 
 
 def _finite(value: Any) -> Any:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.blackbox import fit_percent
+from axisight.display import html
 from axisight.errors import InputError
 from axisight.graybox.axis_findings import (
     covariance_findings,
@@ -109,6 +110,17 @@ class AxisFit:
     def converged(self) -> bool:
         """Whether the search ended by itself."""
         return self.status in CONVERGED
+
+    def _repr_html_(self) -> str:
+        """Values with standard errors, for notebooks."""
+        unit = {p.name: p.unit for p in self.model.parameters}
+        units = [unit[name] for name in self.free]
+        fits = ", ".join(f"{fit:.2f} %" for fit in self.fit_percent)
+        return html.page(
+            f"fit of an axis: {self.status} after {self.iterations} iterations, fit {fits}",
+            html.values(self.free, self.values, self.standard_error, units),
+            html.lines(self.warnings),
+        )
 
     @property
     def standard_error(self) -> Array:

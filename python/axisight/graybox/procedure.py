@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.display import html
 from axisight.errors import InputError
 from axisight.graybox.axis_model import AxisData, AxisModel
 from axisight.graybox.axis_records import as_data, reference_of
@@ -53,6 +54,16 @@ class AxisIdentification:
     fit: AxisFit
     initial_fit_percent: tuple[float, ...]
     tests: tuple[ResidualTests, ...]
+
+    def _repr_html_(self) -> str:
+        """Values of step 3 and how well each record is explained, for notebooks."""
+        columns = (self.initial_fit_percent, self.fit.fit_percent)
+        fits = zip(*(map(html.number, column) for column in columns), strict=True)
+        names = [data.name for data in self.data_sets]
+        rows = ((name, *fit) for name, fit in zip(names, fits, strict=True))
+        return self.fit._repr_html_() + html.table(
+            ("record", "fit of steps 1 and 2 [%]", "of step 3 [%]"), rows
+        )
 
     def report(self) -> str:
         """Return the values of each step, fits, tests and findings as text."""

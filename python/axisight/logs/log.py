@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.arguments import not_negative, positive
+from axisight.display import html
 from axisight.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,6 +96,26 @@ class Log:
             object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
         if len(self.axis_kinds) != shape[1]:
             raise InputError(f"axis_kinds: expected {shape[1]} entries, got {len(self.axis_kinds)}")
+
+    def _repr_html_(self) -> str:
+        """Signals with unit and range on every axis, for notebooks."""
+        rows = []
+        for field, (name, revolute, prismatic) in _VARIABLES.items():
+            found = getattr(self, field)
+            if found is None:
+                continue
+            for i, kind in enumerate(self.axis_kinds):
+                there = found[np.isfinite(found[:, i]), i]
+                span = (there.min(), there.max()) if there.size else (math.nan, math.nan)
+                unit = revolute if kind == "revolute" else prismatic
+                if there.size:
+                    rows.append((name, str(i + 1), unit, *map(html.number, span)))
+        return html.page(
+            f"{self.name}: {self.duration_s:g} s, {self.n_samples} samples at "
+            f"{self.sample_rate_hz:.6g} Hz, {self.n_axes} axes",
+            html.table(("signal", "axis", "unit", "least", "largest"), rows),
+            html.lines([f"from {self.source}", *self.notes]),
+        )
 
     @property
     def has_torque(self) -> bool:

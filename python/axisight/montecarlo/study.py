@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.display import html
 from axisight.documents import parse_toml
 from axisight.errors import StudyError
 from axisight.robot.presets import PRESETS
@@ -168,6 +169,21 @@ class Study(_Model):
     effect: list[EffectEntry] = []
     spread: list[Spread] = []
 
+    def _repr_html_(self) -> str:
+        """What is studied, for notebooks; results are xarray's."""
+        effects = "; ".join(_listed(e.model_dump(exclude_none=True)) for e in self.effect)
+        fields = ("plant", "excitation", "measurement", "statistics")
+        rows = [
+            (name, _listed(getattr(self, name).model_dump(exclude_none=True))) for name in fields
+        ]
+        rows += [("effects", effects)] if effects else []
+        spread = "; ".join(_listed(s.model_dump(exclude_none=True)) for s in self.spread)
+        rows += [("spread", spread)] if spread else []
+        return html.page(
+            f"{self.name}: {self.runs} runs of {self.robot}, seed {self.seed}",
+            html.table(("part", "settings"), rows),
+        )
+
     def changed(self, **changes: Any) -> Study:
         """Return the study with other fields; raises StudyError naming one that cannot be."""
         return Study(**{**self.model_dump(by_alias=True), **changes}) if changes else self
@@ -175,6 +191,10 @@ class Study(_Model):
     def to_toml(self) -> str:
         """Return the study as TOML; :func:`read_study` gives the same study back."""
         return tomli_w.dumps(self.model_dump(by_alias=True, exclude_none=True, mode="json"))
+
+
+def _listed(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in values.items())
 
 
 def read_study(source: Path | str) -> Study:

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.display import html
 from axisight.effects.stated import friction_corner
 from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
@@ -64,6 +65,20 @@ class LogIdentification:
     motions: tuple[MotionEstimate, ...]
     errors: xr.Dataset
     samples_kept: NDArray[np.intp]
+
+    def _repr_html_(self) -> str:
+        """Base parameters and torque errors on every log, for notebooks."""
+        rows = []
+        for which in self.errors["parameters"].values:
+            one = self.errors.sel(parameters=which)
+            for i, log in enumerate(one["log"].values):
+                held = " (held out)" if one["held_out"].values[i] else ""
+                shares = one["relative_error"].values[i]
+                rows.append((f"{log}{held}", str(which), *(f"{100 * x:.3g} %" for x in shares)))
+        axes = [f"axis {axis}" for axis in self.errors["axis"].values]
+        return self.estimate._repr_html_() + html.table(
+            ("log", "parameters", *axes), rows, "torque error over torque"
+        )
 
     def identified(self, provenance: Provenance) -> Identified:
         """Return the values for a robot file, those of bodies that can exist where there are.

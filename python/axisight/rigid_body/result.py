@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display import html
 from axisight.errors import InputError
 from axisight.rigid_body.base import BaseParameters
 from axisight.rigid_body.findings import IdentificationFinding
@@ -137,6 +138,14 @@ class RigidBodyEstimate:
     def names(self) -> list[str]:
         """Names of the base parameters."""
         return self.base.names
+
+    def _repr_html_(self) -> str:
+        """Base parameters with standard errors, for notebooks."""
+        return html.page(
+            f"base parameters by {self.method}, {self.n_samples} samples",
+            html.values(self.names, self.values, self.standard_error, self.base.units),
+            html.lines(str(finding) for finding in self.findings),
+        )
 
     @property
     def standard_error(self) -> Array:

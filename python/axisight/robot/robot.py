@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
 from axisight.arguments import usable_path
+from axisight.display import html
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
@@ -48,6 +49,23 @@ class Robot:
     def __repr__(self) -> str:
         """Name and size."""
         return f"<Robot {self.name!r}: {self.n_axes} axes, {self.n_joints} joints>"
+
+    def _repr_html_(self) -> str:
+        """Axes with drives and the present operating point, for notebooks."""
+        kinds = ["slides" if slides else "turns" for slides in self.axis_is_prismatic]
+        gears = ["rigid" if rigid else "elastic" for rigid in self.axis_is_rigid]
+        ratios, pose = (map(html.number, x) for x in (self.gear_ratio, self.operating_point))
+        numbers = map(str, range(1, self.n_axes + 1))
+        rows = zip(numbers, self.axis_names, kinds, gears, ratios, pose, strict=True)
+        acting = [effect.label for effect in self.effects if effect.acts]
+        return html.page(
+            f"{self.name}: {self.n_axes} axes, {self.n_joints} joints, "
+            f"sample time {self.sample_time_s:g} s, controller {self.controller_kind}",
+            html.table(
+                ("axis", "joint", "kind", "gear", "gear ratio", "operating point [rad or m]"), rows
+            ),
+            html.lines([f"with the effects {', '.join(acting)}"] if acting else []),
+        )
 
     @property
     def name(self) -> str:

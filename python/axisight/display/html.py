@@ -1,0 +1,59 @@
+"""Tables in HTML for notebooks: every text escaped, nothing fetched, no script, no style of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from itertools import islice
+
+_MOST_ROWS = 60
+_LONGEST = 500
+
+
+def page(title: str, *parts: str) -> str:
+    """Return a heading, which is escaped, above parts that are HTML."""
+    return f"<div><p><strong>{_text(title)}</strong></p>{''.join(parts)}</div>"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
+    """Return a table of texts; of very many rows the first, and a row that says so."""
+    rows = iter(rows)
+    shown = [_row("td", row) for row in islice(rows, _MOST_ROWS)]
+    more = sum(1 for _ in rows)
+    if more:
+        shown.append(_row("td", (f"and {more} more", *[""] * (len(head) - 1))))
+    if not shown:
+        return ""
+    above = f"<caption>{_text(caption)}</caption>" if caption else ""
+    return f"<table>{above}<thead>{_row('th', head)}</thead><tbody>{''.join(shown)}</tbody></table>"
+
+
+def values(
+    names: Sequence[str],
+    found: Iterable[float],
+    std: Iterable[float],
+    units: Sequence[str] | None = None,
+) -> str:
+    """Return a table of parameters with standard errors, and units where they are known."""
+    rows = zip(names, map(number, found), map(number, std), units or [""] * len(names), strict=True)
+    head = ("parameter", "value", "standard error", *(["unit"] if units else []))
+    return table(head, (row[: len(head)] for row in rows))
+
+
+def lines(texts: Iterable[str]) -> str:
+    """Return a paragraph a text."""
+    return "".join(f"<p>{_text(text)}</p>" for text in texts)
+
+
+def number(value: float) -> str:
+    """Return a number in four digits."""
+    return f"{value:.4g}"
+
+
+def _row(cell: str, texts: Sequence[str]) -> str:
+    return "<tr>" + "".join(f"<{cell}>{_text(text)}</{cell}>" for text in texts) + "</tr>"
+
+
+def _text(text: str) -> str:
+    cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    return escape(cut, quote=True)
