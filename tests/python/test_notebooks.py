@@ -179,7 +179,7 @@ def test_fits_show_values_with_errors():
 def test_a_study_shows_its_parts():
     text = shown(study())
     assert "mine: 17 runs of mine, seed 0" in text
-    assert "'period_s': 1.0" in text
+    assert "excitation multisine (period_s 1.0" in text
 
 
 ATTACKED = {

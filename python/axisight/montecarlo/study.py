@@ -194,7 +194,8 @@ class Study(_Model):
 
 
 def _listed(values: dict[str, Any]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in values.items())
+    texts = (f"({_listed(x)})" if isinstance(x, dict) else str(x) for x in values.values())
+    return ", ".join(f"{name} {text}" for name, text in zip(values, texts, strict=True))
 
 
 def read_study(source: Path | str) -> Study:
