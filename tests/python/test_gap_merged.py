@@ -75,27 +75,42 @@ def test_a_number_more_costs_as_in_the_ranking():
     assert likelier(1.0, 2.0, than=(1.0, 3.0))
 
 
-def test_a_link_that_is_heavier_and_off_its_centre_is_a_load():
-    """What a mass on the last link does is what two changes of that link do, and is met more often."""
+def in_place_of(machine: list[Effect], free: list[FreeEffect]) -> tuple[Evidence, str | None, int]:
+    """A fit of the arm with effects of a machine that has others, what takes their place, and its axis from 0."""
     robot = load_robot("irb6600_like")
-    machine = [Effect("payload", None, {"mass_kg": 100.0, "x_m": 0.7, "y_m": 0.05, "z_m": 0.25})]
     n = int(3.0 / robot.sample_time_s)
     logs = []
     for run in range(2):
         wanted = [reference("multisine", 3 * run + i, n, robot.sample_time_s) for i in range(3)]
         logs.append(log_of(robot, machine, np.hstack(wanted), run))
     view = ClosedLoopView(robot, logs, Settings(block_s=0.5))
+    model = view.fitter.fit(free)
+    floor = view.floor.expected[model.axis] * model.size
+    options = view.candidates(model, axes=[3])
+    one = one_for_several(view.fitter, model, options, floor, layout_of(model), view.settings)
+    return model, *((None, -1) if one is None else (one[0].trial.label, one[1].axis))
+
+
+LOAD = Effect("payload", None, {"mass_kg": 100.0, "x_m": 0.7, "y_m": 0.05, "z_m": 0.25})
+
+
+def test_a_link_that_is_heavier_and_off_its_centre_is_a_load():
+    """What a mass on the last link does is what two changes of that link do, and is met more often."""
     parts = [
         FreeEffect(Effect("link_mass", 3, {"relative_change": 0.1}), ("relative_change",)),
         FreeEffect(
             Effect("link_com", 3, {"x_m": 0.0, "y_m": 0.0, "z_m": 0.0}), ("x_m", "y_m", "z_m")
         ),
     ]
-    model = view.fitter.fit(parts)
+    model, label, axis = in_place_of([LOAD], parts)
     assert list(several_together(model)) == [(3, "load")]
-    floor = view.floor.expected[model.axis] * model.size
-    options = view.candidates(model, axes=[3])
-    one = one_for_several(view.fitter, model, options, floor, layout_of(model), view.settings)
-    assert one is not None
-    assert one[0].trial.label == "payload"
-    assert one[1].axis == 2
+    assert (label, axis) == ("payload", 2)
+
+
+@pytest.mark.parametrize("heavier", [True, False])
+def test_a_load_at_the_centre_of_the_last_link_is_a_heavier_link(heavier: bool):
+    """One number does what four do; a load elsewhere stays one."""
+    link = Effect("link_mass", 3, {"relative_change": 0.1})
+    free = [FreeEffect(LOAD, ("mass_kg", "x_m", "y_m", "z_m"))]
+    _, label, axis = in_place_of([link if heavier else LOAD], free)
+    assert (label, axis) == (("link_mass@3", 2) if heavier else (None, -1))

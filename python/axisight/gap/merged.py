@@ -53,9 +53,11 @@ def one_for_several(
 
     ``options``: the candidates, which are tried in their place, as is each of the several; ``floor``
     (n_blocks,): loss of noise alone. It has fewer numbers (a load no more), and may leave a little more; of laws
-    of a gear and of loads what formulas of one effect differ by.
+    of a gear and of loads what formulas of one effect differ by. A load alone gives way to one change of the
+    last link: at its centre it is no more than that.
     """
-    for (axis, family), several in several_together(model).items():
+    groups = {**several_together(model), **_lone_load(model, layout.n_axes)}
+    for (axis, family), several in groups.items():
         rest = [f for f in model.free if f not in several]
         count = sum(numbers(f) for f in several)
         labels = {f.effect.label for f in several}
@@ -67,7 +69,7 @@ def one_for_several(
             and o.effect.label not in labels
         ]
         # One of them may do it alone from where it is now, and could not from its start.
-        most = count if family == "load" else count - 1
+        most = count if family == "load" and len(several) > 1 else count - 1
         others = [o for o in (*new, *several) if numbers(o) <= most]
         try:
             without = fitter.fit(rest, model, lazy=True)
@@ -108,6 +110,17 @@ def several_together(model: Evidence) -> dict[tuple[int, str], list[FreeEffect]]
         if f.effect.axis is not None:
             found[f.effect.axis, effect_info(f.effect.name).family].append(f)
     return {key: several for key, several in found.items() if len(several) > 1}
+
+
+def _lone_load(model: Evidence, n_axes: int) -> dict[tuple[int, str], list[FreeEffect]]:
+    """Return a load with the axis of the link that carries it, where that has no other change of the kind."""
+    loads = [f for f in model.free if f.effect.axis is None and _is_load(f)]
+    links = [f for f in model.free if f.effect.axis == n_axes and _is_load(f)]
+    return {(n_axes, "load"): loads} if len(loads) == 1 and not links else {}
+
+
+def _is_load(free: FreeEffect) -> bool:
+    return effect_info(free.effect.name).family == "load"
 
 
 def _best_settled(fitter: ModelFitter, trials: Sequence[Trial]) -> list[Trial]:
