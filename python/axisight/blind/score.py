@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,9 @@ from typing import Any
 import numpy as np
 import scipy
 
+from axisight.arguments import short
 from axisight.blind.sealed import SEAL, seal_of
+from axisight.documents import parse_json
 from axisight.effects import effect_table
 from axisight.errors import InputError
 from axisight.gap.twins import TWIN_SHARE, twins_of
@@ -105,8 +106,8 @@ class Share:
 def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
     """Return every verdict beside its truth.
 
-    Raises InputError for a truth that is not the one its case was sealed with, or that is not there, and
-    where there is no verdict at all.
+    Raises InputError for a truth that is not the one its case was sealed with, or that is not there, for
+    a damaged verdict, and where there is no verdict at all.
     """
     out = []
     for path in sorted(verdicts.glob("*.json")):
@@ -114,7 +115,17 @@ def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
         seal = _read(cases / path.stem / SEAL, "the seal of a case").strip()
         if seal_of(text) != seal:
             raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
-        out.append(_judged(path.stem, json.loads(text), json.loads(path.read_text("utf-8"))))
+        truth = _parsed(truths / path.name, text)
+        verdict = _parsed(path, _read(path, "a verdict"))
+        try:
+            out.append(_judged(path.stem, truth, verdict))
+        except InputError:
+            raise
+        except Exception as error:  # what is damaged but JSON lacks anything, or has it as anything
+            raise InputError(
+                f"{path}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
+                f"({short(repr(error))})"
+            ) from error
     if not out:
         raise InputError(f"{verdicts}: expected verdicts (*.json), got none")
     return out
@@ -125,6 +136,16 @@ def _read(path: Path, what: str) -> str:
         return path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected {what}: {error}") from error
+
+
+def _parsed(path: Path, text: str) -> dict[str, Any]:
+    try:
+        found = parse_json(text)
+    except ValueError as error:
+        raise InputError(f"{path}: expected JSON: {error}") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: expected an object, got {short(text)}")
+    return found
 
 
 def _label(entry: dict[str, Any]) -> str:

@@ -13,11 +13,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
 
-from axisight.arguments import instance, path_of, short
+from axisight.arguments import instance, path_of, short, shown
 from axisight.documents import parse_json
 from axisight.errors import InputError, LogError
 from axisight.excitation.references import References
+from axisight.logs.budget import Budget
+from axisight.logs.columns import CsvOptions
 from axisight.logs.sources import load_arrays
+from axisight.logs.sources_csv import load_csv
 from axisight.storage import write_bytes
 
 _SCHEMA = "axisight.excitation/1"
@@ -80,7 +83,7 @@ def read_references(path: Path | str) -> References:
         text, period = _content(source)
         design = parse_json(text)
         if design["schema"] != _SCHEMA:
-            raise InputError(f"{source}: schema: expected {_SCHEMA}, got {design['schema']}")
+            raise InputError(f"{source}: schema: expected {_SCHEMA}, got {shown(design['schema'])}")
         period = period.reshape(design["shape"])
         return References(
             sample_time_s=design["sample_time_s"],
@@ -94,7 +97,7 @@ def read_references(path: Path | str) -> References:
         raise InputError(f"{source}: expected references with their design: {error}") from None
     except InputError:
         raise
-    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as e:
+    except Exception as e:  # damage makes readers raise nearly anything
         raise InputError(
             f"{source}: expected references with their design: {short(repr(e), 200)}"
         ) from None
@@ -123,8 +126,10 @@ def _content(source: Path) -> tuple[str, np.ndarray[Any, np.dtype[np.float64]]]:
         columns = [arrays[name] for name in list(arrays)[2:]]
         return text, np.column_stack(columns).astype(np.float64)
     text = _beside(source).read_text("utf-8")
-    table = pd.read_csv(source, float_precision="round_trip")
-    return text, table.iloc[:, 2:].to_numpy(np.float64)
+    budget = Budget()
+    budget.grow([source])
+    table = load_csv(source, budget, CsvOptions(), exact=True)
+    return text, np.column_stack([table[name] for name in list(table)[2:]]).astype(np.float64)
 
 
 def _table(reference: References) -> pd.DataFrame:

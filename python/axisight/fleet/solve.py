@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -13,6 +14,7 @@ from typing import Any
 
 from axisight.cluster import on_cluster
 from axisight.cluster.workers import each_done
+from axisight.documents import parse_json
 from axisight.errors import AxisightError
 from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
 from axisight.gap import Settings, diagnose
@@ -36,7 +38,8 @@ def diagnose_fleet(
     """Diagnose every case below ``folder``; return the verdicts by name, in their order.
 
     A verdict goes to ``verdicts`` / name + ``.json`` as soon as it is there, and stays where the
-    case, the settings and the version of this package are what they were. A case that cannot be
+    case, the settings and the version of this package are what they were; one that is damaged is made
+    again. A case that cannot be
     diagnosed has ``error``, the reason, in place of a verdict. ``workers``: processes here;
     ``scheduler``: address of a Dask scheduler whose workers do it instead, which are sent the
     files. A verdict does not depend on where it was made: every diagnosis has one thread.
@@ -68,6 +71,7 @@ def diagnose_fleet(
         for case, text in made:
             found[case.name] = verdict = json.loads(text)
             verdict["fingerprint"] = prints[case.name]
+            verdict["sha256"] = _checksum(verdict)
             write_whole(_path(verdicts, case), json.dumps(verdict, indent=2) + "\n")
             progress(_LABEL, len(found), len(cases))
     return {case.name: found[case.name] for case in cases}
@@ -96,13 +100,23 @@ def _path(verdicts: Path, case: FleetCase) -> Path:
 
 
 def _known(path: Path, wanted: str) -> dict[str, Any] | None:
-    """Return the verdict in a file if it is that of the fingerprint."""
+    """Return the verdict in a file if it is that of the fingerprint, as it was written."""
     try:
-        found = json.loads(path.read_text("utf-8"))
+        found = parse_json(path.read_text("utf-8"))
     except (OSError, ValueError):
         return None
-    same = isinstance(found, dict) and found.get("fingerprint") == wanted
+    same = (
+        isinstance(found, dict)
+        and found.get("fingerprint") == wanted
+        and found.get("sha256") == _checksum(found)
+    )
     return found if same else None
+
+
+def _checksum(verdict: dict[str, Any]) -> str:
+    """Return the SHA-256 of what a verdict says, but for this line of it."""
+    said = {name: value for name, value in verdict.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 
 def _here(

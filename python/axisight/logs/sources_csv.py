@@ -21,8 +21,10 @@ _BLOCK = 2**20
 UNENDED = "expected a line end behind the last row, as behind the others, got none: its last value may be cut"
 
 
-def load_csv(path: Path, budget: Budget, options: CsvOptions) -> LazyArrays:
+def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = False) -> LazyArrays:
     """Return the columns of a table; of names that stand twice none is read.
+
+    ``exact``: numbers to the last bit, which takes longer.
 
     A last line without an end is said among the doubts: whether the file was cut inside its last number
     cannot be known from it. Raises LogError for a table that is too wide or too large.
@@ -47,6 +49,7 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions) -> LazyArrays:
             header=0 if options.header else None,
             skipinitialspace=True,
             index_col=False,
+            float_precision="round_trip" if exact else None,
         )
     raw = [str(name).strip() for name in (first.iloc[0] if options.header else range(n_columns))]
     counts = Counter(raw)

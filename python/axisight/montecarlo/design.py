@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import short, shown
+from axisight.documents import parse_json
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError, StudyError
 from axisight.montecarlo.study import Study
@@ -45,15 +47,26 @@ def digest(design: str) -> str:
     return hashlib.sha256(design.encode()).hexdigest()
 
 
+def settings_of(design: str) -> dict[str, Any]:
+    """Return what a design holds; raises StudyError for text that is no design."""
+    try:
+        found = parse_json(design)
+    except (TypeError, ValueError) as error:
+        raise StudyError(f"design: expected JSON: {short(str(error), 200)}") from None
+    if not isinstance(found, dict):
+        raise StudyError(f"design: expected an object, got {type(found).__name__}")
+    return found
+
+
 @lru_cache(maxsize=8)
 def core_study(design: str) -> _core.MonteCarloStudy:
     """Return the checked study of a design; raises StudyError naming the field."""
-    d = json.loads(design)
-    multisine, square = d["excitation"]["multisine"], d["excitation"]["square"]
-    directions = d["excitation"]["directions"]
-    named = isinstance(directions, str)
-    plant, measurement = d["plant"], d["measurement"]
+    d = settings_of(design)
     try:
+        multisine, square = d["excitation"]["multisine"], d["excitation"]["square"]
+        directions = d["excitation"]["directions"]
+        named = isinstance(directions, str)
+        plant, measurement = d["plant"], d["measurement"]
         robot = Robot.from_toml(d["robot"]["toml"]).with_parameters(d["robot_parameters"])
         return _core.MonteCarloStudy(
             robot.core,
@@ -86,6 +99,11 @@ def core_study(design: str) -> _core.MonteCarloStudy:
         raise
     except InputError as error:
         raise StudyError(str(error)) from None
+    # A design that somebody changed lacks anything, or has it as anything.
+    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+        raise StudyError(
+            f"design: expected what a study is frozen to: {short(repr(error))}"
+        ) from error
 
 
 def _effects(design: Mapping[str, Any], robot: Robot) -> list[Effect]:
@@ -104,11 +122,10 @@ def compute_block(
 
     A pure function of its arguments: it runs here, in a thread, or on a worker elsewhere.
     """
-    settings = json.loads(design)
+    settings = settings_of(design)
     here = version("axisight")
-    if settings["axisight_version"] != here:
-        expected = settings["axisight_version"]
-        raise StudyError(f"axisight_version: expected {expected}, got {here} on a worker")
+    if (expected := settings.get("axisight_version")) != here:
+        raise StudyError(f"axisight_version: expected {shown(expected)}, got {here} on a worker")
     keep = settings["statistics"]["keep_responses"]
     out = core_study(design).block(seed, first, count, keep_responses=keep, cancel=cancel)
     return None if out is None else {name: np.asarray(value) for name, value in out.items()}

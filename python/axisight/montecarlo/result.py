@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.errors import StoreError
-from axisight.montecarlo.design import Arrays, Task, core_study
+from axisight.arguments import short
+from axisight.errors import StoreError, StudyError
+from axisight.montecarlo.design import Arrays, Task, core_study, settings_of
 from axisight.montecarlo.store import Store
 from axisight.montecarlo.study import Study
 
@@ -136,8 +136,12 @@ def responses(out: Path | str) -> xr.DataArray:
     StoreError if the store holds none.
     """
     store = Store(Path(out))
-    provenance = store.provenance()
-    core = core_study(provenance["design"])
+    design, seed = store.begun_with()
+    try:
+        core = core_study(design)
+        output = settings_of(design)["measurement"]["output"]
+    except StudyError as error:
+        raise store.damaged(short(str(error))) from None
     parts = []
     runs: list[int] = []
     for first, count in sorted(store.stored().items()):
@@ -150,10 +154,9 @@ def responses(out: Path | str) -> xr.DataArray:
     if not parts:
         raise StoreError(f"{store.root}: expected blocks of runs, got none")
     axes = list(range(1, core.n_axes + 1))
-    output = json.loads(provenance["design"])["measurement"]["output"]
     return xr.DataArray(
         np.concatenate(parts),
         dims=("run", "frequency_hz", "output", "input"),
         coords={"run": runs, "frequency_hz": core.frequency_hz, "output": axes, "input": axes},
-        attrs={"units": _UNITS[output], "seed": provenance["seed"]},
+        attrs={"units": _UNITS[output], "seed": seed},
     )

@@ -14,7 +14,6 @@ either all of it or nothing. Blocks that fail their checksum are computed again.
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -31,7 +30,7 @@ from numpy.typing import NDArray
 from axisight.arguments import short, shown
 from axisight.documents import parse_json
 from axisight.errors import StoreError, StudyError
-from axisight.montecarlo.design import Arrays, differences
+from axisight.montecarlo.design import Arrays, differences, digest, settings_of
 
 FORMAT: Final = "axisight.montecarlo.store/1"
 
@@ -96,6 +95,16 @@ class Store:
         # Damage shows as anything that a reader of JSON or of groups can raise.
         except Exception as error:
             raise self.damaged(short(str(error))) from None
+
+    def begun_with(self) -> tuple[str, int]:
+        """Return design and seed; raises StoreError for a store without, or whose design was changed."""
+        found = self.provenance()
+        design, seed = found.get("design"), found.get("seed")
+        if not isinstance(design, str) or not isinstance(seed, int):
+            raise self.damaged("design and seed are not both there")
+        if found.get("design_sha256") != digest(design):
+            raise self.damaged("the design is not the one its SHA-256 is of")
+        return design, seed
 
     def damaged(self, reason: str) -> StoreError:
         """Return the error for metadata without which nobody knows what the blocks are of."""
@@ -209,7 +218,7 @@ def check_same(store: Store, design: str, seed: int) -> None:
         was, seeded = parse_json(stored["design"]), stored["seed"]
     except (KeyError, TypeError, ValueError) as error:
         raise store.damaged(short(f"{type(error).__name__}: {error}")) from None
-    found = differences(was, json.loads(design)) + differences(seeded, seed, "seed")
+    found = differences(was, settings_of(design)) + differences(seeded, seed, "seed")
     if found:
         raise StudyError(f"{store.folder}: cannot resume: {'; '.join(found)}")
 
