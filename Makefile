@@ -9,6 +9,8 @@
 #   make docs    regenerate the generated pages
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
 #   make crash   studies killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
+#   make deny    licences, doubles and sources of the Rust dependencies, by cargo deny where it is
+#   make lowest  the package with the lowest versions of its Python dependencies
 #   make bench   criterion benches, then side-by-side runs against other libraries
 #   make clean   remove everything that was built
 
@@ -40,7 +42,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs fuzz crash bench clean force
+.PHONY: setup demo test test-rust test-python lint format docs fuzz crash deny lowest bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -83,6 +85,13 @@ fuzz: $(STAMPS)/test-tools
 
 crash: $(STAMPS)/test-tools
 	$(BIN)/python tests/python/crash_trial.py $(KILLS)
+
+# Tests hold licences, doubles and sources against deny.toml too, without cargo deny.
+deny:
+	@$(CARGO) deny --version || { echo "deny: cargo install cargo-deny --locked" >&2; exit 1; }
+	$(CARGO) deny --locked --offline check licenses bans sources
+	@if $(CARGO) deny --locked fetch db 2>/dev/null; then $(CARGO) deny --locked check advisories; \
+	else echo "deny: the database of advisories is out of reach: advisories not checked"; fi
 
 bench: $(STAMPS)/bench-tools
 	$(CARGO) bench --locked -p axisight-benches

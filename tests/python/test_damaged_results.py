@@ -49,7 +49,9 @@ def benchmark(folder: Path, truth: str, verdict: str) -> list[Path]:
 @pytest.mark.parametrize("which", ["truths", "verdicts"])
 def test_a_damaged_verdict_or_truth_is_named(tmp_path, text, which):
     good = '{"error": "x"}'
-    truth, verdict = (text, good) if which == "truths" else ('{"severity": [], "effects": []}', text)
+    truth, verdict = (
+        (text, good) if which == "truths" else ('{"severity": [], "effects": []}', text)
+    )
     with pytest.raises(InputError, match=r"one\.json: expected") as caught:
         judged_cases(*benchmark(tmp_path, truth, verdict))
     assert len(str(caught.value)) < 1000
