@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any, TextIO
@@ -42,15 +43,7 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = F
     budget.take_values((lines, n_columns), 8)
     with path.open(encoding="utf-8", newline="") as file:
         _settle(file, options)
-        frame = pd.read_csv(
-            file,
-            sep=separator,
-            decimal=options.decimal,
-            header=0 if options.header else None,
-            skipinitialspace=True,
-            index_col=False,
-            float_precision="round_trip" if exact else None,
-        )
+        frame = _whole(file, separator, options, exact)
     raw = [str(name).strip() for name in (first.iloc[0] if options.header else range(n_columns))]
     counts = Counter(raw)
     readers: dict[str, Reader] = {}
@@ -60,6 +53,27 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = F
         elif k < frame.shape[1]:
             readers[name] = given(_column(frame, k))
     return LazyArrays(readers, () if ended else (UNENDED,))
+
+
+def _whole(file: TextIO, separator: str, options: CsvOptions, exact: bool) -> pd.DataFrame:
+    with warnings.catch_warnings():
+        # Of rows that are all, or from the first on, longer than the header pandas drops the end.
+        warnings.filterwarnings("error", "Length of header", pd.errors.ParserWarning)
+        try:
+            return pd.read_csv(
+                file,
+                sep=separator,
+                decimal=options.decimal,
+                header=0 if options.header else None,
+                skipinitialspace=True,
+                index_col=False,
+                float_precision="round_trip" if exact else None,
+            )
+        except pd.errors.ParserWarning:
+            raise LogError(
+                "expected as many values in every row as names in the header, got more: a comma may be the "
+                "decimal mark (decimal, separator of the column map)"
+            ) from None
 
 
 def _column(frame: pd.DataFrame, k: int) -> NDArray[Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from axisight.arguments import shown
 from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING, TORQUE_CONSTANT
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Mass, Pose, joined
@@ -29,7 +30,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
     for name in drives.joint:
         if name not in names:
             raise RobotError(
-                f"drive data: joint.{name}: expected one of {', '.join(names)}, got {name!r}"
+                f"drive data: joint.{name}: expected one of {', '.join(names)}, got {shown(name)}"
             )
     drives, by_class = with_rotors(chain.joints, drives)
     joints = list(chain.joints)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Mass, Motion, Pose, Tree, still
 
@@ -61,7 +62,7 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
         name = row.get("joint", "")
         if not name or name in seen:
             raise RobotError(
-                f"{path}, line {number}: joint: expected a name no other row has, got {name!r}"
+                f"{path}, line {number}: joint: expected a name no other row has, got {shown(name)}"
             )
         seen.add(name)
     return rows
@@ -72,9 +73,9 @@ def _bodies(row: dict[str, str], parent: str, where: str) -> list[Body]:
     convention, motion = row.get("convention", ""), row["motion"]
     if convention not in CONVENTIONS:
         expected = " or ".join(CONVENTIONS)
-        raise RobotError(f"{where}: convention: expected {expected}, got {convention!r}")
+        raise RobotError(f"{where}: convention: expected {expected}, got {shown(convention)}")
     if motion not in ("revolute", "prismatic"):
-        raise RobotError(f"{where}: motion: expected revolute or prismatic, got {motion!r}")
+        raise RobotError(f"{where}: motion: expected revolute or prismatic, got {shown(motion)}")
     theta, d, a, alpha = (_number(row, name, where) for name in _GEOMETRY)
     mass = _mass(row, where)
     along_z = _turned("z", theta) @ Pose(np.eye(3), np.array([0.0, 0.0, d]))
@@ -104,7 +105,7 @@ def _number(row: dict[str, str], name: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise RobotError(f"{where}: {name}: expected a number, got {text!r}")
+        raise RobotError(f"{where}: {name}: expected a number, got {shown(text)}")
     return value
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.xml_tree import Element, read_xml
 
@@ -49,7 +50,9 @@ def _checked(root: Element, path: Path, folder: Path, above: list[Path]) -> list
                     f"{element.where}: expected another file, got one that includes itself"
                 )
             if not included.is_file():
-                raise RobotError(f"{element.where}: file: expected a file, got {included.name!r}")
+                raise RobotError(
+                    f"{element.where}: file: expected a file, got {shown(included.name)}"
+                )
             found += _checked(read_xml(included), included, folder, here)
     return found
 
@@ -59,6 +62,6 @@ def _inside(element: Element, key: str, name: str, folder: Path) -> None:
     target = (folder / name).resolve()
     if Path(name).is_absolute() or not target.is_relative_to(folder):
         raise RobotError(
-            f"{element.where}: {key}: expected a path inside the folder of the model, got {name!r}: "
+            f"{element.where}: {key}: expected a path inside the folder of the model, got {shown(name)}: "
             f"nothing outside is read; copy it beside the model"
         )

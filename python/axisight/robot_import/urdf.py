@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
 from axisight.robot_import.xml_tree import Element
@@ -63,7 +64,7 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
         raise RobotError(f"{joint.where}: expected <{tag} link=...>, got none")
     name = end.require("link", f"the {tag} of joint {joint.attributes['name']!r}")
     if name not in links:
-        raise RobotError(f"{end.where}: expected the name of a link, got {name!r}")
+        raise RobotError(f"{end.where}: expected the name of a link, got {shown(name)}")
     return name
 
 
@@ -119,7 +120,7 @@ def _body(
     kind = joint.require("type", f"one of {', '.join(_MOTIONS)}")
     if kind not in _MOTIONS:
         raise RobotError(
-            f"{joint.where}: type: expected one of {', '.join(_MOTIONS)}, got {kind!r}"
+            f"{joint.where}: type: expected one of {', '.join(_MOTIONS)}, got {shown(kind)}"
         )
     motion = _MOTIONS[kind]
     refused = ""
@@ -236,5 +237,7 @@ def _reduction(element: Element) -> float:
     except ValueError:
         value = 0.0
     if value == 0 or not np.isfinite(value):
-        raise RobotError(f"{element.where}: expected a reduction other than zero, got {text!r}")
+        raise RobotError(
+            f"{element.where}: expected a reduction other than zero, got {shown(text)}"
+        )
     return value

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
+from axisight.arguments import shown
 from axisight.errors import RobotError
 
 # Robots of the largest public collections stay below a tenth of these.
@@ -75,7 +76,7 @@ class Element:
         except ValueError:
             found = ()
         if len(found) != count or not all(map(math.isfinite, found)):
-            raise RobotError(f"{self.where}: {attribute}: expected {expected}, got {text!r}")
+            raise RobotError(f"{self.where}: {attribute}: expected {expected}, got {shown(text)}")
         return found
 
     def number(self, attribute: str, default: float | None = None) -> float:
