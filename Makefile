@@ -86,6 +86,21 @@ fuzz: $(STAMPS)/test-tools
 crash: $(STAMPS)/test-tools
 	$(BIN)/python tests/python/crash_trial.py $(KILLS)
 
+# Lowest versions of what pyproject.toml asks for, in an environment of their own.
+LOWEST := $(VENV)/lowest
+LOWEST_TESTS := test_cli test_logs_reading test_logs_errors test_montecarlo_store test_store_foreign \
+	test_excitation_limits test_report test_damaged_results
+lowest: $(STAMPS)/installed
+	$(INSTALL) 'uv>=0.4'
+	rm -rf $(LOWEST)
+	$(BIN)/uv venv --quiet --python $(BIN)/python $(LOWEST)
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --output-file $(LOWEST)/lowest.txt
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --only-binary :all: \
+		--requirement $(LOWEST)/lowest.txt 'pytest>=8' 'hypothesis>=6'
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --no-deps $(WHEELS)/axisight-*.whl
+	$(LOWEST)/bin/axisight demo --out $(LOWEST)/demo
+	$(LOWEST)/bin/python -m pytest -q $(patsubst %,tests/python/%.py,$(LOWEST_TESTS))
+
 # Tests hold licences, doubles and sources against deny.toml too, without cargo deny.
 deny:
 	@$(CARGO) deny --version || { echo "deny: cargo install cargo-deny --locked" >&2; exit 1; }
