@@ -10,19 +10,28 @@ from pathlib import Path
 # and the largest memory so far (MB).
 _CHILD = """
 import json, resource, signal, sys, warnings
+from pathlib import Path
 warnings.simplefilter("ignore")
 from axisight.errors import AxisightError
 from axisight.logs import parse_column_map, read_log
 import h5py, pandas, pyarrow.parquet
 
 limit, seconds = int(sys.argv[1]), int(sys.argv[2])
+read_path = None
+if len(sys.argv) > 3:
+    sys.path.insert(0, sys.argv[3])
+    from every_reader import READERS
+    read_path = READERS[sys.argv[4]]
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 signal.signal(signal.SIGALRM, signal.SIG_DFL)
 for line in sys.stdin:
     path, columns = json.loads(line)
     signal.alarm(seconds)
     try:
-        read_log(path, None if columns is None else parse_column_map(columns))
+        if read_path is not None:
+            read_path(Path(path))
+        else:
+            read_log(path, None if columns is None else parse_column_map(columns))
         said = "read"
     except AxisightError as error:
         said = f"refused: {error}"
@@ -37,9 +46,16 @@ for line in sys.stdin:
 
 
 def read_in_child(
-    paths: list[Path], columns: str | None = None, *, limit: int = 4 * 10**9, seconds: int = 20
+    paths: list[Path],
+    columns: str | None = None,
+    *,
+    reader: str | None = None,
+    limit: int = 4 * 10**9,
+    seconds: int = 20,
 ) -> list[tuple[str, float]]:
     """What reading each file came to, and the child's largest memory until then (MB).
+
+    As a log, or by a reader of `every_reader`.
 
     "read", "refused: ..." for an error of the package, another exception by its name, or "killed: ..."
     by a signal: 11 where memory was violated, 14 where it took longer than `seconds`.
@@ -47,8 +63,9 @@ def read_in_child(
     found: list[tuple[str, float]] = []
     while len(found) < len(paths):
         lines = "".join(f"{json.dumps([str(p), columns])}\n" for p in paths[len(found) :])
+        chosen = [] if reader is None else [str(Path(__file__).parent), reader]
         child = subprocess.run(
-            [sys.executable, "-c", _CHILD, str(limit), str(seconds)],
+            [sys.executable, "-c", _CHILD, str(limit), str(seconds), *chosen],
             check=False,
             input=lines,
             capture_output=True,

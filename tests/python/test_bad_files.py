@@ -6,24 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from axisight.blind.score import _parsed, _read
 from axisight.errors import CaseError, InputError, LogError, RobotError, StoreError, StudyError
-from axisight.excitation import load_design, read_design, read_references
-from axisight.logs import load_column_map, parse_column_map, read_case, read_log
-from axisight.montecarlo import read_study
-from axisight.montecarlo.store import Store
-from axisight.robot import load_robot
-from axisight.robot_file.sidecar import read_sidecar
-from axisight.robot_import import import_robot
-from axisight.robot_import.drives import read_drives
+from every_reader import READERS
 from reading_children import read_in_child
 
 BAD = Path(__file__).resolve().parents[1] / "golden" / "bad"
-STATES = """
-time = { name = "joint_states.time_s", resample_hz = "mean" }
-[[axis]]
-position = { name = "joint_states.position.a", unit = "rad" }
-"""
 TOML = {
     "cut": "expected TOML.*end of document",
     "digits": "5000 digits",
@@ -119,30 +106,6 @@ SAID: dict[str, tuple[type[Exception], dict[str, str]]] = {
 }
 
 
-def case(path):
-    """A case has its name from its folder's file."""
-    folder = path.parent.parent / f"case_{path.stem}"
-    folder.mkdir()
-    read_case(shutil.copy(path, folder / "case.toml").parent)
-
-
-READERS = {
-    "logs": read_log,
-    "recordings": lambda path: read_log(
-        f"{path}#0" if path.name.startswith("lerobot") else path, parse_column_map(STATES)
-    ),
-    "columns": load_column_map,
-    "case": case,
-    "robot": load_robot,
-    "study": read_study,
-    "design": lambda path: read_design(load_design(path), str(path)),
-    "drives": read_drives,
-    "verdict": lambda path: _parsed(path, _read(path, "a verdict")),
-    "sidecar": read_sidecar,
-    "store": lambda path: Store(path).provenance(),
-    "models": import_robot,
-    "references": read_references,
-}
 EVERY = [(reader, name) for reader, (_, files) in SAID.items() for name in files]
 
 

@@ -1,7 +1,5 @@
 """Damage of any kind, seeded: no reader is killed, hangs, swells, or raises what is not the package's."""
 
-import os
-
 import h5py
 import numpy as np
 import pytest
@@ -11,51 +9,9 @@ from axisight.errors import InputError
 from axisight.logs import check_log, named_map_text, parse_column_map, read_case, read_log
 from bag_data import written_states
 from columns_data import robot, write_lerobot
+from damage import TIMES, batch, mutated, sound
 from logs_data import FORMAT_IDS, FORMATS, native_columns, write
-from reading_children import read_in_child, wrong
-
-# Of each format; `make fuzz` asks for more.
-_TIMES = int(os.environ.get("AXISIGHT_FUZZ", "200"))
-
-
-def mutated(data: bytes, rng: np.random.Generator) -> bytes:
-    """The bytes with one kind of damage: changed, taken out, put in twice, cut off, or set to extremes."""
-    spoiled = bytearray(data)
-    at = int(rng.integers(len(data)))
-    if rng.random() < 0.4:  # structure stands at the ends of most formats
-        at = int(rng.choice([at % 512, len(data) - 1 - at % 512])) % len(data)
-    long = int(rng.integers(1, 9))
-    kind = rng.integers(7)
-    if kind == 0:
-        spoiled[at] ^= 1 << int(rng.integers(8))
-    elif kind == 1:
-        spoiled[at : at + long] = rng.bytes(long)
-    elif kind == 2:
-        del spoiled[at : at + long]
-    elif kind == 3:
-        spoiled[at:at] = spoiled[at : at + 4 * long]
-    elif kind == 4:
-        del spoiled[at:]
-    elif kind == 5:  # where types stand as small numbers, another one
-        spoiled[at - at % 8] = int(rng.integers(32))
-    else:
-        spoiled[at : at + long] = rng.choice([b"\0", b"\xff", b"\x7f"]) * long
-    return bytes(spoiled)
-
-
-def batch(folder, path, rng, times=_TIMES):
-    """Files with damage, as many of the same suffix."""
-    data, paths = path.read_bytes(), []
-    for number in range(times):
-        paths.append(folder / f"{number}{path.suffix}")
-        paths[-1].write_bytes(mutated(data, rng))
-    return paths
-
-
-def sound(outcomes):
-    assert wrong(outcomes) == []
-    assert any(said.startswith("refused") for said, _ in outcomes)
-    assert max(used for _, used in outcomes) < 500
+from reading_children import read_in_child
 
 
 @pytest.mark.parametrize(("name", "kind"), FORMATS, ids=FORMAT_IDS)
@@ -129,7 +85,7 @@ def test_damaged_recordings(tmp_path, kind):
         paths = batch(tmp_path, path, rng)
     else:  # a folder with a description and a file: either is damaged
         paths, files = [], sorted(p for p in good.iterdir() if p.is_file())
-        for number in range(_TIMES):
+        for number in range(TIMES):
             paths.append(tmp_path / f"{number}")
             paths[-1].mkdir()
             spoiled = files[number % len(files)]
@@ -140,7 +96,7 @@ def test_damaged_recordings(tmp_path, kind):
     sound(read_in_child(paths, STATES, seconds=10, limit=3 * 10**9))
 
 
-def refused_only(call, times=_TIMES):
+def refused_only(call, times=TIMES):
     """Call with numbers of damages; errors of the package are right, all others are raised."""
     refused = 0
     for number in range(times):
