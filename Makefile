@@ -81,7 +81,7 @@ docs: $(STAMPS)/installed
 
 fuzz: $(STAMPS)/test-tools
 	AXISIGHT_FUZZ=$(FUZZ) $(CARGO) test --release --locked -p axisight-tests --test damaged_robots
-	AXISIGHT_FUZZ=$(FUZZ) $(BIN)/python -m pytest -q tests/python/test_fuzz_readers.py
+	AXISIGHT_FUZZ=$(FUZZ) $(BIN)/python -m pytest -q tests/python/test_fuzz_readers.py tests/python/test_fuzz_documents.py
 
 crash: $(STAMPS)/test-tools
 	$(BIN)/python tests/python/crash_trial.py $(KILLS)
