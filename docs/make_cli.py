@@ -4,10 +4,13 @@ Usage: python docs/make_cli.py [--check]
 """
 
 import argparse
+import inspect
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 PAGE = Path(__file__).resolve().parent / "cli.md"
 
@@ -28,72 +31,126 @@ def cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
 
 
-def commands(group: Any, path: str, load: Any = None) -> Iterator[tuple[str, Any]]:
-    """The commands below a group, by the words that call them."""
-    for name, command in group.commands.items():
-        command = load(name) if load else command  # noqa: PLW2901 - the group has only its name
-        if hasattr(command, "commands"):
-            yield from commands(command, f"{path} {name}")
-        else:
-            yield f"{path} {name}", command
+def commands() -> Iterator[tuple[str, Callable[..., Any], str]]:
+    """Every command: the words that call it, its function and its help."""
+    # Imported here so that helpers can be used without the package.
+    import typer  # noqa: PLC0415
+
+    from axisight.cli.application import _COMMANDS  # noqa: PLC0415
+
+    for name, (place, _) in _COMMANDS.items():
+        module, attribute = place.split(":")
+        found = getattr(import_module(f"axisight.cli.{module}"), attribute)
+        if not isinstance(found, typer.Typer):
+            yield name, found, inspect.getdoc(found) or ""
+            continue
+        for command in found.registered_commands:
+            function = command.callback
+            assert function is not None
+            own = command.name or function.__name__.replace("_", "-")
+            yield f"{name} {own}", function, command.help or inspect.getdoc(function) or ""
 
 
-def option_row(option: Any) -> str:
-    """A row of the table of options."""
-    names = ", ".join(f"`{name}`" for name in [*option.opts, *option.secondary_opts])
-    if not option.is_flag:
-        names += f" {cell(value_name(option))}"
-    notes = []
-    if option.required:
-        notes.append("Required.")
-    if option.multiple and "repeatable" not in (option.help or ""):
-        notes.append("Repeatable.")
-    default = option.default
-    if isinstance(default, str | int | float | Path) and not isinstance(default, bool):
-        notes.append(f"Default: `{default}`.")
-    return f"| {names} | {cell(' '.join([option.help or '', *notes]))} |"
+@dataclass(frozen=True)
+class Parameter:
+    """An argument or option of a command, as typer has it from its annotation."""
+
+    name: str
+    kind: Any
+    info: Any
+    default: Any
+
+    @property
+    def is_option(self) -> bool:
+        """Whether it is an option."""
+        return type(self.info).__name__ == "OptionInfo"
+
+    @property
+    def needed(self) -> bool:
+        """Whether it has no default."""
+        return self.default is inspect.Parameter.empty
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it may be given several times."""
+        return any(get_origin(k) is list for k in (self.kind, *get_args(self.kind)))
+
+    @property
+    def value(self) -> str:
+        """What stands for its value; nothing for a switch."""
+        if self.kind is bool:
+            return ""
+        kinds = {str: "TEXT", int: "N", float: "X", Path: "PATH"}
+        held = {self.kind, *get_args(self.kind)}
+        held |= {inner for kind in held for inner in get_args(kind)}
+        named = [word for kind, word in kinds.items() if kind in held]
+        return self.info.metavar or named[0]
+
+    def row(self) -> str:
+        """A row of a table."""
+        own = [d for d in self.info.param_decls or () if d.startswith("-")]
+        names = own or [f"--{self.name.replace('_', '-')}"]
+        if self.kind is bool and not own and self.default is True:
+            names.append(f"--no-{names[0].removeprefix('--')}")
+        called = ", ".join(f"`{name}`" for name in names) if self.is_option else f"`{self.word}`"
+        if self.is_option and self.value:
+            called += f" {cell(self.value)}"
+        notes = [" ".join((self.info.help or "").split())]
+        if self.is_option and self.needed:
+            notes.append("Required.")
+        if self.is_option and self.repeats and "repeatable" not in notes[0]:
+            notes.append("Repeatable.")
+        if isinstance(self.default, str | int | float | Path) and self.kind is not bool:
+            notes.append(f"Default: `{self.default}`.")
+        return f"| {called} | {cell(' '.join(notes))} |\n"
+
+    @property
+    def word(self) -> str:
+        """What stands for an argument."""
+        return self.name.upper() + ("..." if self.repeats else "")
 
 
-def value_name(option: Any) -> str:
-    """What stands for a value: its own name, or its kind."""
-    kinds = {"text": "TEXT", "path": "PATH", "integer": "N", "float": "X"}
-    kind = option.type.name
-    return option.metavar or kinds.get(kind.split()[0], "N" if "integer" in kind else kind.upper())
+def parameters(function: Callable[..., Any]) -> list[Parameter]:
+    """The arguments and options of a command."""
+    hints = get_type_hints(function, include_extras=True)
+    out = []
+    for name, parameter in inspect.signature(function).parameters.items():
+        kind, *extras = get_args(hints[name]) or (hints[name],)
+        infos = [e for e in extras if type(e).__name__ in ("OptionInfo", "ArgumentInfo")]
+        if infos:  # else the context of the command, which nobody gives
+            out.append(Parameter(name, kind, infos[0], parameter.default))
+    return [p for p in out if not getattr(p.info, "hidden", False)]
 
 
-def section(name: str, command: Any) -> str:
+def section(name: str, function: Callable[..., Any], said: str) -> str:
     """What one command takes."""
-    arguments = [p for p in command.params if p.param_type_name == "argument"]
-    options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
-    words = [name]
-    for a in arguments:
-        word = (a.metavar or a.name or "").strip("[]{}.").upper() + ("..." if a.nargs < 0 else "")
-        words.append(word if a.required else f"[{word}]")
-    text = f"## {name.removeprefix('axisight ')}\n\n"
-    text += f"```text\n{' '.join(words)} [OPTIONS]\n```\n\n{' '.join((command.help or '').split())}\n"
-    if arguments:
-        text += "\n| argument | |\n|---|---|\n"
-        text += "".join(f"| `{a.name.upper()}` | {cell(a.help or '')} |\n" for a in arguments)
+    taken = parameters(function)
+    arguments = [p for p in taken if not p.is_option]
+    options = [p for p in taken if p.is_option]
+    words = ["axisight", name, *(a.word if a.needed else f"[{a.word}]" for a in arguments)]
     if options:
-        text += "\n| option | |\n|---|---|\n" + "".join(f"{option_row(o)}\n" for o in options)
+        words.append("[OPTIONS]")
+    text = f"## {name}\n\n```text\n{' '.join(words)}\n```\n\n{paragraphs(said)}\n"
+    for title, part in (("argument", arguments), ("option", options)):
+        if part:
+            text += f"\n| {title} | |\n|---|---|\n" + "".join(p.row() for p in part)
     return text
+
+
+def paragraphs(text: str) -> str:
+    """A text with a line a paragraph."""
+    parts = inspect.cleandoc(text).replace("\b\n", "").split("\n\n")
+    return "\n\n".join(" ".join(part.split()) for part in parts)
 
 
 def render() -> str:
     """Return the page."""
-    # Imported here so that helpers can be used without the package.
-    import typer  # noqa: PLC0415
-
-    from axisight.cli.application import app, load_command  # noqa: PLC0415
-
-    found = dict(commands(typer.main.get_command(app), "axisight", load_command))
-    rows = "".join(
-        f"| [`{name.removeprefix('axisight ')}`](#{name.removeprefix('axisight ').replace(' ', '-')}) "
-        f"| {cell((command.help or '').split(chr(10) * 2)[0])} |\n"
-        for name, command in sorted(found.items())
-    )
-    table = f"| command | does |\n|---|---|\n{rows}\n"
-    return HEAD + table + "\n".join(section(*item) for item in sorted(found.items()))
+    found = sorted(commands())
+    text = HEAD + "| command | does |\n|---|---|\n"
+    for name, _, said in found:
+        first = cell(paragraphs(said).split("\n")[0])
+        text += f"| [`{name}`](#{name.replace(' ', '-')}) | {first} |\n"
+    return text + "".join("\n" + section(*command) for command in found)
 
 
 def main() -> int:
