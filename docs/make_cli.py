@@ -88,7 +88,9 @@ class Parameter:
 
     def row(self) -> str:
         """A row of a table."""
-        own = [d for d in self.info.param_decls or () if d.startswith("-")]
+        # The first name stands where a default would.
+        given = (self.info.default, *(self.info.param_decls or ()))
+        own = [d for name in given if isinstance(name, str) for d in name.split("/")]
         names = own or [f"--{self.name.replace('_', '-')}"]
         if self.kind is bool and not own and self.default is True:
             names.append(f"--no-{names[0].removeprefix('--')}")

@@ -9,9 +9,11 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 import axisight
 from axisight import _core
+from axisight.cli import app
 
 MODULES = (
     axisight,
@@ -68,6 +70,57 @@ def test_effects_page_is_up_to_date(repository: Path) -> None:
     script = load_script(repository / "docs" / "make_effects.py")
     page = (repository / "docs" / "effects.md").read_text(encoding="utf-8")
     assert page == script.render(_core.effect_table()), "run `make docs`"
+
+
+def test_commands_page_is_up_to_date(repository: Path) -> None:
+    script = load_script(repository / "docs" / "make_cli.py")
+    page = (repository / "docs" / "cli.md").read_text(encoding="utf-8")
+    assert page == script.render(), "run `make docs`"
+
+
+def test_commands_page_has_the_options_of_the_help(repository: Path) -> None:
+    page = (repository / "docs" / "cli.md").read_text(encoding="utf-8")
+    for section in page.split("\n## ")[1:]:
+        command = section.split("\n")[0]
+        run = CliRunner(env={"COLUMNS": "300", "NO_COLOR": "1", "TERM": "dumb"})
+        told = run.invoke(app, [*command.split(), "--help"]).output
+        options = set(re.findall(r"(?<![\w`-])--[a-z][\w-]*(?=[ ,│|])", told)) - {"--help"}
+        shown = set(re.findall(r"^\| `(--[\w-]+)`", section, flags=re.MULTILINE))
+        shown |= set(re.findall(r"^\| `--[\w-]+`, `(--[\w-]+)`", section, flags=re.MULTILINE))
+        shown |= set(re.findall(r"^\| `-\w`, `(--[\w-]+)`", section, flags=re.MULTILINE))
+        in_words = set(re.findall(r"--[a-z][\w-]*", section)) - shown
+        assert shown <= options, command
+        assert options <= shown | in_words, command
+
+
+def test_gallery_is_up_to_date(repository: Path) -> None:
+    script = load_script(repository / "docs" / "make_gallery.py")
+    page = (repository / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert page == script.render(), "run `make docs`"
+    pictures = {path.stem: path for path in script.PICTURES.glob("*.png")}
+    assert set(pictures) == {*axisight.effect_table(), "motions"}, "run `make gallery`"
+    sizes = [path.stat().st_size for path in pictures.values()]
+    assert max(sizes) < 40_000
+    assert sum(sizes) < 2_000_000
+
+
+def test_gallery_draws_what_the_effect_does(repository: Path) -> None:
+    script = load_script(repository / "docs" / "make_gallery.py")
+    named = [name for names in script.OVER.values() for name in names]
+    assert len(named) == len(set(named))
+    known = set(axisight.effect_table())
+    assert {*named, *script.ON_AXIS_2, *script.SIZES, *script.FROM_THE_START} <= known
+    robot = axisight.load_robot(script.ROBOT)
+    reference = script.references(robot, script.FAST)
+    base = script.moved(robot, axisight.simulate(robot, reference))
+    constant = axisight.Effect("torque_offset", 1, {"offset_nm": 0.5})
+    run = axisight.simulate(robot, reference, effects=[constant])
+    missing = run["torque_cmd_nm"].values - base.torque
+    figure = script.picture(axisight.effect_info("torque_offset"), base, missing)
+    assert all(axes.get_xlabel().endswith("]") for axes in figure.axes)
+    assert figure.axes[0].get_ylabel() == "missing torque,\naxis 1 [Nm]"
+    drawn = figure.axes[0].lines[1].get_ydata()
+    assert drawn == pytest.approx(-0.5, abs=1e-3)
 
 
 def test_table_cells_cannot_break_the_effects_page(repository: Path) -> None:
