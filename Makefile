@@ -6,7 +6,9 @@
 #   make test    Rust tests, stub check, Python tests against the installed wheel
 #   make lint    formatting, clippy, ruff, mypy
 #   make format  rewrite the sources in the format that lint asks for
-#   make docs    regenerate the generated pages
+#   make docs    regenerate the generated pages and build the site into site/
+#   make gallery draw the effects anew for their page
+#   make wheel-smoke   the wheel in an empty environment: installed, asked, its demo run, timed
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
 #   make crash   studies killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
 #   make deny    licences, doubles and sources of the Rust dependencies, by cargo deny where it is
@@ -42,7 +44,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs fuzz crash deny lowest bench clean force
+.PHONY: setup demo test test-rust test-python lint format docs gallery wheel-smoke fuzz crash deny lowest bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -75,9 +77,18 @@ format: $(STAMPS)/test-tools
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: $(STAMPS)/installed
+docs: $(STAMPS)/docs-tools
 	$(BIN)/python docs/make_effects.py
 	$(BIN)/python docs/make_verdict.py
+	$(BIN)/python docs/make_cli.py
+	$(BIN)/python docs/make_gallery.py --page-only
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+gallery: $(STAMPS)/installed
+	$(BIN)/python docs/make_gallery.py
+
+wheel-smoke: $(WHEELS)/.built
+	$(PYTHON) tests/wheel_smoke.py $(WHEELS)
 
 fuzz: $(STAMPS)/test-tools
 	AXISIGHT_FUZZ=$(FUZZ) $(CARGO) test --release --locked -p axisight-tests --test damaged_robots
@@ -116,7 +127,7 @@ bench: $(STAMPS)/bench-tools
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(WHEELS) demo .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(WHEELS) demo site .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 # --- set-up, each step done once -------------------------------------------------------
 
@@ -171,6 +182,9 @@ $(STAMPS)/test-tools: $(STAMPS)/test-extra $(STAMPS)/test-arms $(STAMPS)/install
 # MJCF files of arms that tests import; the package itself and what it needs are not used.
 $(STAMPS)/test-arms: | $(STAMPS)/installed
 	$(INSTALL) --no-deps robosuite==1.5.2
+	touch $@
+
+$(STAMPS)/docs-tools: $(STAMPS)/docs-extra $(STAMPS)/installed
 	touch $@
 
 $(STAMPS)/bench-tools: $(STAMPS)/bench-extra $(STAMPS)/installed

@@ -12,6 +12,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+import typer
+
+from axisight.cli.application import _COMMANDS
+
 PAGE = Path(__file__).resolve().parent / "cli.md"
 
 HEAD = """\
@@ -33,11 +37,6 @@ def cell(text: str) -> str:
 
 def commands() -> Iterator[tuple[str, Callable[..., Any], str]]:
     """Every command: the words that call it, its function and its help."""
-    # Imported here so that helpers can be used without the package.
-    import typer  # noqa: PLC0415
-
-    from axisight.cli.application import _COMMANDS  # noqa: PLC0415
-
     for name, (place, _) in _COMMANDS.items():
         module, attribute = place.split(":")
         found = getattr(import_module(f"axisight.cli.{module}"), attribute)

@@ -11,6 +11,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.figure import Figure
+from PIL import Image
+
+import axisight
+from axisight import excitation
+from axisight.palette import BEFORE, MEASURED
 
 Array = npt.NDArray[np.float64]
 
@@ -139,8 +145,6 @@ class Motion:
 
 def references(robot: Any, motion: str) -> Array:
     """References of a motion, (n, n_axes) [rad/s], motor side."""
-    from axisight import excitation  # noqa: PLC0415
-
     n = round(PERIOD_S[motion] / robot.sample_time_s)
     one = 100 * np.sin(2 * np.pi * np.arange(n) / n)
     if motion == FAST:
@@ -171,15 +175,13 @@ def moved(robot: Any, run: Any) -> Motion:
 
 def at_work(info: Any) -> Any:
     """The effect as it is drawn."""
-    from axisight import Effect  # noqa: PLC0415
-
     values = {p.name: p.typical for p in info.parameters if p.role == "amplitude"}
     # Of a series of waves, the first.
     values = {k: v for k, v in values.items() if not k.startswith(later_waves(info))}
     values |= SIZES.get(info.name, {})
     if info.scope == "axes":
-        return Effect(info.name, axes=(1, 2), parameters=values)
-    return Effect(info.name, None if info.scope == "arm" else axis_of(info), values)
+        return axisight.Effect(info.name, axes=(1, 2), parameters=values)
+    return axisight.Effect(info.name, None if info.scope == "arm" else axis_of(info), values)
 
 
 def later_waves(info: Any) -> tuple[str, ...]:
@@ -217,8 +219,6 @@ def style(axes: Any) -> None:
 
 def draw_over(axes: Any, name: str, base: Motion, part: slice, i: int, missing: Array) -> None:
     """Draw the residual over its variable."""
-    from axisight.palette import BEFORE  # noqa: PLC0415
-
     variable = over(name)
     look: dict[str, Any] = {"color": BEFORE, "lw": 0.9}
     if variable == SPECTRUM:
@@ -250,9 +250,6 @@ def draw_over(axes: Any, name: str, base: Motion, part: slice, i: int, missing: 
 
 def picture(info: Any, base: Motion, missing: Array) -> Any:
     """The picture of one effect; ``missing`` (n, n_axes) [Nm]."""
-    from axisight.palette import BEFORE  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     i = axis_of(info) - 1
     motion = motion_of(info.name)
     settled_s = 0.0 if info.name in FROM_THE_START else SETTLED[motion] * PERIOD_S[motion]
@@ -274,9 +271,6 @@ def picture(info: Any, base: Motion, missing: Array) -> Any:
 
 def motions_picture(bases: dict[str, Motion]) -> Any:
     """The picture of the motions."""
-    from axisight.palette import MEASURED  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
     grid = figure.subplots(2, 3, sharex="col")
     for (motion, base), (above, below) in zip(bases.items(), grid.T, strict=True):
@@ -295,8 +289,6 @@ def motions_picture(bases: dict[str, Motion]) -> Any:
 
 def save(figure: Any, name: str) -> None:
     """Write a picture in few colours: lines need no more."""
-    from PIL import Image  # noqa: PLC0415
-
     PICTURES.mkdir(parents=True, exist_ok=True)
     whole = io.BytesIO()
     figure.savefig(whole, dpi=120)
@@ -306,8 +298,6 @@ def save(figure: Any, name: str) -> None:
 
 def draw(names: list[str]) -> None:
     """Draw the effects of these names, or all, and the motions."""
-    import axisight  # noqa: PLC0415
-
     robot = axisight.load_robot(ROBOT)
     wanted = {motion: references(robot, motion) for motion in PERIOD_S}
     bases = {m: moved(robot, axisight.simulate(robot, r)) for m, r in wanted.items()}
@@ -338,8 +328,6 @@ def size_of(info: Any) -> str:
 
 def render() -> str:
     """Return the page."""
-    import axisight  # noqa: PLC0415
-
     infos = [axisight.effect_info(name) for name in axisight.effect_table()]
     text = HEAD
     places = list(dict.fromkeys([*ACTS, *(info.acts for info in infos)]))
