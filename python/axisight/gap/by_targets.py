@@ -137,6 +137,11 @@ class TargetsView(View):
             for position, log in zip(positions, logs, strict=True)
         ]
 
+    def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
+        """Return the same of one log, and its simulated position."""
+        (position,) = simulated_positions(self.robot, variant, [log])
+        return log.torque_nm + self._told(position - log.position_rad), position
+
     def _told(self, error_rad: Array) -> Array:
         """Return an error of position, known where positions were logged, as torque.
 

@@ -25,7 +25,7 @@ from axisight.gap.own_controller import other_controllers
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
-from axisight.gap.simulated import noise_torques, simulated_torques
+from axisight.gap.simulated import noise_torques, simulated_run, simulated_torques
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.tracking_weights import passed, shortest, tracking_floor
@@ -107,9 +107,17 @@ class ClosedLoopView(View):
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the simulated torque of every log."""
         out = simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
+        return [self._reported(torque, variant) for torque in out]
+
+    def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
+        """Return torque and position of the simulator on one log."""
+        torque, position = simulated_run(self.robot, variant, log)
+        return self._reported(torque, variant), position
+
+    def _reported(self, torque_nm: Array, variant: Variant) -> Array:
         # An effect of a variant replaces the simulator's own.
         effects = {e.label: e for e in (*self.robot.effects, *variant.effects)}.values()
-        return [reported(torque, self.limits, effects) for torque in out]
+        return reported(torque_nm, self.limits, effects)
 
     def weighting_with(self, torque_nm: Array) -> Weighting:
         """Return the weights that there would be with one more log, of this torque (n, n_axes)."""

@@ -110,7 +110,7 @@ def diagnose(
     progress("looking at the logs", 0, 1)
     begun = from_rest(machine, fit_logs, held_logs, simulated)
     simulated = begun.simulated
-    inputs = _passed(machine, begun.estimation, begun.validation, chosen.despite)
+    inputs = behind_gate(machine, begun.estimation, begun.validation, chosen.despite)
     inputs = replace(inputs, noted=(*begun.findings, *inputs.noted))
     progress("looking at the logs", 1, 1)
     view = inputs.view(chosen)
@@ -203,10 +203,13 @@ class _Inputs:
         return tuple(filter(None, said))
 
 
-def _passed(
+def behind_gate(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], despite: Collection[str]
 ) -> _Inputs:
-    """Return simulator and logs behind the gate, with commands and references where none were logged."""
+    """Return simulator and logs behind the gate, with commands and references where none were logged.
+
+    ``despite`` as in `Settings`; raises as `diagnose`.
+    """
     logs, n = [*estimation, *validation], len(estimation)
     commanded = with_commands(robot, logs)
     if commanded is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
@@ -38,6 +39,13 @@ def simulated_positions(
     return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
 
 
+def simulated_run(robot: Robot, variant: Variant, log: Log) -> tuple[Array, Array]:
+    """Return torque [Nm] and motor position [rad] of one run along a log's references, (n, n_axes) each."""
+    changed = robot.with_parameters(variant.robot_values)
+    out = _runs(changed, [log], 1, variant.effects)
+    return out["torque_cmd_nm"].values[0], out["position_rad"].values[0]
+
+
 def _along(
     robot: Robot,
     logs: Sequence[Log],
@@ -48,18 +56,27 @@ def _along(
     signal: str = "torque_cmd_nm",
 ) -> list[Array]:
     """Return a signal along the references of logs, which may differ in length."""
-    references = _padded([_reference(log) for log in logs])
-    out = simulate_batch(
+    values = _runs(robot, logs, threads, effects, noise)[signal].values
+    return [values[i, : log.n_samples] for i, log in enumerate(logs)]
+
+
+def _runs(
+    robot: Robot,
+    logs: Sequence[Log],
+    threads: int,
+    effects: Sequence[Effect],
+    noise: Sequence[Array] | None = None,
+) -> xr.Dataset:
+    """Return all signals along the references of logs, one run for each."""
+    return simulate_batch(
         robot,
-        references,
+        _padded([_reference(log) for log in logs]),
         effects=effects,
         method="rk4",
         noise=None if noise is None else _padded(noise),
         start_rad=starts_of(robot, logs),
         threads=threads,
     )
-    values = out[signal].values
-    return [values[i, : log.n_samples] for i, log in enumerate(logs)]
 
 
 def _padded(rows: Sequence[Array]) -> Array:

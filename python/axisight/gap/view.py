@@ -111,6 +111,13 @@ class View(ABC):
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
+    def run(self, variant: Variant, log: Log) -> tuple[Array, Array | None]:
+        """Return torque [Nm] and motor position [rad] of a simulator on one log, (n, n_axes) each.
+
+        The torque is that of `torques`; no position where the simulator takes the measured one.
+        """
+        return self.torques(variant, [log])[0], None
+
     @abstractmethod
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN

@@ -1,0 +1,181 @@
+"""What the explorer shows of one log under one set of causes: curves, residual, gap; no page here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.explore.choices import in_bounds
+from axisight.fitting import robot_parameters
+from axisight.gap.howfar import stage
+from axisight.gap.pipeline import behind_gate
+from axisight.gap.settings import Settings
+from axisight.gap.torques import Variant, combine
+from axisight.gap.view import View
+from axisight.gap.where import BAND_EDGES_HZ
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Runs that are kept: those of pins and of the last few steps.
+_KEPT = 24
+
+
+@dataclass(frozen=True)
+class Version:
+    """A simulator as somebody made it: effects of the machine and values of parameters [SI].
+
+    ``effects``: those added to the robot's own, in the place of its own of the same name and axis.
+    """
+
+    effects: tuple[Effect, ...] = ()
+    robot_values: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def of(cls, effects: Sequence[Effect], values: Mapping[str, float] | None = None) -> Version:
+        """Return the version of these effects, each within the bounds of the table."""
+        return cls(tuple(map(in_bounds, effects)), tuple(sorted((values or {}).items())))
+
+    def variant(self) -> Variant:
+        """Return it as simulations take it."""
+        return Variant(dict(self.robot_values), self.effects)
+
+
+AS_GIVEN = Version()
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A simulator on one log; torques (n, n_axes) [Nm, N on a prismatic axis], motor side.
+
+    ``residual``: simulated less measured. ``position_rad``: simulated motor position (n, n_axes) [rad, m],
+    None where the simulator takes the measured one. ``gap`` (n_axes,): rms of the residual over the
+    standard deviation of the measured torque [1]; ``bands`` (n_axes, n_bands): the part of it in each of
+    `Session.bands`, whose squares sum to that of the gap. ``broken_at_s``: from when on there are no
+    numbers, because the simulation broke off; None where it did not.
+    """
+
+    measured: Array
+    simulated: Array
+    residual: Array
+    position_rad: Array | None
+    gap: Array
+    bands: Array
+    broken_at_s: float | None
+
+
+class Session:
+    """A robot and its logs, to be simulated with any causes, one log at a time.
+
+    Compared as `axisight.diagnose` compares them: the gap of `AS_GIVEN` over the validation logs is its
+    ``gap.before_per_axis``.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        robot: Robot,
+        estimation: Sequence[Log],
+        validation: Sequence[Log],
+        settings: Settings | None = None,
+    ) -> None:
+        """Prepare what does not change; raises as `axisight.diagnose` for logs and robots it refuses."""
+        self.name, self.given = name, robot
+        self.estimation, self.validation = tuple(estimation), tuple(validation)
+        self.settings = settings or Settings()
+        inputs = behind_gate(robot, estimation, validation, self.settings.despite)
+        self.view: View = inputs.view(self.settings)
+        self.robot = inputs.robot
+        self.logs: tuple[Log, ...] = (*inputs.estimation, *inputs.validation)
+        self.roles = ("estimation",) * len(estimation) + ("validation",) * len(validation)
+        self._held = list(inputs.validation)
+        self._measured: dict[int, Array] = {}
+        self._run: Callable[[int, Version], tuple[Array, Array | None]]
+        self._run = lru_cache(_KEPT)(self._simulate)
+
+    @property
+    def n_axes(self) -> int:
+        """Number of driven axes."""
+        return self.robot.n_axes
+
+    @property
+    def bands(self) -> list[tuple[float, float]]:
+        """Frequency bands [Hz] of `Seen.bands`, those of a diagnosis."""
+        nyquist = 0.5 / self.logs[0].sample_time_s
+        return list(pairwise([*(e for e in BAND_EDGES_HZ if e < nyquist), nyquist]))
+
+    def measured(self, log: int) -> Array:
+        """Return the torque that a log, by number, is compared in (n, n_axes) [Nm]."""
+        if log not in self._measured:
+            self._measured[log] = self.view.measured(self.logs[log])
+        return self._measured[log]
+
+    def check(self, version: Version) -> None:
+        """Raise InputError for effects or values that the robot cannot have."""
+        own = {e.label: e for e in (*self.robot.effects, *version.effects)}
+        self.robot.with_parameters(dict(version.robot_values)).with_effects(own.values())
+
+    def see(self, log: int, version: Version = AS_GIVEN) -> Seen:
+        """Return a simulator on one log, by number; raises InputError as `check`."""
+        simulated, position = self._run(log, version)
+        measured = self.measured(log)
+        residual = simulated - measured
+        item = self.logs[log]
+        known = np.isfinite(residual).all(axis=1)
+        broken = None if known.all() else float(item.time_s[int(np.argmin(known))])
+        gap = self._gap([item], [residual], [measured])
+        variance = np.maximum(np.var(item.torque_nm, axis=0), 1e-300)
+        bands = self._by_band(residual, variance, item.sample_time_s)
+        return Seen(measured, simulated, residual, position, gap, bands, broken)
+
+    def held_gap(self, version: Version = AS_GIVEN) -> Array:
+        """Return the gap per axis over all validation logs (n_axes,) [1]."""
+        first = len(self.logs) - len(self._held)
+        measured = [self.measured(first + i) for i in range(len(self._held))]
+        torques = self.view.torques(version.variant(), self._held)
+        errors = [t - u for t, u in zip(torques, measured, strict=True)]
+        return self._gap(self._held, errors, measured)
+
+    def floor(self, log: int) -> Array:
+        """Return the gap per axis that noise alone makes on one log (n_axes,) [1]."""
+        noise = self.view.noises([self.logs[log]], log)
+        return self._gap([self.logs[log]], noise, [self.measured(log)])
+
+    def _simulate(self, log: int, version: Version) -> tuple[Array, Array | None]:
+        # What the robot cannot have is said before anything runs.
+        self.check(version)
+        return self.view.run(version.variant(), self.logs[log])
+
+    def _gap(self, logs: list[Log], errors: list[Array], measured: list[Array]) -> Array:
+        with np.errstate(invalid="ignore"):
+            per_log = stage(logs, errors, self.settings.block_s, measured).per_log()
+        return combine(per_log)[1]
+
+    def _by_band(self, residual: Array, variance: Array, sample_time_s: float) -> Array:
+        if not np.isfinite(residual).all():
+            return np.full((self.n_axes, len(self.bands)), np.nan)
+        lines = dct(residual, axis=0, norm="ortho") ** 2 / len(residual) / variance
+        frequency_hz = np.arange(len(residual)) * 0.5 / sample_time_s / len(residual)
+        at = np.digitize(frequency_hz, [low for low, _ in self.bands]) - 1
+        squares = [lines[at == b].sum(axis=0) for b in range(len(self.bands))]
+        return np.asarray(np.sqrt(np.transpose(squares)))
+
+    def known_parameters(self, relative: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters [SI] from their relative changes [1], as a verdict's ``refit`` states them.
+
+        Raises InputError for a parameter that the robot does not have.
+        """
+        own = robot_parameters(self.robot)
+        unknown = sorted(set(relative) - set(own))
+        if unknown:
+            raise InputError(f"refit: expected parameters of this robot, got {unknown[0]!r}")
+        return {n: own[n] + change * (abs(own[n]) or 1.0) for n, change in relative.items()}
