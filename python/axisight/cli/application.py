@@ -52,6 +52,10 @@ _COMMANDS = {
         "Say where a simulator disagrees with measured logs, which effect causes it, and how far it "
         "shrinks.",
     ),
+    "explore": (
+        "explore:explore_command",
+        "Look at logs beside the simulator on a local page, and try causes by hand.",
+    ),
     "check": (
         "check:check_command",
         "Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels.",
@@ -80,7 +84,7 @@ _COMMANDS = {
 
 
 # Their matrices are small and their threads many: those of the linear algebra would spin beside them.
-_THREADED = ("blind", "demo", "diagnose")
+_THREADED = ("blind", "demo", "diagnose", "explore")
 
 # All that these do is print.
 _ONLY_PRINT = ("schema", "effects", "completion", "list", "show")

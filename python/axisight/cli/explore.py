@@ -1,0 +1,87 @@
+"""The command ``axisight explore``."""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.cli.common import Columns, MaxBytes, Untrusted, bars, errors, say
+from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
+from axisight.errors import MissingExtraError
+from axisight.gap.inputs import read_inputs
+from axisight.gap.settings import Settings
+from axisight.gap.tolerances import with_tolerances
+
+
+def explore_command(
+    case_or_logs: Annotated[
+        list[Path],
+        typer.Argument(help="A case folder, or logs; the simulator may stand first."),
+    ],
+    model: Annotated[
+        str | None,
+        typer.Option(help="Simulator: robot.toml, URDF, MJCF or a preset. A case brings its own."),
+    ] = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
+    ] = None,
+    columns: Columns = None,
+    verdict: Annotated[
+        Path | None, typer.Option(help="Verdict of an earlier diagnosis, to try its causes.")
+    ] = None,
+    cutoff_hz: Annotated[
+        float | None,
+        typer.Option(help="Low-pass in inverse dynamics. Default: chosen from the data."),
+    ] = None,
+    despite: Annotated[
+        list[str] | None,
+        typer.Option(help="Name of a fault of the logs that is refused: go on (repeatable)."),
+    ] = None,
+    effect: GivenEffects = None,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the page. Default: a free one.")
+    ] = 0,
+    no_open: Annotated[
+        bool, typer.Option("--no-open", help="Print the address and open no browser.")
+    ] = False,
+    untrusted: Untrusted = False,
+    max_bytes: MaxBytes = None,
+) -> None:
+    """Look at logs beside the simulator on a local page, and try causes by hand."""
+    with errors(stopped="stopped"):
+        if find_spec("panel") is None:
+            raise MissingExtraError("axisight explore needs Panel: pip install axisight[explore]")
+        given = parse_effects(effect)
+
+        def load(source: Path | str, *, sample_time_s: float | None = None) -> object:
+            return load_simulator(source, given, sample_time_s=sample_time_s)
+
+        inputs = read_inputs(
+            case_or_logs,
+            model,
+            validation or [],
+            columns,
+            load,
+            untrusted=untrusted,
+            max_bytes=max_bytes,
+        )
+        settings = Settings(
+            cutoff_hz=cutoff_hz, despite=tuple(despite or ()), threads=os.cpu_count() or 1
+        )
+        settings = with_tolerances(settings, inputs.robot, inputs.robot_source)
+        app = import_module("axisight.explore.app")
+        with bars() as progress:
+            state = app.prepared(inputs, settings, verdict, progress)
+        served = app.served(state, port)
+        say(f"explorer: {served.url}")
+        say("for this machine only; Ctrl-C ends it")
+        if not no_open:
+            webbrowser.open(served.url)
+        served.run()

@@ -1,0 +1,46 @@
+"""The explorer put together: from what a user hands over to a page that is served."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import panel as pn
+
+from axisight.explore.background import Background
+from axisight.explore.page import Page
+from axisight.explore.said import read_said
+from axisight.explore.server import Served, serve
+from axisight.explore.session import Session
+from axisight.explore.state import State
+from axisight.gap.inputs import Inputs
+from axisight.gap.settings import Settings
+
+
+def prepared(
+    inputs: Inputs,
+    settings: Settings,
+    verdict: Path | None,
+    progress: Callable[[str, int, int], None],
+) -> State:
+    """Return the state that a page begins with; ``progress`` is told how far it is.
+
+    ``verdict``: file of an earlier diagnosis. Raises InputError as `Session`, and for a verdict that is none
+    or not of this robot.
+    """
+    said = None if verdict is None else read_said(verdict)
+    progress("preparing the simulator", 0, 2)
+    session = Session(inputs.name, inputs.robot, inputs.estimation, inputs.validation, settings)
+    progress("preparing the simulator", 1, 2)
+    # The curve everything is compared with.
+    session.see(0)
+    progress("preparing the simulator", 2, 2)
+    work = Background(inputs.name, inputs.robot, inputs.estimation, inputs.validation, settings)
+    return State(session, work, said)
+
+
+def served(state: State, port: int = 0) -> Served:
+    """Return the running page of a state; raises InputError for a port in use."""
+    # In line with what the server gives: nothing from elsewhere.
+    pn.extension(design="native", inline=True)
+    return serve(lambda: Page(state).view(), port)

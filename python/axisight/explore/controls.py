@@ -1,0 +1,121 @@
+"""The list of causes: one card each with its sliders, and what adds another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import panel as pn
+from bokeh.models.formatters import PrintfTickFormatter
+
+from axisight.effects import Effect, EffectParameter, effect_info, noun, title
+from axisight.errors import AxisightError
+from axisight.explore import words
+from axisight.explore.choices import slider_range, usable, usual
+from axisight.explore.state import State
+from axisight.report.wording import place
+
+_WIDTH = 380
+# Of the range of a slider.
+_STEPS = 400
+
+
+class Controls:
+    """Sliders for the causes of a state; ``changed`` is called with what went wrong, or nothing."""
+
+    def __init__(self, state: State, changed: Callable[[str], None]) -> None:
+        self._state, self._changed = state, changed
+        self._cards = pn.Column(width=_WIDTH)
+        self._offered = usable(state.session.robot)
+        self._name = pn.widgets.Select(
+            name="cause", options={title(n): n for n in self._offered}, width=210
+        )
+        self._place = pn.widgets.Select(name="where", width=100)
+        self._name.param.watch(lambda _event: self._places(), "value")
+        self._add = pn.widgets.Button(name="add", width=50, align="end", button_type="primary")
+        self._add.on_click(lambda _event: self.add(usual(self._name.value, self._place.value)))
+        self._places()
+        self._show()
+
+    def view(self) -> Any:
+        """Return the cards and what adds one."""
+        return pn.Column(self._cards, pn.Row(self._name, self._place, self._add), width=_WIDTH)
+
+    def add(self, effect: Effect) -> None:
+        """Put a cause in."""
+        try:
+            self._state.add(effect)
+        except AxisightError as error:
+            self._changed(str(error))
+            return
+        self._show()
+        self._changed("")
+
+    def _places(self) -> None:
+        options = {
+            place(None if isinstance(p, tuple) else p, p if isinstance(p, tuple) else None): p
+            for p in self._offered[self._name.value]
+        }
+        self._place.options = options
+        self._place.value = next(iter(options.values()))
+
+    def _take_out(self, label: str, _event: Any) -> None:
+        self._state.take_out(label)
+        self._show()
+        self._changed("")
+
+    def _moved(self, label: str, parameter: str, event: Any) -> None:
+        self._state.set_value(label, parameter, float(event.new))
+        self._changed("")
+
+    def _show(self) -> None:
+        cards = [self._card(effect) for effect in self._state.chosen]
+        none = pn.pane.HTML(words.text("none: the simulator as given", "quiet"))
+        none.stylesheets = [words.STYLE]
+        self._cards.objects = cards or [none]
+
+    def _card(self, effect: Effect) -> Any:
+        out = pn.widgets.Button(name="take it out", width=100, margin=(0, 5))
+        out.on_click(partial(self._take_out, effect.label))
+        head = pn.pane.HTML(words.text(words.name_of(effect)), stylesheets=[words.STYLE], width=240)
+        pairs = zip(effect_info(effect.name).parameters, effect.values(), strict=True)
+        sliders = [self._slider(effect, p, value) for p, value in pairs]
+        return pn.Column(
+            pn.Row(head, out),
+            *sliders,
+            width=_WIDTH,
+            margin=(0, 0, 8, 0),
+            styles={"border-left": "3px solid #0072b2", "padding-left": "8px"},
+        )
+
+    def _slider(self, effect: Effect, p: EffectParameter, value: float) -> Any:
+        low, high = slider_range(p, value)
+        unit = "" if p.unit == "1" else f" [{p.unit}]"
+        slider = pn.widgets.EditableFloatSlider(
+            name=f"{_plain(p.name)}{unit}",
+            start=low,
+            end=high,
+            value=min(max(value, p.lower), p.upper),
+            step=(high - low) / _STEPS,
+            fixed_start=p.lower,
+            fixed_end=p.upper,
+            format=PrintfTickFormatter(format="%.4g"),
+            width=340,
+            margin=(0, 5),
+        )
+        slider.param.watch(partial(self._moved, effect.label, p.name), "value")
+        return slider
+
+
+# Ends of names that are units, which stand beside them.
+_UNITS = ("_nm_s2_rad2", "_nm_s2_rad", "_nm_s_rad", "_nm_rad3", "_nm_rad", "_rad_nm", "_rad_s")
+_UNITS += ("_kg_m2", "_rad", "_nm", "_kg", "_hz", "_1_w", "_s", "_m")
+
+
+def _plain(name: str) -> str:
+    """Return the name of a parameter in words, without its unit."""
+    for unit in _UNITS:
+        if name.endswith(unit):
+            return noun(name.removesuffix(unit))
+    return noun(name)

@@ -1,0 +1,400 @@
+"""The page: what is chosen on the left, curves on the right; simulations run beside the server's loop."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import panel as pn
+from bokeh.events import RangesUpdate
+from bokeh.models import Range1d
+
+from axisight.errors import AxisightError
+from axisight.explore import words
+from axisight.explore.answers import Answer, Rest, answer, rest
+from axisight.explore.controls import Controls
+from axisight.explore.exports import figure_png, robot_text, verdict_text
+from axisight.explore.plots import Orders, Regard, Responses, time_figures
+from axisight.explore.regard import AGAINST
+from axisight.explore.state import PINS, State
+from axisight.gap.compared import torque_of
+
+# What is slow waits until a slider has rested so long.
+_REST_MS = 250
+_POLL_MS = 300
+_LEFT = 400
+
+_TABS = ("time", "against", "orders", "bands", "responses")
+
+
+class Page:
+    """One visit of the page; choices live in ``state``, which all visits share."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        session = state.session
+        kind = session.robot.axis_is_prismatic
+        self._units = [("N", "m") if prismatic else ("Nm", "rad") for prismatic in kind]
+        self._pool = ThreadPoolExecutor(1)
+        self._busy = self._wanted = False
+        self._resting: Any = None
+        self._last: Answer | None = None
+        self._doc: Any = pn.state.curdoc
+        self._time = Range1d(0.0, session.logs[state.log].duration_s)
+        self._curves = time_figures(self._time)
+        self._curves["torque"].figure.on_event(RangesUpdate, lambda _event: self._zoomed())
+        self._regard, self._orders = Regard(), Orders()
+        self._responses = Responses(session.n_axes)
+        self._bands = self._html("")
+        self._gaps, self._held, self._message = self._html(""), self._html(""), self._html("")
+        self._controls = Controls(state, self.changed)
+        self._build_choices()
+        self._build_diagnosis()
+        self.ask()
+
+    def _html(self, text: str) -> Any:
+        return pn.pane.HTML(text, stylesheets=[words.STYLE], sizing_mode="stretch_width")
+
+    # What is chosen
+
+    def _build_choices(self) -> None:
+        session, state = self.state.session, self.state
+        # By number: two logs may have one name.
+        logs = {
+            f"{i + 1}. {log.name} ({role})": i
+            for i, (log, role) in enumerate(zip(session.logs, session.roles, strict=True))
+        }
+        axes = {f"axis {i + 1}": i for i in range(session.n_axes)}
+        self._log = pn.widgets.Select(name="log", options=logs, value=state.log, width=250)
+        self._axis = pn.widgets.Select(name="axis", options=axes, value=state.axis, width=110)
+        self._log.param.watch(self._other_log, "value")
+        self._axis.param.watch(self._other_axis, "value")
+        self._against = pn.widgets.Select(
+            name="against", options={words_: key for key, words_ in AGAINST.items()}, width=200
+        )
+        self._against.param.watch(lambda _event: self._rest_soon(), "value")
+        self._pins = [
+            pn.widgets.Button(name=f"pin as {pin}", width=110, margin=(5, 5)) for pin in PINS
+        ]
+        for pin, button in zip(PINS, self._pins, strict=True):
+            button.on_click(partial(self._pin, pin))
+        self._unpin = pn.widgets.Button(name="clear pins", width=110, margin=(5, 5))
+        self._unpin.on_click(self._clear_pins)
+        self._downloads = [
+            self._download("robot file", "robot.toml", self._robot),
+            self._download("verdict", "verdict.json", self._verdict),
+            self._download("figure", "figure.png", self._figure),
+        ]
+
+    def _download(self, label: str, name: str, make: Callable[[], bytes]) -> Any:
+        def made() -> io.BytesIO | None:
+            try:
+                return io.BytesIO(make())
+            except AxisightError as error:
+                self._say(str(error))
+                return None
+
+        return pn.widgets.FileDownload(
+            callback=made, filename=name, label=label, width=110, margin=(5, 5)
+        )
+
+    def _robot(self) -> bytes:
+        return robot_text(self.state.session, self.state.version()).encode()
+
+    def _verdict(self) -> bytes:
+        if self.state.said is None:
+            raise AxisightError("no verdict yet: run the diagnosis, or start with --verdict")
+        return verdict_text(self.state.said.document).encode()
+
+    def _figure(self) -> bytes:
+        state, session = self.state, self.state.session
+        given, seen = session.see(state.log), session.see(state.log, state.version())
+        unit = self._units[state.axis][0]
+        return figure_png(session, state.log, state.axis, given, seen, unit)
+
+    def _other_log(self, event: Any) -> None:
+        self.state.log = event.new
+        self._time.start, self._time.end = 0.0, self.state.session.logs[event.new].duration_s
+        self._time.reset_start, self._time.reset_end = self._time.start, self._time.end
+        self.ask()
+
+    def _other_axis(self, event: Any) -> None:
+        self.state.axis = event.new
+        if self._last is not None:
+            self._draw(self._last)
+        self.ask()
+
+    def _pin(self, pin: str, _event: Any) -> None:
+        self.state.pins[pin] = self.state.version()
+        self.ask()
+
+    def _clear_pins(self, _event: Any) -> None:
+        self.state.pins.clear()
+        self.ask()
+
+    # The diagnosis
+
+    def _build_diagnosis(self) -> None:
+        self._said = pn.Column(sizing_mode="stretch_width")
+        self._run = pn.widgets.Button(name="run the diagnosis", width=170, button_type="primary")
+        self._stop = pn.widgets.Button(name="stop", width=80, disabled=True)
+        self._says = self._html("")
+        self._run.on_click(lambda _event: self._begin())
+        self._stop.on_click(lambda _event: self.state.background.stop())
+        self._refitted = pn.widgets.Checkbox(
+            name="with the parameters it re-fitted", value=self.state.refitted
+        )
+        self._refitted.param.watch(self._refit, "value")
+        self._polls: Any = None
+        self._show_said()
+        if self.state.background.busy:
+            self._poll()
+
+    def _begin(self) -> None:
+        self.state.background.start()
+        self._poll()
+
+    def _poll(self) -> None:
+        if self._polls is None:
+            self._polls = self._doc.add_periodic_callback(self._look, _POLL_MS)
+        self._look()
+
+    def _look(self) -> None:
+        """Show how far the diagnosis is, and what it said once it is done."""
+        work = self.state.background
+        self._run.disabled, self._stop.disabled = work.busy, not work.busy
+        kind = "problem" if work.state == "failed" else "quiet"
+        self._says.object = words.text(f"{work.state}: {work.says}", kind)
+        if work.busy:
+            return
+        if self._polls is not None:
+            self._doc.remove_periodic_callback(self._polls)
+            self._polls = None
+        if work.state == "done" and work.document is not None:
+            self.state.hear(work.document)
+            self._show_said()
+
+    def _show_said(self) -> None:
+        said = self.state.said
+        self._refitted.visible = said is not None
+        if said is None:
+            self._said.objects = [self._html(words.text("nothing yet", "quiet"))]
+            return
+        rows: list[Any] = [self._html(words.of_verdict(said))]
+        for cause in said.causes:
+            button = pn.widgets.Button(name="add the cause", width=120, margin=(5, 5))
+            button.on_click(partial(self._add_said, cause.effect))
+            rows.append(pn.Row(self._html(words.of_cause(cause)), button))
+        if not said.causes:
+            rows.append(self._html(words.text("it names no cause", "quiet")))
+        self._said.objects = rows
+
+    def _add_said(self, effect: Any, _event: Any) -> None:
+        self._controls.add(effect)
+
+    def _refit(self, event: Any) -> None:
+        self.state.refitted = event.new
+        self.ask()
+
+    # Simulation
+
+    def changed(self, problem: str = "") -> None:
+        """Simulate again: causes changed, or could not be (``problem``)."""
+        self._say(problem)
+        if not problem:
+            self.ask()
+
+    def ask(self) -> None:
+        """Have what is chosen simulated; of several wishes meanwhile only the last counts."""
+        self._wanted = True
+        if not self._busy:
+            self._begin_answer()
+
+    def _begin_answer(self) -> None:
+        self._busy, self._wanted = True, False
+        state = self.state
+        task = partial(
+            answer, state.session, state.log, state.version(), dict(sorted(state.pins.items()))
+        )
+        self._pool.submit(self._hand_over, task, self._answered)
+
+    def _hand_over(self, task: Callable[[], Any], then: Callable[[Any], None]) -> None:
+        """Do a task in the thread of this page, and hand the result to the server's loop."""
+        try:
+            found = task()
+        except AxisightError as error:
+            found = error
+        self._doc.add_next_tick_callback(partial(then, found))
+
+    def _answered(self, found: Answer | AxisightError) -> None:
+        self._busy = False
+        if isinstance(found, AxisightError):
+            self._say(str(found))
+        elif found.log == self.state.log:
+            self._last = found
+            self._draw(found)
+        if self._wanted:
+            self._begin_answer()
+        else:
+            self._rest_soon()
+
+    def _rest_soon(self) -> None:
+        if self._resting is not None:
+            self._doc.remove_timeout_callback(self._resting)
+        self._resting = self._doc.add_timeout_callback(self._at_rest, _REST_MS)
+
+    def _at_rest(self) -> None:
+        self._resting = None
+        if self._last is None or self._busy:
+            return
+        state, tab = self.state, _TABS[self._tabs.active]
+        task = partial(rest, state.session, self._last, state.axis, tab, self._against.value)
+        self._pool.submit(self._hand_over, task, self._rested)
+
+    # Drawing
+
+    def _say(self, problem: str) -> None:
+        self._message.object = words.text(problem, "problem") if problem else ""
+
+    def _zoomed(self) -> None:
+        for curves in self._curves.values():
+            curves.draw()
+
+    def _draw(self, found: Answer) -> None:
+        axis, session = self.state.axis, self.state.session
+        log = session.logs[found.log]
+        torque, angle = self._units[axis]
+        versions = {"given": found.given, "now": found.now, **found.pins}
+        self._curves["torque"].set("measured", log.time_s, found.now.measured[:, axis])
+        self._curves["position"].set("measured", log.time_s, log.position_rad[:, axis])
+        for key in ("given", "now", *PINS):
+            seen = versions.get(key)
+            for name, curves in self._curves.items():
+                values = None
+                if seen is not None:
+                    values = {
+                        "torque": seen.simulated,
+                        "residual": seen.residual,
+                        "position": seen.position_rad,
+                    }[name]
+                curves.set(key, log.time_s, None if values is None else values[:, axis])
+        self._zoomed()
+        for name, label in (
+            ("torque", f"torque [{torque}]"),
+            ("residual", f"residual [{torque}]"),
+            ("position", f"position [{angle}]"),
+        ):
+            self._curves[name].figure.yaxis.axis_label = label
+        self._gaps.object = self._gap_table(versions)
+        self._bands.object = self._band_table(versions)
+        if found.now.broken_at_s is not None:
+            self._say(f"the simulation breaks off at {found.now.broken_at_s:.2f} s")
+        else:
+            self._say("")
+
+    def _gap_table(self, versions: dict[str, Any]) -> str:
+        labels = {"given": "as given", "now": "as chosen"} | {p: f"pin {p}" for p in PINS}
+        head = ("axis", *(labels[k] for k in versions))
+        rows = [
+            (str(i + 1), *(words.share(v.gap[i]) for v in versions.values()))
+            for i in range(self.state.session.n_axes)
+        ]
+        return words.table(head, rows, "gaps")
+
+    def _band_table(self, versions: dict[str, Any]) -> str:
+        labels = {"given": "as given", "now": "as chosen"} | {p: f"pin {p}" for p in PINS}
+        session = self.state.session
+        out = ""
+        for i in range(session.n_axes):
+            head = (f"axis {i + 1}, Hz", *(labels[k] for k in versions))
+            rows = [
+                (f"{low:g} to {high:g}", *(words.share(v.bands[i, b]) for v in versions.values()))
+                for b, (low, high) in enumerate(session.bands)
+            ]
+            out += words.table(head, rows, f"bands-{i + 1}")
+        return out
+
+    def _rested(self, found: Rest | AxisightError) -> None:
+        if isinstance(found, AxisightError):
+            self._say(str(found))
+            return
+        rows = [(str(i + 1), words.share(g)) for i, g in enumerate(found.held)]
+        self._held.object = words.table(("axis", "all validation logs"), rows, "held")
+        unit, angle = self._units[found.axis]
+        if found.against is not None:
+            dots, means = found.against
+            self._regard.dots.data = {"x": dots[0], "y": dots[1]}
+            for key, (x, y) in means.items():
+                self._regard.means[key].data = {"x": x, "y": y}
+            label = {"speed": f"{angle}/s", "angle": angle, "load": unit, "time": "s"}
+            chosen = self._against.value
+            self._regard.figure.xaxis.axis_label = f"{AGAINST[chosen]} [{label[chosen]}]"
+            self._regard.figure.yaxis.axis_label = f"residual [{unit}]"
+        for key, (orders, amplitude) in found.orders.items():
+            self._orders.show(key, orders, amplitude)
+        self._orders.figure.yaxis.axis_label = f"amplitude in the residual [{unit}]"
+        for key, (frequency, gain) in found.responses.items():
+            self._responses.show(key, frequency, gain)
+        if found.problem:
+            self._say(found.problem)
+
+    # The whole
+
+    def view(self) -> Any:
+        """Return the page."""
+        head = f"{self.state.session.name}: {self._compared()}"
+        panes = {
+            "time": pn.Column(
+                *(
+                    pn.pane.Bokeh(c.figure, sizing_mode="stretch_width")
+                    for c in self._curves.values()
+                ),
+                sizing_mode="stretch_width",
+            ),
+            "residual against": pn.Column(
+                self._against,
+                pn.pane.Bokeh(self._regard.figure, sizing_mode="stretch_width"),
+                sizing_mode="stretch_width",
+            ),
+            "orders": pn.pane.Bokeh(self._orders.figure, sizing_mode="stretch_width"),
+            "bands": self._bands,
+            "response": pn.pane.Bokeh(self._responses.figure, sizing_mode="stretch_width"),
+        }
+        self._tabs = pn.Tabs(*panes.items(), sizing_mode="stretch_width")
+        self._tabs.param.watch(lambda _event: self._rest_soon(), "active")
+        left = pn.Column(
+            pn.Row(self._log, self._axis),
+            self._html(words.heading("Gap on this log")),
+            self._gaps,
+            self._held,
+            self._message,
+            self._html(words.heading("Causes")),
+            self._controls.view(),
+            self._html(words.heading("What the diagnosis said")),
+            pn.Row(self._run, self._stop),
+            self._says,
+            self._said,
+            self._refitted,
+            self._html(words.heading("Compare")),
+            pn.Row(*self._pins, self._unpin),
+            self._html(words.heading("Export")),
+            pn.Row(*self._downloads),
+            width=_LEFT,
+            margin=(0, 15, 0, 0),
+        )
+        title = self._html(words.heading(head))
+        return pn.Column(
+            title,
+            pn.Row(left, self._tabs, sizing_mode="stretch_width"),
+            sizing_mode="stretch_width",
+            margin=10,
+        )
+
+    def _compared(self) -> str:
+        view = self.state.session.view
+        how = {"closed_loop": "closed loop", "inverse_dynamics": "inverse dynamics"}[view.mode]
+        cutoff = "" if view.cutoff_hz is None else f", below {view.cutoff_hz:.3g} Hz"
+        return f"{how}{cutoff}; gap is the rms of the residual over the deviation of the {torque_of(view.compared)}"

@@ -1,0 +1,196 @@
+"""The figures of the page: curves that keep their peaks however long a log is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool, Legend, LegendItem, Range1d
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from axisight import palette
+from axisight.report.curves import thin
+
+Array = NDArray[np.float64]
+
+# About two for each pixel of a wide screen.
+_POINTS = 2400
+# Of what is shown, drawn beyond its ends, so that a small move has curves already.
+_MARGIN = 0.2
+_TOOLS = "xpan,xwheel_zoom,xbox_zoom,reset,save"
+_TALL, _LOW = 260, 190
+
+CURVES = {
+    "measured": ("measured", palette.MEASURED, "solid"),
+    "given": ("as given", palette.BEFORE, "solid"),
+    "now": ("as chosen", palette.AFTER, "solid"),
+    "A": ("pin A", palette.SERIES[2], "dashed"),
+    "B": ("pin B", palette.SERIES[3], "dashed"),
+}
+
+
+class Curves:
+    """One figure over time; curves by the keys of `CURVES`."""
+
+    def __init__(self, name: str, keys: Sequence[str], height: int, x_range: Range1d) -> None:
+        self._full: dict[str, tuple[Array, Array]] = {}
+        self.figure = figure(
+            height=height,
+            sizing_mode="stretch_width",
+            tools=_TOOLS,
+            active_scroll="xwheel_zoom",
+            active_drag="xbox_zoom",
+            x_range=x_range,
+            name=f"figure-{name}",
+            output_backend="canvas",
+        )
+        self.figure.toolbar.logo = None
+        self.figure.min_border_left = 70
+        self.figure.y_range.range_padding = 0.05
+        self.sources = {}
+        items = []
+        for key in keys:
+            label, color, dash = CURVES[key]
+            source = ColumnDataSource({"x": [], "y": []}, name=f"{name}-{key}")
+            line = self.figure.line(
+                "x", "y", source=source, color=color, line_dash=dash, line_width=1.2
+            )
+            self.sources[key] = source
+            items.append(LegendItem(label=label, renderers=[line]))
+        legend = Legend(
+            items=items,
+            orientation="horizontal",
+            click_policy="hide",
+            border_line_color=None,
+            margin=0,
+            padding=2,
+            label_text_font_size="9pt",
+        )
+        self.figure.add_layout(legend, "above")
+        self.figure.add_tools(
+            HoverTool(tooltips=[("time", "@x{0.000} s"), ("value", "@y")], mode="mouse")
+        )
+
+    def set(self, key: str, time_s: Array | None, values: Array | None = None) -> None:
+        """Give a curve other values (n,), or none; `draw` shows them."""
+        if time_s is None or values is None:
+            self._full.pop(key, None)
+        else:
+            self._full[key] = (time_s, values)
+
+    def draw(self, keys: Sequence[str] | None = None) -> None:
+        """Show curves, all by default, as closely as the zoom asks for."""
+        window = (float(self.figure.x_range.start), float(self.figure.x_range.end))
+        for key in keys if keys is not None else tuple(self.sources):
+            source = self.sources.get(key)
+            if source is None:
+                continue
+            full = self._full.get(key)
+            x, y = (np.zeros(0), np.zeros(0)) if full is None else _in_window(*full, window)
+            source.data = {"x": x, "y": y}
+
+
+def _in_window(time_s: Array, values: Array, window: tuple[float, float]) -> tuple[Array, Array]:
+    start, stop = window
+    margin = _MARGIN * (stop - start)
+    first, last = np.searchsorted(time_s, [start - margin, stop + margin])
+    return thin(time_s[first:last], values[first:last], _POINTS)
+
+
+def time_figures(x_range: Range1d) -> dict[str, Curves]:
+    """Return torque, residual and position over one range of time, which zooms them all."""
+    pins = ("A", "B")
+    out = {
+        "torque": Curves("torque", ("measured", "given", "now", *pins), _TALL, x_range),
+        "residual": Curves("residual", ("given", "now", *pins), _LOW, x_range),
+        "position": Curves("position", ("measured", "given", "now", *pins), _LOW, x_range),
+    }
+    out["position"].figure.xaxis.axis_label = "time [s]"
+    return out
+
+
+class Regard:
+    """The residual against a quantity: samples as dots, means in bins as lines."""
+
+    def __init__(self) -> None:
+        self.figure = _plain("figure-against", "", "residual")
+        self.dots = ColumnDataSource({"x": [], "y": []}, name="against-dots")
+        self.figure.scatter(
+            "x", "y", source=self.dots, size=2, alpha=0.25, color=palette.AFTER, line_color=None
+        )
+        self.means = {}
+        for key in ("given", "now"):
+            label, color, _ = CURVES[key]
+            source = ColumnDataSource({"x": [], "y": []}, name=f"against-{key}")
+            self.figure.line(
+                "x", "y", source=source, color=color, line_width=2.5, legend_label=f"mean, {label}"
+            )
+            self.means[key] = source
+        self.figure.legend.location = "top_right"
+        self.figure.legend.label_text_font_size = "9pt"
+
+
+class Orders:
+    """Amplitude by order of the motor angle, as given and as chosen."""
+
+    def __init__(self) -> None:
+        self.figure = _plain("figure-orders", "order of the motor angle", "amplitude")
+        self.sources = {}
+        for key, shift in (("given", -0.2), ("now", 0.2)):
+            label, color, _ = CURVES[key]
+            source = ColumnDataSource({"x": [], "y": []}, name=f"orders-{key}")
+            self.figure.vbar(
+                "x", top="y", width=0.38, source=source, color=color, legend_label=label
+            )
+            self.sources[key] = (source, shift)
+        self.figure.y_range.start = 0
+        self.figure.legend.label_text_font_size = "9pt"
+
+    def show(self, key: str, orders: Array, amplitude: Array) -> None:
+        """Show the amplitudes (n_orders,) that are known."""
+        source, shift = self.sources[key]
+        known = np.isfinite(amplitude)
+        source.data = {"x": orders[known] + shift, "y": amplitude[known]}
+
+
+class Responses:
+    """Gain from the torque of one motor to the angles of all."""
+
+    def __init__(self, n_axes: int) -> None:
+        self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB rad/Nm]", "log")
+        self.sources: dict[str, list[ColumnDataSource]] = {"given": [], "now": []}
+        items = []
+        for i in range(n_axes):
+            color = palette.SERIES[i % len(palette.SERIES)]
+            for key, dash in (("given", "dashed"), ("now", "solid")):
+                source = ColumnDataSource({"x": [], "y": []}, name=f"response-{key}-{i + 1}")
+                line = self.figure.line(
+                    "x", "y", source=source, color=color, line_dash=dash, line_width=1.6
+                )
+                self.sources[key].append(source)
+                items.append(
+                    LegendItem(label=f"axis {i + 1}, {CURVES[key][0]}", renderers=[line])
+                )
+        legend = Legend(items=items, click_policy="hide", label_text_font_size="9pt")
+        self.figure.add_layout(legend, "right")
+
+    def show(self, key: str, frequency_hz: Array, gain: Array) -> None:
+        """Show gains (n_freq, n_outputs) [rad/Nm]."""
+        with np.errstate(divide="ignore"):
+            level = 20 * np.log10(gain)
+        for source, column in zip(self.sources[key], level.T, strict=True):
+            source.data = {"x": frequency_hz, "y": column}
+
+
+def _plain(name: str, x_label: str, y_label: str, x_scale: str = "linear") -> figure:
+    out = figure(
+        height=480,
+        sizing_mode="stretch_width",
+        tools="pan,box_zoom,wheel_zoom,reset,save",
+        x_axis_type=x_scale,
+        name=name,
+    )
+    out.toolbar.logo = None
+    out.xaxis.axis_label, out.yaxis.axis_label = x_label, y_label
+    return out

@@ -1,0 +1,146 @@
+"""The page's server: this machine only, a token to enter, nothing from outside."""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import panel as pn
+from tornado.httputil import HTTPServerRequest
+from tornado.routing import Router
+from tornado.web import ErrorHandler, OutputTransform, RequestHandler
+
+from axisight.errors import InputError
+
+ADDRESS = "127.0.0.1"
+PATH = "/explore"
+
+
+@dataclass(frozen=True)
+class Served:
+    """A page that is served: where it is, with its token, and its server."""
+
+    server: Any
+    url: str
+
+    def run(self) -> None:
+        """Answer until interrupted."""
+        try:
+            self.server.start()
+            self.server.io_loop.start()
+        finally:
+            self.server.stop()
+
+
+def free_port() -> int:
+    """Return a port of this machine that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind((ADDRESS, 0))
+        return int(probe.getsockname()[1])
+
+
+def serve(page: Callable[[], Any], port: int = 0) -> Served:
+    """Return the server of a page, not yet at work; ``page`` makes it anew for every visit.
+
+    ``port`` 0 takes a free one. Raises InputError for a port that is in use.
+    """
+    chosen = port or free_port()
+    host = f"{ADDRESS}:{chosen}"
+    try:
+        server = pn.io.server.get_server(
+            {PATH: page},
+            port=chosen,
+            address=ADDRESS,
+            websocket_origin=[host],
+            title="Axisight explorer",
+            start=False,
+            show=False,
+            index=None,
+        )
+    except OSError as error:
+        raise InputError(f"--port: expected a free port, got {chosen}: {error}") from error
+    token = secrets.token_urlsafe(32)
+    application = server._tornado
+    application.add_transform(_headers(host))
+    server._http.request_callback = _Guard(application, token, host)
+    return Served(server, f"http://{host}{PATH}?token={token}")
+
+
+class _Guard(Router):
+    """Lets requests through that know the token; the others get 403, files and sockets too.
+
+    The token comes in the address once, and then as a cookie that only this address gets and no script
+    reads. Another name of this machine in ``Host`` is refused: a page elsewhere may have chosen it.
+    """
+
+    def __init__(self, application: Any, token: str, host: str) -> None:
+        self._application, self._token, self._host = application, token, host
+        self._cookie = f"axisight_{host.rpartition(':')[2]}"
+
+    def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
+        """Return what answers a request."""
+        if request.host != self._host:
+            return self._refused(request)
+        given = [x.decode("utf-8", "replace") for x in request.arguments.get("token", [])]
+        if request.path == PATH and len(given) == 1 and self._right(given[0]):
+            kept = {"name": self._cookie, "value": self._token}
+            return self._application.get_handler_delegate(request, _Enter, kept)
+        cookie = request.cookies.get(self._cookie)
+        if cookie is None or not self._right(cookie.value):
+            return self._refused(request)
+        return self._application.find_handler(request, **kwargs)
+
+    def _right(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self._token.encode())
+
+    def _refused(self, request: HTTPServerRequest) -> Any:
+        return self._application.get_handler_delegate(request, ErrorHandler, {"status_code": 403})
+
+
+class _Enter(RequestHandler):
+    """Gives the cookie, and the page without the token in its address."""
+
+    def initialize(self, name: str, value: str) -> None:
+        """Keep name and value of the cookie."""
+        self._name, self._value = name, value
+
+    def get(self) -> None:
+        """Send the browser on."""
+        self.set_cookie(self._name, self._value, httponly=True, samesite="Strict")
+        self.redirect(PATH)
+
+
+def _headers(host: str) -> type[OutputTransform]:
+    """Return what adds the content policy of the page to every answer.
+
+    Its libraries make scripts and styles as they go; all of them come from here.
+    """
+    policy = "; ".join(
+        [
+            "default-src 'self'",
+            "script-src 'self' 'unsafe-inline' 'unsafe-eval'",
+            "style-src 'self' 'unsafe-inline'",
+            "img-src 'self' data: blob:",
+            "font-src 'self' data:",
+            f"connect-src 'self' ws://{host} data: blob:",
+            "object-src 'none'",
+            "base-uri 'none'",
+            "form-action 'none'",
+            "frame-ancestors 'none'",
+        ]
+    )
+
+    class Headers(OutputTransform):
+        def transform_first_chunk(
+            self, status_code: int, headers: Any, chunk: bytes, finishing: bool
+        ) -> Any:
+            headers["Content-Security-Policy"] = policy
+            headers["Referrer-Policy"] = "no-referrer"
+            headers["X-Content-Type-Options"] = "nosniff"
+            return status_code, headers, chunk
+
+    return Headers
