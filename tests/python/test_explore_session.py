@@ -118,3 +118,7 @@ def test_slider_is_answered_in_time(session):
         took.append(time.perf_counter() - start)
     # 5 s of three axes; generous, for machines that are busy. `benches/explore.py` measures.
     assert np.median(took) < 0.5
+
+
+def test_floor_is_that_of_a_diagnosis(session, found):
+    np.testing.assert_allclose(session.held_floor, found.gap.floor_per_axis, rtol=1e-12)

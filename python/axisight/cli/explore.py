@@ -17,6 +17,7 @@ from axisight.errors import MissingExtraError
 from axisight.gap.inputs import read_inputs
 from axisight.gap.settings import Settings
 from axisight.gap.tolerances import with_tolerances
+from axisight.robot import Robot
 
 
 def explore_command(
@@ -60,7 +61,7 @@ def explore_command(
             raise MissingExtraError("axisight explore needs Panel: pip install axisight[explore]")
         given = parse_effects(effect)
 
-        def load(source: Path | str, *, sample_time_s: float | None = None) -> object:
+        def load(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
             return load_simulator(source, given, sample_time_s=sample_time_s)
 
         inputs = read_inputs(

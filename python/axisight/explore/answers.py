@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,12 +45,15 @@ def answer(session: Session, log: int, version: Version, pins: dict[str, Version
 class Rest:
     """What may come later: the gap of all validation logs (n_axes,), and what the open tab shows.
 
+    ``held_given`` and ``held_floor``: the same of the simulator as given, and of noise alone.
     ``against``: dots and means by version; ``orders`` and ``responses`` by version; ``problem``: why one of
     them cannot be.
     """
 
     axis: int
     held: Array
+    held_given: Array
+    held_floor: Array
     against: tuple[Curve, dict[str, Curve]] | None = None
     orders: dict[str, Curve] = field(default_factory=dict)
     responses: dict[str, Curve] = field(default_factory=dict)
@@ -62,30 +65,31 @@ def rest(session: Session, last: Answer, axis: int, tab: str, against: Against) 
     held = session.held_gap(last.version)
     log, versions = session.logs[last.log], {"given": last.given, "now": last.now}
     residuals = {key: seen.residual[:, axis] for key, seen in versions.items()}
+    out = Rest(axis, held, session.held_given, session.held_floor)
     if tab == "against":
         x = quantity(log, axis, against)
         step = max(1, len(x) // _DOTS)
         means = {key: in_bins(x, r)[:2] for key, r in residuals.items()}
-        return Rest(axis, held, ((x[::step], residuals["now"][::step]), means))
+        return replace(out, against=((x[::step], residuals["now"][::step]), means))
     if tab == "orders":
-        return Rest(
-            axis, held, orders={k: order_spectrum(log, axis, r) for k, r in residuals.items()}
-        )
+        orders = {key: order_spectrum(log, axis, r) for key, r in residuals.items()}
+        return replace(out, orders=orders)
     if tab == "responses":
-        return _with_responses(session, last, axis, held)
-    return Rest(axis, held)
+        return _with_responses(session, last, out)
+    return out
 
 
-def _with_responses(session: Session, last: Answer, axis: int, held: Array) -> Rest:
+def _with_responses(session: Session, last: Answer, out: Rest) -> Rest:
     nyquist = 0.5 / session.logs[0].sample_time_s
     frequency_hz = np.geomspace(min(0.5, nyquist / 10), 0.9 * nyquist, _FREQUENCIES)
-    out: dict[str, Curve] = {}
+    curves: dict[str, Curve] = {}
+    problem = ""
     try:
         for key, version in (("given", AS_GIVEN), ("now", last.version)):
             robot = session.robot.with_parameters(dict(version.robot_values))
             own = {e.label: e for e in (*robot.effects, *version.effects)}
             found = responses(robot, tuple(own.values()), frequency_hz)
-            out[key] = (frequency_hz, np.abs(found[:, :, axis]))
+            curves[key] = (frequency_hz, np.abs(found[:, :, out.axis]))
     except AxisightError as error:
-        return Rest(axis, held, responses=out, problem=f"no linear response: {error}")
-    return Rest(axis, held, responses=out)
+        problem = f"no linear response: {error}"
+    return replace(out, responses=curves, problem=problem)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import panel as pn
@@ -35,7 +36,9 @@ def prepared(
     # The curve everything is compared with.
     session.see(0)
     progress("preparing the simulator", 2, 2)
-    work = Background(inputs.name, inputs.robot, inputs.estimation, inputs.validation, settings)
+    # One thread is left to the sliders; threads change no result.
+    fewer = replace(settings, threads=max(1, settings.threads - 1))
+    work = Background(inputs.name, inputs.robot, inputs.estimation, inputs.validation, fewer)
     return State(session, work, said)
 
 

@@ -20,7 +20,7 @@ class Background:
     """A diagnosis in a thread of its own.
 
     ``state``: ``idle``, ``running``, ``stopping``, ``stopped``, ``failed`` or ``done``; ``says``: how far it
-    is, or why it failed; ``document``: the verdict, once it is done.
+    is, or why it failed; ``share`` of the present step that is done [1]; ``document``: the verdict, once it is done.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Background:
         self._work |= {"estimation": list(estimation), "validation": list(validation)}
         self._run, self._stop = run, threading.Event()
         self._thread: threading.Thread | None = None
-        self.state, self.says = "idle", ""
+        self.state, self.says, self.share = "idle", "", 0.0
         self.document: dict[str, Any] | None = None
 
     @property
@@ -67,7 +67,7 @@ class Background:
     def _progress(self, label: str, done: int, total: int) -> None:
         if self._stop.is_set():
             raise _StoppedError
-        self.says = f"{label}: {done} of {total}"
+        self.says, self.share = f"{label}: {done} of {total}", done / max(total, 1)
 
     def _diagnose(self) -> None:
         try:

@@ -29,11 +29,13 @@ class Controls:
         self._cards = pn.Column(width=_WIDTH)
         self._offered = usable(state.session.robot)
         self._name = pn.widgets.Select(
-            name="cause", options={title(n): n for n in self._offered}, width=210
+            name="cause", options={title(n): n for n in self._offered}, width=200
         )
-        self._place = pn.widgets.Select(name="where", width=100)
+        self._place = pn.widgets.Select(name="where", width=95)
         self._name.param.watch(lambda _event: self._places(), "value")
-        self._add = pn.widgets.Button(name="add", width=50, align="end", button_type="primary")
+        self._add = pn.widgets.Button(
+            name="add", width=45, align="end", margin=(5, 0), button_type="primary"
+        )
         self._add.on_click(lambda _event: self.add(usual(self._name.value, self._place.value)))
         self._places()
         self._show()
@@ -57,8 +59,10 @@ class Controls:
             place(None if isinstance(p, tuple) else p, p if isinstance(p, tuple) else None): p
             for p in self._offered[self._name.value]
         }
-        self._place.options = options
-        self._place.value = next(iter(options.values()))
+        kept = self._place.value
+        if options != self._place.options:
+            self._place.options = options
+            self._place.value = kept if kept in options.values() else next(iter(options.values()))
 
     def _take_out(self, label: str, _event: Any) -> None:
         self._state.take_out(label)
@@ -109,6 +113,7 @@ class Controls:
 
 
 # Ends of names that are units, which stand beside them.
+_UNITS: tuple[str, ...]
 _UNITS = ("_nm_s2_rad2", "_nm_s2_rad", "_nm_s_rad", "_nm_rad3", "_nm_rad", "_rad_nm", "_rad_s")
 _UNITS += ("_kg_m2", "_rad", "_nm", "_kg", "_hz", "_1_w", "_s", "_m")
 

@@ -30,6 +30,16 @@ _LEFT = 400
 _TABS = ("time", "against", "orders", "bands", "responses")
 
 
+def _whole(duration_s: float) -> tuple[float, float]:
+    """Return the range of time of a whole log, its ends free of the frame."""
+    return -0.01 * duration_s, 1.01 * duration_s
+
+
+def _told(error: Exception) -> str:
+    """Return what an error says, with its kind where it is none of ours."""
+    return str(error) if isinstance(error, AxisightError) else f"{type(error).__name__}: {error}"
+
+
 class Page:
     """One visit of the page; choices live in ``state``, which all visits share."""
 
@@ -43,17 +53,31 @@ class Page:
         self._resting: Any = None
         self._last: Answer | None = None
         self._doc: Any = pn.state.curdoc
-        self._time = Range1d(0.0, session.logs[state.log].duration_s)
+        self._time = Range1d(*_whole(session.logs[state.log].duration_s))
         self._curves = time_figures(self._time)
         self._curves["torque"].figure.on_event(RangesUpdate, lambda _event: self._zoomed())
         self._regard, self._orders = Regard(), Orders()
         self._responses = Responses(session.n_axes)
         self._bands = self._html("")
         self._gaps, self._held, self._message = self._html(""), self._html(""), self._html("")
+        self._pinned = self._html("")
         self._controls = Controls(state, self.changed)
         self._build_choices()
         self._build_diagnosis()
-        self.ask()
+        self._tabs = self._build_tabs()
+        self._first()
+        pn.state.on_session_destroyed(lambda _context: self._pool.shutdown(wait=False))
+
+    def _first(self) -> None:
+        """Draw everything once, so that no figure is ever without its ranges."""
+        state = self.state
+        try:
+            self._answered(answer(state.session, state.log, state.version(), dict(state.pins)))
+            for tab in _TABS[1:]:
+                if self._last is not None:
+                    self._rested(rest(state.session, self._last, state.axis, tab, "speed"))
+        except AxisightError as error:
+            self._say(str(error))
 
     def _html(self, text: str) -> Any:
         return pn.pane.HTML(text, stylesheets=[words.STYLE], sizing_mode="stretch_width")
@@ -90,12 +114,12 @@ class Page:
         ]
 
     def _download(self, label: str, name: str, make: Callable[[], bytes]) -> Any:
-        def made() -> io.BytesIO | None:
+        def made() -> io.BytesIO:
             try:
                 return io.BytesIO(make())
             except AxisightError as error:
                 self._say(str(error))
-                return None
+                return io.BytesIO(f"# not made: {error}\n".encode())
 
         return pn.widgets.FileDownload(
             callback=made, filename=name, label=label, width=110, margin=(5, 5)
@@ -117,7 +141,8 @@ class Page:
 
     def _other_log(self, event: Any) -> None:
         self.state.log = event.new
-        self._time.start, self._time.end = 0.0, self.state.session.logs[event.new].duration_s
+        duration_s = self.state.session.logs[event.new].duration_s
+        self._time.start, self._time.end = _whole(duration_s)
         self._time.reset_start, self._time.reset_end = self._time.start, self._time.end
         self.ask()
 
@@ -142,6 +167,7 @@ class Page:
         self._run = pn.widgets.Button(name="run the diagnosis", width=170, button_type="primary")
         self._stop = pn.widgets.Button(name="stop", width=80, disabled=True)
         self._says = self._html("")
+        self._bar = pn.indicators.Progress(value=0, max=100, width=360, visible=False)
         self._run.on_click(lambda _event: self._begin())
         self._stop.on_click(lambda _event: self.state.background.stop())
         self._refitted = pn.widgets.Checkbox(
@@ -150,7 +176,8 @@ class Page:
         self._refitted.param.watch(self._refit, "value")
         self._polls: Any = None
         self._show_said()
-        if self.state.background.busy:
+        if self.state.background.state != "idle":
+            # Begun, or brought to its end, while an earlier visit looked on.
             self._poll()
 
     def _begin(self) -> None:
@@ -168,6 +195,7 @@ class Page:
         self._run.disabled, self._stop.disabled = work.busy, not work.busy
         kind = "problem" if work.state == "failed" else "quiet"
         self._says.object = words.text(f"{work.state}: {work.says}", kind)
+        self._bar.visible, self._bar.value = work.busy, int(100 * work.share)
         if work.busy:
             return
         if self._polls is not None:
@@ -180,6 +208,7 @@ class Page:
     def _show_said(self) -> None:
         said = self.state.said
         self._refitted.visible = said is not None
+        self._downloads[1].disabled = said is None
         if said is None:
             self._said.objects = [self._html(words.text("nothing yet", "quiet"))]
             return
@@ -225,14 +254,15 @@ class Page:
         """Do a task in the thread of this page, and hand the result to the server's loop."""
         try:
             found = task()
-        except AxisightError as error:
+        except Exception as error:
+            # Whatever it is: a page that waits for an answer that never comes looks alive.
             found = error
         self._doc.add_next_tick_callback(partial(then, found))
 
-    def _answered(self, found: Answer | AxisightError) -> None:
+    def _answered(self, found: Answer | Exception) -> None:
         self._busy = False
-        if isinstance(found, AxisightError):
-            self._say(str(found))
+        if isinstance(found, Exception):
+            self._say(_told(found))
         elif found.log == self.state.log:
             self._last = found
             self._draw(found)
@@ -288,8 +318,12 @@ class Page:
             ("position", f"position [{angle}]"),
         ):
             self._curves[name].figure.yaxis.axis_label = label
-        self._gaps.object = self._gap_table(versions)
+        self._gaps.object = words.heading(f"Gap on {log.name}") + self._gap_table(versions)
         self._bands.object = self._band_table(versions)
+        self._pinned.object = "".join(
+            words.text(f"{pin}: {self.state.said_of(made)}", "quiet")
+            for pin, made in sorted(self.state.pins.items())
+        )
         if found.now.broken_at_s is not None:
             self._say(f"the simulation breaks off at {found.now.broken_at_s:.2f} s")
         else:
@@ -317,12 +351,20 @@ class Page:
             out += words.table(head, rows, f"bands-{i + 1}")
         return out
 
-    def _rested(self, found: Rest | AxisightError) -> None:
-        if isinstance(found, AxisightError):
-            self._say(str(found))
+    def _rested(self, found: Rest | Exception) -> None:
+        if isinstance(found, Exception):
+            self._say(_told(found))
             return
-        rows = [(str(i + 1), words.share(g)) for i, g in enumerate(found.held)]
-        self._held.object = words.table(("axis", "all validation logs"), rows, "held")
+        self._held.object = words.heading("Gap on all validation logs") + words.table(
+            ("axis", "as given", "as chosen", "noise"),
+            [
+                (str(i), *map(words.share, row))
+                for i, row in enumerate(
+                    zip(found.held_given, found.held, found.held_floor, strict=True), 1
+                )
+            ],
+            "held",
+        )
         unit, angle = self._units[found.axis]
         if found.against is not None:
             dots, means = found.against
@@ -336,6 +378,7 @@ class Page:
         for key, (orders, amplitude) in found.orders.items():
             self._orders.show(key, orders, amplitude)
         self._orders.figure.yaxis.axis_label = f"amplitude in the residual [{unit}]"
+        self._responses.of(found.axis)
         for key, (frequency, gain) in found.responses.items():
             self._responses.show(key, frequency, gain)
         if found.problem:
@@ -343,9 +386,7 @@ class Page:
 
     # The whole
 
-    def view(self) -> Any:
-        """Return the page."""
-        head = f"{self.state.session.name}: {self._compared()}"
+    def _build_tabs(self) -> Any:
         panes = {
             "time": pn.Column(
                 *(
@@ -359,15 +400,24 @@ class Page:
                 pn.pane.Bokeh(self._regard.figure, sizing_mode="stretch_width"),
                 sizing_mode="stretch_width",
             ),
-            "orders": pn.pane.Bokeh(self._orders.figure, sizing_mode="stretch_width"),
+            "orders": pn.Column(
+                pn.pane.Bokeh(self._orders.figure, sizing_mode="stretch_width"),
+                sizing_mode="stretch_width",
+            ),
             "bands": self._bands,
-            "response": pn.pane.Bokeh(self._responses.figure, sizing_mode="stretch_width"),
+            "response": pn.Column(
+                pn.pane.Bokeh(self._responses.figure, sizing_mode="stretch_width"),
+                sizing_mode="stretch_width",
+            ),
         }
-        self._tabs = pn.Tabs(*panes.items(), sizing_mode="stretch_width")
-        self._tabs.param.watch(lambda _event: self._rest_soon(), "active")
+        tabs = pn.Tabs(*panes.items(), sizing_mode="stretch_width")
+        tabs.param.watch(lambda _event: self._rest_soon(), "active")
+        return tabs
+
+    def view(self) -> Any:
+        """Return the page."""
         left = pn.Column(
             pn.Row(self._log, self._axis),
-            self._html(words.heading("Gap on this log")),
             self._gaps,
             self._held,
             self._message,
@@ -376,18 +426,22 @@ class Page:
             self._html(words.heading("What the diagnosis said")),
             pn.Row(self._run, self._stop),
             self._says,
+            self._bar,
             self._said,
             self._refitted,
             self._html(words.heading("Compare")),
             pn.Row(*self._pins, self._unpin),
+            self._pinned,
             self._html(words.heading("Export")),
             pn.Row(*self._downloads),
             width=_LEFT,
             margin=(0, 15, 0, 0),
         )
-        title = self._html(words.heading(head))
+        name = self._html(
+            words.heading(self.state.session.name) + words.text(self._compared(), "quiet")
+        )
         return pn.Column(
-            title,
+            name,
             pn.Row(left, self._tabs, sizing_mode="stretch_width"),
             sizing_mode="stretch_width",
             margin=10,

@@ -49,22 +49,21 @@ class Curves:
         self.figure.min_border_left = 70
         self.figure.y_range.range_padding = 0.05
         self.sources = {}
-        items = []
+        self._items = {}
         for key in keys:
             label, color, dash = CURVES[key]
             source = ColumnDataSource({"x": [], "y": []}, name=f"{name}-{key}")
-            line = self.figure.line(
-                "x", "y", source=source, color=color, line_dash=dash, line_width=1.2
-            )
+            line = self.figure.line("x", "y", source=source, color=color, line_dash=dash)
             self.sources[key] = source
-            items.append(LegendItem(label=label, renderers=[line]))
+            self._items[key] = LegendItem(label=label, renderers=[line])
         legend = Legend(
-            items=items,
+            items=list(self._items.values()),
             orientation="horizontal",
             click_policy="hide",
             border_line_color=None,
             margin=0,
             padding=2,
+            spacing=12,
             label_text_font_size="9pt",
         )
         self.figure.add_layout(legend, "above")
@@ -89,6 +88,8 @@ class Curves:
             full = self._full.get(key)
             x, y = (np.zeros(0), np.zeros(0)) if full is None else _in_window(*full, window)
             source.data = {"x": x, "y": y}
+            if self._items[key].visible != (full is not None):
+                self._items[key].visible = full is not None
 
 
 def _in_window(time_s: Array, values: Array, window: tuple[float, float]) -> tuple[Array, Array]:
@@ -158,7 +159,7 @@ class Responses:
     """Gain from the torque of one motor to the angles of all."""
 
     def __init__(self, n_axes: int) -> None:
-        self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB rad/Nm]", "log")
+        self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB]", "log")
         self.sources: dict[str, list[ColumnDataSource]] = {"given": [], "now": []}
         items = []
         for i in range(n_axes):
@@ -169,11 +170,13 @@ class Responses:
                     "x", "y", source=source, color=color, line_dash=dash, line_width=1.6
                 )
                 self.sources[key].append(source)
-                items.append(
-                    LegendItem(label=f"axis {i + 1}, {CURVES[key][0]}", renderers=[line])
-                )
+                items.append(LegendItem(label=f"axis {i + 1}, {CURVES[key][0]}", renderers=[line]))
         legend = Legend(items=items, click_policy="hide", label_text_font_size="9pt")
         self.figure.add_layout(legend, "right")
+
+    def of(self, axis: int) -> None:
+        """Say whose torque it is, of an axis from 0."""
+        self.figure.title.text = f"motor angles per torque of motor {axis + 1}"
 
     def show(self, key: str, frequency_hz: Array, gain: Array) -> None:
         """Show gains (n_freq, n_outputs) [rad/Nm]."""

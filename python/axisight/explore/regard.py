@@ -73,9 +73,9 @@ def order_spectrum(log: Log, axis: int, residual: Array) -> tuple[Array, Array]:
         return orders.astype(float), np.full(len(orders), np.nan)
     step = max(1, round(1 / log.sample_time_s / _ORDER_RATE_HZ))
     if step > 1:
-        residual = lowpass(
-            residual[:, None], log.sample_time_s, 0.4 / (step * log.sample_time_s)
-        )[:, 0]
+        residual = lowpass(residual[:, None], log.sample_time_s, 0.4 / (step * log.sample_time_s))[
+            :, 0
+        ]
     angle = quantity(log, axis, "angle")
     speed = np.gradient(angle, log.sample_time_s)
     kept = residual[::step]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -139,16 +139,25 @@ class Session:
 
     def held_gap(self, version: Version = AS_GIVEN) -> Array:
         """Return the gap per axis over all validation logs (n_axes,) [1]."""
-        first = len(self.logs) - len(self._held)
-        measured = [self.measured(first + i) for i in range(len(self._held))]
+        measured = self._held_measured()
         torques = self.view.torques(version.variant(), self._held)
         errors = [t - u for t, u in zip(torques, measured, strict=True)]
         return self._gap(self._held, errors, measured)
 
-    def floor(self, log: int) -> Array:
-        """Return the gap per axis that noise alone makes on one log (n_axes,) [1]."""
-        noise = self.view.noises([self.logs[log]], log)
-        return self._gap([self.logs[log]], noise, [self.measured(log)])
+    @cached_property
+    def held_floor(self) -> Array:
+        """Gap per axis that noise alone makes over all validation logs (n_axes,) [1]."""
+        noise = self.view.noises(self._held, len(self.view.logs))
+        return self._gap(self._held, noise, self._held_measured())
+
+    @cached_property
+    def held_given(self) -> Array:
+        """`held_gap` of the simulator as given (n_axes,) [1]."""
+        return self.held_gap()
+
+    def _held_measured(self) -> list[Array]:
+        first = len(self.logs) - len(self._held)
+        return [self.measured(first + i) for i in range(len(self._held))]
 
     def _simulate(self, log: int, version: Version) -> tuple[Array, Array | None]:
         # What the robot cannot have is said before anything runs.

@@ -52,6 +52,15 @@ class State:
             values = self.session.known_parameters(self.said.refit)
         return Version.of([*self.chosen, *out], values)
 
+    def said_of(self, version: Version) -> str:
+        """Return a version in a line."""
+        parts = []
+        for effect in version.effects:
+            values = (f"{name} {value:.4g}" for name, value in (effect.parameters or {}).items())
+            parts.append(f"{effect.label} ({', '.join(values)})" if effect.acts else "")
+        parts.append("re-fitted parameters" if version.robot_values else "")
+        return "; ".join(filter(None, parts)) or "as given"
+
     def add(self, effect: Effect) -> None:
         """Put a cause in, in place of one of its name and axis; raises InputError if it cannot be there."""
         self.session.check(Version.of([effect]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -19,7 +20,7 @@ def name_of(effect: Effect) -> str:
 
 def share(value: float | None) -> str:
     """Return a gap in per cent."""
-    return _UNKNOWN if value is None or value != value else percent(value)
+    return _UNKNOWN if value is None or math.isnan(value) else percent(value)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], name: str) -> str:
@@ -64,7 +65,8 @@ def of_verdict(said: Said) -> str:
 STYLE = """
 .ax { font: 14px/1.4 system-ui, sans-serif; color: #222; margin: 0 0 6px; }
 h3.ax { font-size: 15px; font-weight: 600; margin: 4px 0; }
-table.ax { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+table.ax { border-collapse: collapse; width: 100%; max-width: 640px; margin-bottom: 10px;
+  font-variant-numeric: tabular-nums; }
 table.ax th, table.ax td { text-align: right; padding: 2px 6px; border-bottom: 1px solid #ddd; }
 table.ax th:first-child, table.ax td:first-child { text-align: left; }
 table.ax th { font-weight: 600; color: #555; font-size: 13px; }
