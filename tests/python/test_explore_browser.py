@@ -80,7 +80,7 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
         page = seen.page
         assert found.headline in page.locator("p.said").inner_text()
         seen.click("add the cause")
-        page.get_by_label("with the parameters it re-fitted").check()
+        page.locator("input[type=checkbox]").check()
         for axis in (1, 2, 3):
             after = seen.cell("said-gaps", axis, "after").inner_text()
             expect(seen.cell("held", axis, "as chosen")).to_have_text(after)
@@ -96,7 +96,7 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
         expect(page.get_by_role("button", name="take it out")).to_have_count(1)
         after = seen.cell("said-gaps", 2, "after").inner_text()
         expect(seen.cell("held", 2, "as chosen")).to_have_text(after)
-        page.get_by_label("with the parameters it re-fitted").uncheck()
+        page.locator("input[type=checkbox]").uncheck()
         seen.click("take it out")
         assert seen.wrong == []
 
