@@ -207,6 +207,19 @@ def test_figure_is_a_picture(session):
     assert figure_png(session, 0, 1, seen, seen, "Nm").startswith(b"\x89PNG")
 
 
+def test_no_peak_of_a_curve_is_lost():
+    plots = pytest.importorskip("axisight.explore.plots", reason="needs panel")
+    time_s = np.arange(20011) * 5e-4
+    values = np.sin(time_s)
+    values[[7, 12345, 20010]] = 9.0, -8.0, 7.0
+    values[3000:3100] = np.nan
+    t, v = plots.peaks(time_s, values, 2400)
+    assert 1200 < len(t) <= 2400 and (np.diff(t) > 0).all()
+    assert {9.0, -8.0, 7.0} <= set(v)
+    assert np.isnan(v).any()
+    np.testing.assert_array_equal(v, values[np.searchsorted(time_s, t)])
+
+
 def test_slider_changes_one_value(session):
     state = State(session, background(session, None))
     state.add(Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.1}))

@@ -298,20 +298,15 @@ class Page:
         log = session.logs[found.log]
         torque, angle = self._units[axis]
         versions = {"given": found.given, "now": found.now, **found.pins}
-        self._curves["torque"].set("measured", log.time_s, found.now.measured[:, axis])
-        self._curves["position"].set("measured", log.time_s, log.position_rad[:, axis])
+        self._curves["torque"].show("measured", log.time_s, found.now.measured, axis)
+        self._curves["position"].show("measured", log.time_s, log.position_rad, axis)
         for key in ("given", "now", *PINS):
             seen = versions.get(key)
-            for name, curves in self._curves.items():
-                values = None
-                if seen is not None:
-                    values = {
-                        "torque": seen.simulated,
-                        "residual": seen.residual,
-                        "position": seen.position_rad,
-                    }[name]
-                curves.set(key, log.time_s, None if values is None else values[:, axis])
-        self._zoomed()
+            shown = (None, None, None)
+            if seen is not None:
+                shown = (seen.simulated, seen.residual, seen.position_rad)
+            for name, values in zip(("torque", "residual", "position"), shown, strict=True):
+                self._curves[name].show(key, log.time_s, values, axis)
         for name, label in (
             ("torque", f"torque [{torque}]"),
             ("residual", f"residual [{torque}]"),

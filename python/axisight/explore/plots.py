@@ -10,7 +10,6 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from axisight import palette
-from axisight.report.curves import thin
 
 Array = NDArray[np.float64]
 
@@ -35,6 +34,7 @@ class Curves:
 
     def __init__(self, name: str, keys: Sequence[str], height: int, x_range: Range1d) -> None:
         self._full: dict[str, tuple[Array, Array]] = {}
+        self._of: dict[str, tuple[object, int]] = {}
         self.figure = figure(
             height=height,
             sizing_mode="stretch_width",
@@ -71,12 +71,17 @@ class Curves:
             HoverTool(tooltips=[("time", "@x{0.000} s"), ("value", "@y")], mode="mouse")
         )
 
-    def set(self, key: str, time_s: Array | None, values: Array | None = None) -> None:
-        """Give a curve other values (n,), or none; `draw` shows them."""
-        if time_s is None or values is None:
+    def show(self, key: str, time_s: Array, values: Array | None, axis: int) -> None:
+        """Show a column, of an axis from 0, of values (n, n_axes), or none; not again if it is there."""
+        there = self._of.get(key)
+        if there is not None and there[0] is values and there[1] == axis:
+            return
+        self._of[key] = (values, axis)
+        if values is None:
             self._full.pop(key, None)
         else:
-            self._full[key] = (time_s, values)
+            self._full[key] = (time_s, values[:, axis])
+        self.draw([key])
 
     def draw(self, keys: Sequence[str] | None = None) -> None:
         """Show curves, all by default, as closely as the zoom asks for."""
@@ -96,7 +101,29 @@ def _in_window(time_s: Array, values: Array, window: tuple[float, float]) -> tup
     start, stop = window
     margin = _MARGIN * (stop - start)
     first, last = np.searchsorted(time_s, [start - margin, stop + margin])
-    return thin(time_s[first:last], values[first:last], _POINTS)
+    return peaks(time_s[first:last], values[first:last], _POINTS)
+
+
+def peaks(time_s: Array, values: Array, points: int) -> tuple[Array, Array]:
+    """Return about ``points`` samples of a curve (n,): the least and the largest of each stretch.
+
+    As `axisight.report.curves.thin`, for stretches of one length, at once. One without finite values keeps a
+    NaN as a gap.
+    """
+    n = len(values)
+    if n <= points:
+        return time_s, values
+    length = -(-2 * n // points)
+    count = -(-n // length)
+    padded = np.full(count * length, np.nan)
+    padded[:n] = values
+    parts = padded.reshape(count, length)
+    known = np.isfinite(parts)
+    starts = np.arange(count) * length
+    low = starts + np.where(known, parts, np.inf).argmin(axis=1)
+    high = starts + np.where(known, parts, -np.inf).argmax(axis=1)
+    kept = np.unique(np.concatenate([low, high]))
+    return time_s[kept], values[kept]
 
 
 def time_figures(x_range: Range1d) -> dict[str, Curves]:

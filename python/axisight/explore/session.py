@@ -99,8 +99,7 @@ class Session:
         self.roles = ("estimation",) * len(estimation) + ("validation",) * len(validation)
         self._held = list(inputs.validation)
         self._measured: dict[int, Array] = {}
-        self._run: Callable[[int, Version], tuple[Array, Array | None]]
-        self._run = lru_cache(_KEPT)(self._simulate)
+        self._seen: Callable[[int, Version], Seen] = lru_cache(_KEPT)(self._simulate)
 
     @property
     def n_axes(self) -> int:
@@ -125,8 +124,16 @@ class Session:
         self.robot.with_parameters(dict(version.robot_values)).with_effects(own.values())
 
     def see(self, log: int, version: Version = AS_GIVEN) -> Seen:
-        """Return a simulator on one log, by number; raises InputError as `check`."""
-        simulated, position = self._run(log, version)
+        """Return a simulator on one log, by number, the same object again while it is kept.
+
+        Raises InputError as `check`.
+        """
+        return self._seen(log, version)
+
+    def _simulate(self, log: int, version: Version) -> Seen:
+        # What the robot cannot have is said before anything runs.
+        self.check(version)
+        simulated, position = self.view.run(version.variant(), self.logs[log])
         measured = self.measured(log)
         residual = simulated - measured
         item = self.logs[log]
@@ -158,11 +165,6 @@ class Session:
     def _held_measured(self) -> list[Array]:
         first = len(self.logs) - len(self._held)
         return [self.measured(first + i) for i in range(len(self._held))]
-
-    def _simulate(self, log: int, version: Version) -> tuple[Array, Array | None]:
-        # What the robot cannot have is said before anything runs.
-        self.check(version)
-        return self.view.run(version.variant(), self.logs[log])
 
     def _gap(self, logs: list[Log], errors: list[Array], measured: list[Array]) -> Array:
         with np.errstate(invalid="ignore"):
