@@ -162,7 +162,7 @@ def test_diagnosis_beside_the_page_can_be_stopped_and_run(case, found):
         seen.click("stop")
         expect(page.get_by_text("stopped: stopped; nothing was kept")).to_be_visible()
         seen.click("run the diagnosis")
-        expect(page.locator("p.said")).to_contain_text(found.headline, timeout=120_000)
+        expect(page.locator("p.said")).to_contain_text(found.headline, timeout=400_000)
         assert seen.wrong == []
     assert served.status == 130
 
