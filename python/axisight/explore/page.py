@@ -8,9 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
+import numpy as np
 import panel as pn
 from bokeh.events import RangesUpdate
 from bokeh.models import Range1d
+from numpy.typing import NDArray
 
 from axisight.errors import AxisightError
 from axisight.explore import words
@@ -21,6 +23,8 @@ from axisight.explore.plots import Orders, Regard, Responses, time_figures
 from axisight.explore.regard import AGAINST
 from axisight.explore.state import PINS, State
 from axisight.gap.compared import torque_of
+
+Array = NDArray[np.float64]
 
 # What is slow waits until a slider has rested so long.
 _REST_MS = 250
@@ -302,7 +306,7 @@ class Page:
         self._curves["position"].show("measured", log.time_s, log.position_rad, axis)
         for key in ("given", "now", *PINS):
             seen = versions.get(key)
-            shown = (None, None, None)
+            shown: tuple[Array | None, ...] = (None, None, None)
             if seen is not None:
                 shown = (seen.simulated, seen.residual, seen.position_rad)
             for name, values in zip(("torque", "residual", "position"), shown, strict=True):
