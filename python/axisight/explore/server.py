@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import secrets
+import signal
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,13 +23,17 @@ PATH = "/explore"
 
 @dataclass(frozen=True)
 class Served:
-    """A page that is served: where it is, with its token, and its server."""
+    """A page that is served: where it is, with its token, its server, and who hears of signals."""
 
     server: Any
     url: str
+    handlers: dict[int, Any]
 
     def run(self) -> None:
         """Answer until interrupted."""
+        # Those of the command, which Panel replaced: a stop has its exit status.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self.handlers[number])
         try:
             self.server.start()
             self.server.io_loop.start()
@@ -50,6 +55,7 @@ def serve(page: Callable[[], Any], port: int = 0) -> Served:
     """
     chosen = port or free_port()
     host = f"{ADDRESS}:{chosen}"
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         server = pn.io.server.get_server(
             {PATH: page},
@@ -67,7 +73,7 @@ def serve(page: Callable[[], Any], port: int = 0) -> Served:
     application = server._tornado
     application.add_transform(_headers(host))
     server._http.request_callback = _Guard(application, token, host)
-    return Served(server, f"http://{host}{PATH}?token={token}")
+    return Served(server, f"http://{host}{PATH}?token={token}", handlers)
 
 
 class _Guard(Router):
