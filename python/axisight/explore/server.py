@@ -27,7 +27,7 @@ class Served:
 
     server: Any
     url: str
-    handlers: dict[int, Any]
+    handlers: dict[signal.Signals, Any]
 
     def run(self) -> None:
         """Answer until interrupted."""
@@ -55,6 +55,7 @@ def serve(page: Callable[[], Any], port: int = 0) -> Served:
     """
     chosen = port or free_port()
     host = f"{ADDRESS}:{chosen}"
+    handlers: dict[signal.Signals, Any]
     handlers = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         server = pn.io.server.get_server(
