@@ -108,14 +108,11 @@ def diagnose(
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
     progress("looking at the logs", 0, 1)
-    begun = from_rest(machine, fit_logs, held_logs, simulated)
-    simulated = begun.simulated
-    inputs = behind_gate(machine, begun.estimation, begun.validation, chosen.despite)
-    inputs = replace(inputs, noted=(*begun.findings, *inputs.noted))
+    inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, simulated)
     progress("looking at the logs", 1, 1)
     view = inputs.view(chosen)
-    if simulated:
-        inputs = inputs.against(view, simulated, chosen)
+    if inputs.beside:
+        inputs = inputs.against(view, inputs.beside, chosen)
         view = inputs.view(chosen)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
@@ -151,7 +148,8 @@ class _Inputs:
 
     ``commanded``: logs without torque with what the controller commands along them, where they have none;
     ``recovered``: whether the references are those that the controller must have had; ``simulator``: how
-    far the robot reproduces the user's own simulator, where its logs were given.
+    far the robot reproduces the user's own simulator, where its logs were given; ``beside``: these logs, from
+    where the others are taken.
     """
 
     robot: Robot
@@ -161,6 +159,7 @@ class _Inputs:
     commanded: Commanded | None
     recovered: bool
     simulator: Reproduction | None = None
+    beside: tuple[Log, ...] = ()
 
     def view(self, settings: Settings) -> View:
         """Return how simulator and logs are compared."""
@@ -204,13 +203,18 @@ class _Inputs:
 
 
 def behind_gate(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], despite: Collection[str]
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    despite: Collection[str],
+    simulated: Sequence[Log] = (),
 ) -> _Inputs:
     """Return simulator and logs behind the gate, with commands and references where none were logged.
 
-    ``despite`` as in `Settings`; raises as `diagnose`.
+    ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
     """
-    logs, n = [*estimation, *validation], len(estimation)
+    begun = from_rest(robot, estimation, validation, simulated)
+    logs, n = [*begun.estimation, *begun.validation], len(estimation)
     commanded = with_commands(robot, logs)
     if commanded is not None:
         logged = commanded.as_logged()
@@ -221,7 +225,10 @@ def behind_gate(
         noted = pass_gate(robot, logs[:n], logs[n:], despite)
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
-    return _Inputs(robot, logs[:n], logs[n:], noted, commanded, recovered is not None)
+    noted, beside = (*begun.findings, *noted), tuple(begun.simulated)
+    return _Inputs(
+        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=beside
+    )
 
 
 def _inputs(
