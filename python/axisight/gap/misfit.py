@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from axisight.errors import InputError
 from axisight.gap.evidence import Evidence
 from axisight.gap.model import ModelFitter
+from axisight.gap.rank import pseudo_inverse
 from axisight.gap.search import Search
 
 Array = NDArray[np.float64]
 
 # Blocks of an axis from which their scatter tells how much its errors count for.
 _BLOCKS = 8
-# Of directions of the normal equations, relative to the largest, that the data do not show.
-_RANK = 1e-10
 
 
 def with_balanced_values(found: Search, fitter: ModelFitter) -> Search:
@@ -76,7 +75,7 @@ def inflation(model: Evidence) -> Array:
         curvature = model.matrix[mine].sum(axis=0)
         gradient = model.gradient[mine] - model.gradient[mine].mean(axis=0)
         scatter = gradient.T @ gradient
-        inverse = _pseudo_inverse(curvature + model.prior_matrix)
+        inverse = pseudo_inverse(curvature + model.prior_matrix)
         told = float(np.sum(inverse * curvature))
         if told > 0:
             out[axis] = max(1.0, float(np.sum(inverse * scatter)) / told)
@@ -107,10 +106,10 @@ def deviations(model: Evidence) -> dict[tuple[int | None, str], float]:
     prior = model.prior_matrix[pick]
     whole, pull = matrix.sum(axis=0) + prior, gradient.sum(axis=0) + model.prior_gradient[used]
     without = np.stack(
-        [_pseudo_inverse(whole - m) @ (pull - g) for m, g in zip(matrix, gradient, strict=True)]
+        [pseudo_inverse(whole - m) @ (pull - g) for m, g in zip(matrix, gradient, strict=True)]
     )
     scatter = (count - 1) * without.var(axis=0)
-    inverse = _pseudo_inverse(whole)
+    inverse = pseudo_inverse(whole)
     known = np.diag(inverse @ prior @ inverse)
     quantile = float(scipy.stats.t.ppf(0.975, count - 1)) / _NORMAL
     found = quantile * np.sqrt(scatter + known)
@@ -129,12 +128,3 @@ def _stretches(model: Evidence) -> NDArray[np.int64]:
             place[mine[np.argsort(model.start[mine])]] = np.arange(len(mine))
     _, out = np.unique(np.stack([model.log, place]), axis=1, return_inverse=True)
     return np.asarray(out, dtype=np.int64).reshape(-1)
-
-
-def _pseudo_inverse(matrix: Array) -> Array:
-    """Return the inverse of a positive semidefinite matrix, zero where it has no rank; units do not matter."""
-    size = np.sqrt(np.diag(matrix))
-    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-    scaled = matrix * np.outer(scale, scale)
-    inverse = np.linalg.pinv(scaled, rcond=_RANK, hermitian=True)
-    return np.asarray(inverse * np.outer(scale, scale))

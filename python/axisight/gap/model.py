@@ -21,6 +21,7 @@ from axisight.fitting import (
     robot_parameters,
 )
 from axisight.gap.evidence import Evidence, FreeEffect, Linearized
+from axisight.gap.rank import deviations_seen
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.tolerances import spring_changes, tolerance_of
 from axisight.robot import Robot
@@ -437,7 +438,7 @@ def _evidence(
     fitted = tuple(f.effect.with_values(v) for f, v in zip(free, values, strict=True))
     blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
     columns = result.columns
-    std = np.sqrt(np.maximum(np.diag(result.sandwich), 0.0))
+    std = _deviations(result, at)
     return Evidence(
         parameters=at.parameters,
         at_bound=at.at_bound,
@@ -466,6 +467,16 @@ def _evidence(
             for i, (place, name) in enumerate(at.parameters)
         },
     )
+
+
+def _deviations(result: _core.FitResult, at: Linearized) -> Array:
+    """Return the standard deviations (n_parameters,), infinite where the data do not show a parameter."""
+    variance = np.diag(result.sandwich)
+    if np.isfinite(variance).all():
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+    # One that they do not show leaves the normal equations without an inverse.
+    scatter = at.gradient.T @ at.gradient + at.prior_matrix
+    return deviations_seen(at.matrix.sum(axis=0) + at.prior_matrix, scatter)
 
 
 def _samples(start: NDArray[np.int64], size: NDArray[np.int64], counted: Array | None) -> Array:

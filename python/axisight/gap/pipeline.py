@@ -31,6 +31,7 @@ from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
+from axisight.gap.intervals import with_own_scatter
 from axisight.gap.misfit import with_balanced_values
 from axisight.gap.modes import view_of
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
@@ -393,6 +394,8 @@ def _seen(
     lost: list[str] = []
     while True:
         conclusion = said(found)
+        causes = with_own_scatter(conclusion.causes, view.fitter.tolerated)
+        conclusion = replace(conclusion, causes=causes)
         reach = _reach(view, held_logs, found, conclusion.effects, settings)
         own = _axes_alone(view, conclusion, reach)
         axis = None if own is None else own.not_carried()
