@@ -39,7 +39,7 @@ PAIRS = (
         Effect("stribeck_friction", 3, {"coulomb_nm": 0.2, "excess_nm": 0.2}),
     ),
     (
-        Effect("gravity_compensation", 2, {"sine_nm": 3.0}),
+        Effect("gravity_compensation", 2, {"sine_nm": 300.0}),
         Effect("actuator_bandwidth", 1, {"time_constant_s": 1.5e-3}),
     ),
     (
