@@ -36,6 +36,34 @@ Columns = Annotated[
 ]
 
 
+Model = Annotated[
+    str | None,
+    typer.Option(help="Simulator: robot.toml, URDF, MJCF or a preset. A case brings its own."),
+]
+
+
+Validation = Annotated[
+    list[Path] | None,
+    typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
+]
+
+
+CutoffHz = Annotated[
+    float | None,
+    typer.Option(
+        help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
+    ),
+]
+
+
+Despite = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Name of a fault of the logs that is refused: flag it and go on, e.g. rows_missing (repeatable)."
+    ),
+]
+
+
 MaxBytes = Annotated[
     int | None,
     typer.Option(

@@ -15,11 +15,15 @@ import axisight
 from axisight import report as pages
 from axisight.cli.common import (
     Columns,
+    CutoffHz,
+    Despite,
     Force,
     From,
     MaxBytes,
+    Model,
     To,
     Untrusted,
+    Validation,
     bars,
     errors,
     say,
@@ -85,14 +89,8 @@ def diagnose_command(
             help="A case folder, or logs to fit and choose on; the simulator may stand first."
         ),
     ] = None,
-    model: Annotated[
-        str | None,
-        typer.Option(help="Simulator: robot.toml, URDF, MJCF or a preset. A case brings its own."),
-    ] = None,
-    validation: Annotated[
-        list[Path] | None,
-        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
-    ] = None,
+    model: Model = None,
+    validation: Validation = None,
     columns: Columns = None,
     json: Annotated[
         Path | None,
@@ -108,18 +106,8 @@ def diagnose_command(
             "the robot file or the default."
         ),
     ] = None,
-    cutoff_hz: Annotated[
-        float | None,
-        typer.Option(
-            help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
-        ),
-    ] = None,
-    despite: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Name of a fault of the logs that is refused: flag it and go on, e.g. rows_missing (repeatable)."
-        ),
-    ] = None,
+    cutoff_hz: CutoffHz = None,
+    despite: Despite = None,
     max_causes: Annotated[
         int, typer.Option(min=0, help="Stop after so many causes.")
     ] = Settings.max_causes,

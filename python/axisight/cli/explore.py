@@ -11,7 +11,18 @@ from typing import Annotated
 
 import typer
 
-from axisight.cli.common import Columns, MaxBytes, Untrusted, bars, errors, say
+from axisight.cli.common import (
+    Columns,
+    CutoffHz,
+    Despite,
+    MaxBytes,
+    Model,
+    Untrusted,
+    Validation,
+    bars,
+    errors,
+    say,
+)
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import MissingExtraError
 from axisight.gap.inputs import read_inputs
@@ -25,26 +36,14 @@ def explore_command(
         list[Path],
         typer.Argument(help="A case folder, or logs; the simulator may stand first."),
     ],
-    model: Annotated[
-        str | None,
-        typer.Option(help="Simulator: robot.toml, URDF, MJCF or a preset. A case brings its own."),
-    ] = None,
-    validation: Annotated[
-        list[Path] | None,
-        typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
-    ] = None,
+    model: Model = None,
+    validation: Validation = None,
     columns: Columns = None,
     verdict: Annotated[
         Path | None, typer.Option(help="Verdict of an earlier diagnosis, to try its causes.")
     ] = None,
-    cutoff_hz: Annotated[
-        float | None,
-        typer.Option(help="Low-pass in inverse dynamics. Default: chosen from the data."),
-    ] = None,
-    despite: Annotated[
-        list[str] | None,
-        typer.Option(help="Name of a fault of the logs that is refused: go on (repeatable)."),
-    ] = None,
+    cutoff_hz: CutoffHz = None,
+    despite: Despite = None,
     effect: GivenEffects = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of the page. Default: a free one.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
@@ -37,12 +38,12 @@ class Counted(Protocol):
         """What is out of the ordinary, if anything."""
 
 
-class Bars:
+class Bars(ABC):
     """A bar for each stage of work: to be called with what is done, how many are done, of how many."""
 
+    @abstractmethod
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show that ``done`` of ``total`` are done of ``what``."""
-        raise NotImplementedError
 
     def study(self, state: Counted) -> None:
         """Show the state that `axisight.montecarlo.run` reports."""
@@ -50,9 +51,9 @@ class Bars:
             self.note(state.message)
         self("runs", state.done, state.total)
 
+    @abstractmethod
     def note(self, text: str) -> None:
         """Show a text above the bars, to stay."""
-        raise NotImplementedError
 
 
 @contextmanager
