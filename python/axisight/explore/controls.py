@@ -26,7 +26,12 @@ class Controls:
 
     def __init__(self, state: State, changed: Callable[[str], None]) -> None:
         self._state, self._changed = state, changed
-        self._cards = pn.Column(width=_WIDTH)
+        self._none = pn.pane.HTML(words.text("none: the simulator as given", "quiet"))
+        self._none.stylesheets = [words.STYLE]
+        # Cards that were made stay and are hidden: a browser that takes elements out while others are
+        # drawn can be left with one twice, and loses a press on what is drawn anew.
+        self._cards = pn.Column(self._none, width=_WIDTH)
+        self._made: dict[str, _Card] = {}
         self._offered = usable(state.session.robot)
         self._name = pn.widgets.Select(
             name="cause", options={title(n): n for n in self._offered}, width=200
@@ -74,42 +79,74 @@ class Controls:
         self._changed("")
 
     def _show(self) -> None:
-        cards = [self._card(effect) for effect in self._state.chosen]
-        none = pn.pane.HTML(words.text("none: the simulator as given", "quiet"))
-        none.stylesheets = [words.STYLE]
-        self._cards.objects = cards or [none]
+        chosen = {effect.label: effect for effect in self._state.chosen}
+        for label, effect in chosen.items():
+            if label in self._made:
+                self._made[label].take(effect)
+            else:
+                self._made[label] = self._card(effect)
+                self._cards.append(self._made[label].view)
+        for label, card in self._made.items():
+            card.view.visible = label in chosen
+        self._none.visible = not chosen
 
-    def _card(self, effect: Effect) -> Any:
-        out = pn.widgets.Button(name="take it out", width=100, margin=(0, 5))
-        out.on_click(partial(self._take_out, effect.label))
+    def _card(self, effect: Effect) -> _Card:
+        return _Card(
+            effect, partial(self._take_out, effect.label), partial(self._moved, effect.label)
+        )
+
+
+class _Card:
+    """What is shown of a cause: its name, what takes it out, a slider for every parameter."""
+
+    def __init__(
+        self,
+        effect: Effect,
+        out: Callable[[Any], None],
+        moved: Callable[[str, Any], None],
+    ) -> None:
+        button = pn.widgets.Button(name="take it out", width=100, margin=(0, 5))
+        button.on_click(out)
         head = pn.pane.HTML(words.text(words.name_of(effect)), stylesheets=[words.STYLE], width=240)
-        pairs = zip(effect_info(effect.name).parameters, effect.values(), strict=True)
-        sliders = [self._slider(effect, p, value) for p, value in pairs]
-        return pn.Column(
-            pn.Row(head, out),
-            *sliders,
+        self._parameters = effect_info(effect.name).parameters
+        pairs = zip(self._parameters, effect.values(), strict=True)
+        self._sliders = [_slider(p, value) for p, value in pairs]
+        for p, slider in zip(self._parameters, self._sliders, strict=True):
+            slider.param.watch(partial(moved, p.name), "value")
+        self.view = pn.Column(
+            pn.Row(head, button),
+            *self._sliders,
             width=_WIDTH,
             margin=(0, 0, 8, 0),
             styles={"border-left": "3px solid #0072b2", "padding-left": "8px"},
         )
 
-    def _slider(self, effect: Effect, p: EffectParameter, value: float) -> Any:
-        low, high = slider_range(p, value)
-        unit = "" if p.unit == "1" else f" [{p.unit}]"
-        slider = pn.widgets.EditableFloatSlider(
-            name=f"{_plain(p.name)}{unit}",
-            start=low,
-            end=high,
-            value=min(max(value, p.lower), p.upper),
-            step=(high - low) / _STEPS,
-            fixed_start=p.lower,
-            fixed_end=p.upper,
-            format=PrintfTickFormatter(format="%.4g"),
-            width=340,
-            margin=(0, 5),
-        )
-        slider.param.watch(partial(self._moved, effect.label, p.name), "value")
-        return slider
+    def take(self, effect: Effect) -> None:
+        """Show the values of an effect, in a range that suits them."""
+        for p, slider, value in zip(self._parameters, self._sliders, effect.values(), strict=True):
+            shown = _shown(p, value)
+            if slider.value != shown["value"]:
+                slider.param.update(**shown)
+
+
+def _shown(p: EffectParameter, value: float) -> dict[str, float]:
+    """Return the range of a slider, and where it stands."""
+    low, high = slider_range(p, value)
+    value = min(max(value, p.lower), p.upper)
+    return {"start": low, "end": high, "step": (high - low) / _STEPS, "value": value}
+
+
+def _slider(p: EffectParameter, value: float) -> Any:
+    unit = "" if p.unit == "1" else f" [{p.unit}]"
+    return pn.widgets.EditableFloatSlider(
+        **_shown(p, value),
+        name=f"{_plain(p.name)}{unit}",
+        fixed_start=p.lower,
+        fixed_end=p.upper,
+        format=PrintfTickFormatter(format="%.4g"),
+        width=340,
+        margin=(0, 5),
+    )
 
 
 # Ends of names that are units, which stand beside them.
