@@ -147,7 +147,8 @@ def test_figures_hold_what_was_simulated(running):
         page.evaluate("""() => {
             const range = Bokeh.documents[0].get_model_by_name("figure-torque").x_range;
             range.start = 1.0; range.end = 1.2; }""")
-        page.mouse.move(800, 250)
+        # Wherever the page was scrolled to meanwhile.
+        page.locator(".bk-Figure").first.hover()
         page.mouse.wheel(0, -10)
         page.wait_for_function(
             f"() => {{ const x = ({DATA})('position-measured')[0]; return x[x.length - 1] < 2; }}"
