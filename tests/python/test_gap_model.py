@@ -207,21 +207,31 @@ def evidence(*effects: Effect) -> Evidence:
 
 
 class Valley:
-    """A fitter whose loss depends on one number; the simulation fails where ``fails`` says so."""
+    """A fitter whose loss depends on one number; the simulation fails where ``fails`` says so.
 
-    def __init__(self, loss: Callable[[float], float], fails: float = np.inf) -> None:
-        self.curve, self.fails = loss, fails
+    ``given``: loss with the simulator as given, where that differs from the re-fitted one.
+    """
+
+    def __init__(
+        self,
+        loss: Callable[[float], float],
+        fails: float = np.inf,
+        given: float | None = None,
+    ) -> None:
+        self.curve, self.fails, self.given = loss, fails, given
         self.asked: list[float] = []
 
     def runs(self, *_: object) -> None:
         return None
 
-    def loss(self, free: Sequence[FreeEffect], *_: object, **__: object) -> float:
+    def loss(
+        self, free: Sequence[FreeEffect], *_: object, robot_values: object = None, **__: object
+    ) -> float:
         value = (free[-1].effect.parameters or {})["half_width_rad"]
         self.asked.append(value)
         if value > self.fails:
             raise InputError("the simulation failed")
-        return self.curve(value)
+        return self.curve(value) if self.given is None or robot_values else self.given
 
 
 def screen(model: Evidence, fitter: object = None) -> Screen:
@@ -287,39 +297,51 @@ def test_the_bottom_of_a_valley_narrower_than_the_steps_between_starts_is_found(
     model = evidence()
     # Starts lie a factor of 1.5 apart; the valley falls to half its depth within a fifth.
     fitter = Valley(lambda v: 2 * model.total * (1 - np.exp(-((v / true - 1) ** 2) / 0.06)))
-    option, gain = screen(model, fitter).best_of_starts(play(STARTS[::-1]))
-    found = (option.effect.parameters or {})["half_width_rad"]
+    start = screen(model, fitter).best_of_starts(play(STARTS[::-1]))
+    found = (start.option.effect.parameters or {})["half_width_rad"]
     # The scan stops within 0.003 of the value; the loss there is 2e-4 of the depth.
     assert found == pytest.approx(true, rel=0.01)
-    assert gain == pytest.approx(model.total, rel=1e-2)
-    assert gain == pytest.approx(model.total - fitter.curve(found))
+    assert start.gain == pytest.approx(model.total, rel=1e-2)
+    assert start.gain == pytest.approx(model.total - fitter.curve(found))
 
 
 def test_where_no_start_is_better_none_is_looked_at_closer():
     model = evidence()
     fitter = Valley(lambda v: model.total * (1 + v))
-    option, gain = screen(model, fitter).best_of_starts(play())
-    assert (option.effect.parameters or {})["half_width_rad"] == STARTS[0]
-    assert gain == pytest.approx(-model.total * STARTS[0])
-    assert fitter.asked == list(STARTS)
+    start = screen(model, fitter).best_of_starts(play())
+    assert (start.option.effect.parameters or {})["half_width_rad"] == STARTS[0]
+    assert start.gain == pytest.approx(-model.total * STARTS[0])
+    # With the simulator as given, and as it was re-fitted.
+    assert fitter.asked == [*STARTS, *STARTS]
 
 
 def test_starts_that_cannot_be_simulated_are_passed_over():
     model, true = evidence(), 5e-5
     fitter = Valley(lambda v: model.total * (v / true - 1) ** 2, fails=3e-4)
     screened = screen(model, fitter)
-    option, gain = screened.best_of_starts(play())
-    assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
-    assert gain == pytest.approx(model.total, rel=1e-3)
+    start = screened.best_of_starts(play())
+    assert (start.option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
+    assert start.gain == pytest.approx(model.total, rel=1e-3)
     assert screened.bench.skipped == {"backlash@1": "the simulation failed"}
 
 
 def test_a_single_start_is_a_start():
     model = evidence()
     fitter = Valley(lambda v: model.total * (v / 1e-4 - 1) ** 2)
-    option, gain = screen(model, fitter).best_of_starts(play([1.2e-4]))
-    assert (option.effect.parameters or {})["half_width_rad"] == pytest.approx(1.2e-4)
-    assert gain == pytest.approx(0.96 * model.total)
+    start = screen(model, fitter).best_of_starts(play([1.2e-4]))
+    assert (start.option.effect.parameters or {})["half_width_rad"] == pytest.approx(1.2e-4)
+    assert start.gain == pytest.approx(0.96 * model.total)
+
+
+def test_where_the_simulator_as_given_is_far_off_the_re_fitted_one_is_begun_from():
+    """Play that bends the simulator is found with it as it was, play of a simulator that was off as re-fitted."""
+    model = replace(evidence(), robot_values={"axis1.mass": 2.0})
+    fitter = Valley(lambda v: 0.1 * model.total, given=3 * model.total)
+    start = screen(model, fitter).best_of_starts(play())
+    assert start.robot_values == model.robot_values
+    assert start.gain == pytest.approx(0.9 * model.total)
+    given = screen(model, Valley(lambda v: 0.1 * model.total)).best_of_starts(play())
+    assert given.robot_values == {}
 
 
 def test_part_of_the_logs_is_what_they_are_alone(view: ClosedLoopView, fitter: ClosedLoopFitter):

@@ -33,11 +33,11 @@ def test_a_cube_that_is_most_of_its_spring_is_found():
     option, screen, explainable = screened(
         Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": cubic})
     )
-    begin, gain = screen.best_of_starts(option)
-    assert gain > 0.95 * explainable
-    assert (begin.effect.parameters or {})["cubic_nm_rad3"] == pytest.approx(cubic, rel=0.2)
+    start = screen.best_of_starts(option)
+    assert start.gain > 0.95 * explainable
+    assert (start.option.effect.parameters or {})["cubic_nm_rad3"] == pytest.approx(cubic, rel=0.2)
     (promise,) = screen.starts([option.at({"cubic_nm_rad3": 0.0})])
-    assert promise.gain == pytest.approx(gain)
+    assert promise.gain == pytest.approx(start.gain)
 
 
 def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():

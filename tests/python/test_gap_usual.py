@@ -8,6 +8,7 @@ import pytest
 
 from axisight import Effect, Settings, diagnose
 from axisight.gap import trials
+from axisight.gap.decide import Ranked, Standing
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.search import _beaten_at_home
 from axisight.gap.trials import Trials
@@ -43,6 +44,38 @@ def test_what_was_tried_is_not_tried_again():
 def test_nothing_is_more_usual_than_play():
     play = Effect("backlash", 1, {"half_width_rad": WIDTH})
     assert not begun_where_it_ended(led_by(play), [CUBE, PLAY], set())
+
+
+def stood(effect: Effect, score: float, probability: float) -> Ranked:
+    evidence = SimpleNamespace(effects=(effect,))
+    trial = SimpleNamespace(label=effect.label, evidence=evidence)
+    return Ranked(trial, score, 1.0, 9.0, probability)
+
+
+FOUND = Effect("backlash", 1, {"half_width_rad": WIDTH})
+
+
+@pytest.mark.parametrize("leader", [SOFT, KNEE], ids=lambda e: e.name)
+def test_a_gear_whose_middle_has_lost_its_stiffness_has_play(leader: Effect):
+    """Whatever formula does better; with the probability of the two exchanged."""
+    led = Standing(0, (stood(leader, 0.99, 0.9), stood(FOUND, 0.85, 0.02)), 0.05, 0.03)
+    found = led.play_first()
+    assert [(r.trial.label, r.probability) for r in found.ranked] == [
+        ("backlash@1", 0.9),
+        (leader.label, 0.02),
+    ]
+    assert (found.p_none, found.p_unknown) == (0.05, 0.03)
+
+
+def test_it_has_none_where_play_does_not_explain_it_or_the_middle_carries():
+    far = Standing(0, (stood(SOFT, 0.99, 0.9), stood(FOUND, 0.75, 0.02)), 0.05, 0.03)
+    assert far.play_first() is far
+    carries = SOFT.with_values({"softness": 0.9})
+    soft = Standing(0, (stood(carries, 0.99, 0.9), stood(FOUND, 0.98, 0.02)), 0.05, 0.03)
+    assert soft.play_first() is soft
+    friction = Effect("coulomb_friction", 1)
+    other = Standing(0, (stood(friction, 0.99, 0.9), stood(FOUND, 0.98, 0.02)), 0.05, 0.03)
+    assert other.play_first() is other
 
 
 def standing(axis: int, effect: Effect):
@@ -155,3 +188,15 @@ def test_a_heavier_link_is_not_an_eccentric_encoder():
     # The link turns about the axis of the joint: 1130 kg m^2, and 200 kg at one metre more.
     heavier = 200.0 / (1130.0 * wanted)
     assert cause.parameters["relative_change"].value == pytest.approx(heavier, rel=0.05)
+
+
+@pytest.mark.parametrize("damped", [0.0, 1.0])
+def test_play_is_found_whatever_damps_in_its_gap(damped: float):
+    """Engines damp the whole way or in contact only; a soft middle imitates the one or the other."""
+    robot = bare_axis()
+    play = Effect("backlash", 1, {"half_width_rad": 4e-4, "damped": damped})
+    logs = logs_of(scattered(robot, 6), [play], PLAN, seconds=4.0)
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    (cause,) = found.causes
+    assert (found.verdict, cause.label) == ("explained", "backlash@1")
+    assert cause.parameters["half_width_rad"].value == pytest.approx(4e-4, rel=0.03)

@@ -137,6 +137,9 @@ SPRING_CHANGES = {
 }
 """Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
 
+PLAY = ("backlash", "damped")
+"""What a gear has whose middle is without stiffness, and its parameter for what is damped there."""
+
 WITH_MEMORY = frozenset(
     {
         "presliding_friction",

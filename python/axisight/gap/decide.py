@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import LOOP_LIKE
+from axisight.effects.stated import LOOP_LIKE, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
@@ -176,7 +176,31 @@ class Standing:
         ]
         return self._of(tuple(sorted(weighed, key=lambda r: -r.probability)))
 
+    def play_first(self) -> Standing:
+        """Return the same led by play where the winner is a gear whose middle has lost its stiffness.
 
+        Such a gear has play, whichever formula does better: engines and machines end it more softly or harder.
+        """
+        effect = self.best.trial.evidence.effects[-1]
+        middle = SPRING_CHANGES.get(effect.name, ((),))[0]
+        named = dict(
+            zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True)
+        )
+        if not middle or abs(named[middle[0]]) < _NO_MIDDLE:
+            return self
+        label = Effect(PLAY[0], effect.axis).label
+        for play in self.ranked[1:]:
+            if play.trial.label == label and play.score >= _AS_PLAY * self.best.score:
+                led = replace(play, probability=self.best.probability)
+                other = replace(self.best, probability=play.probability)
+                rest = (other if r is play else r for r in self.ranked[1:])
+                return replace(self, ranked=(led, *rest))
+        return self
+
+
+# A middle that has lost this share of its stiffness is none; and what play explains of what it does.
+_NO_MIDDLE = 0.95
+_AS_PLAY = 0.8
 # How many times as often the usual one of two is met: the simpler law of an axis; a load, which every
 # arm is there to carry, beside a link that is not as it was drawn: named first, with the link beside it.
 _ODDS = {"axis": 4.0, "axes": 4.0, "arm": 3.0}

@@ -20,6 +20,7 @@ class FreeEffect:
 
     ``starts`` are further start values worth trying, of one parameter, for effects whose fit may
     end in the wrong valley. ``stated`` are the values of an effect that the simulator has itself.
+    ``deflections_rad``: from where to where the torques of the logs turn a linear gear, for laws of gears.
     """
 
     effect: Effect
@@ -28,6 +29,7 @@ class FreeEffect:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     starts: tuple[Mapping[str, float], ...] = ()
     stated: Mapping[str, float] = field(default_factory=dict)
+    deflections_rad: tuple[float, float] | None = None
 
     def at(self, values: Mapping[str, float]) -> FreeEffect:
         """Return the same with other start values."""

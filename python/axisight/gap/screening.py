@@ -209,9 +209,9 @@ class Screen:
             best = max((best, *starts), key=lambda start: start.gain)
             best = replace(best, sensitivity=known)
         elif option.starts:
-            begin, gain = self.best_of_starts(option)
-            if gain > best.gain:
-                best = Start(begin, {}, gain, sensitivity=best.sensitivity)
+            found = self.best_of_starts(option)
+            if found.gain > best.gain:
+                best = replace(found, sensitivity=best.sensitivity)
         return best
 
     def _at_starts(self, option: FreeEffect) -> list[FreeEffect]:
@@ -234,15 +234,20 @@ class Screen:
         known = sensitivity(option, evidence, self.model.axis)
         return Start(option, self.model.robot_values, gain, falls, known)
 
-    def best_of_starts(self, option: FreeEffect) -> tuple[FreeEffect, float]:
+    def best_of_starts(self, option: FreeEffect) -> Start:
         """Return the candidate at the best of its own starts, and what it gains there.
 
-        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted.
+        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted. Where none
+        of them gains anything with that, the re-fitted one was nearer the truth.
         """
+        first = self._scanned(option, {})
+        return first if first.gain > 0 else self._scanned(option, self.model.robot_values)
+
+    def _scanned(self, option: FreeEffect, robot_values: Mapping[str, float]) -> Start:
         name = option.free[0]
 
         def loss(value: float) -> float:
-            found = self.bench.attempt(self.fitter.loss, option.at({name: value}), {})
+            found = self.bench.attempt(self.fitter.loss, option.at({name: value}), robot_values)
             return np.inf if found is None else found
 
         values = sorted(s[name] for s in option.starts)
@@ -260,7 +265,7 @@ class Screen:
             )
             if finer.fun < least:
                 least, value = float(finer.fun), float(finer.x)
-        return option.at({name: value}), self.model.total - least
+        return Start(option.at({name: value}), robot_values, self.model.total - least)
 
 
 class KeptScreen(Screen):

@@ -168,12 +168,12 @@ def search(
         )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
-        trials = round_.refined(round_.run(options, number), number)
+        trials = round_.refined(round_.run(options, number), options, number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
             # What others waited for is no cause.
             trials = round_.run_waiting(trials, options, number)
-            trials = round_.refined(trials, number, even_felt=True)
+            trials = round_.refined(trials, options, number, even_felt=True)
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
         out.sensitivities |= round_.sensitivities

@@ -171,6 +171,17 @@ def _deflection_rad(trial: Trial) -> float:
     return max(most / ratio / _stiffness(trial), _LEAST_DEFLECTION_RAD)
 
 
+# Beyond these shares of the samples torques say little of a gear's law.
+_HARDLY_EVER = (0.005, 0.995)
+
+
+def _of_a_gear(trial: Trial) -> FreeEffect:
+    """Begin at the neutral values, and say between which deflections the gear works."""
+    torque = np.concatenate(trial.torque()) / float(trial.robot.gear_ratio[trial.index])
+    low, high = np.quantile(torque / _stiffness(trial), _HARDLY_EVER)
+    return replace(_neutral(trial), deflections_rad=(float(low), float(high)))
+
+
 # Largest half-width of the play of an industrial gear, 3 minutes of arc.
 _WIDEST_RAD = 9e-4
 # From one start to the next: the valley around the true width is narrow, impacts must stay in phase.
@@ -180,10 +191,11 @@ _WIDER = 1.24
 def _play(trial: Trial) -> FreeEffect:
     """Begin at several widths, from a share of the deflection the largest torque gives.
 
-    Up to most of it, or the play of a gear that is stiffer than that.
+    Up to most of it, or the play of a gear that is stiffer than that. What is damped in the gap is found
+    where it ended.
     """
     i, deflection = trial.index, _deflection_rad(trial)
-    begin = FreeEffect(trial.effect({"half_width_rad": 0.0}), ("half_width_rad",))
+    begin = replace(_of_a_gear(trial), free=("half_width_rad",))
     if _axis_share(trial.at, i) <= _SMALL_SHARE:
         return begin
     widest = 0.8 * deflection
@@ -201,7 +213,7 @@ _HARDER = (1.0, 3.0, 10.0, 30.0)
 
 def _hardening(trial: Trial) -> FreeEffect:
     """Begin without, or where the cube is most of the spring."""
-    begin = _neutral(trial)
+    begin = _of_a_gear(trial)
     if _axis_share(trial.at, trial.index) <= _SMALL_SHARE:
         return begin
     unit = _stiffness(trial) / _deflection_rad(trial) ** 2
@@ -240,7 +252,7 @@ def _knee(trial: Trial) -> FreeEffect:
     bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
     begin = trial.effect({"step": 0.0, "within": 0.0, **starts[1]})
     further = (starts[0], starts[2])
-    return FreeEffect(begin, ("step", "within", name), bounds=bounds, starts=further)
+    return replace(_of_a_gear(trial), effect=begin, bounds=bounds, starts=further)
 
 
 # Half-widths of a soft middle, as shares of the deflection: its corner has to be passed.
@@ -257,10 +269,11 @@ def _soft(trial: Trial) -> FreeEffect:
         for rounding in _ROUNDED
         for share in _MIDDLES
     ]
-    bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
+    # The largest torques turn a gear by several times its deviation.
+    bounds = {name: (0.3 * starts[0][name], 10 * starts[-1][name])}
     begin = trial.effect({"softness": 0.0, **starts[1]})
     further = (starts[0], *starts[2:])
-    return FreeEffect(begin, ("softness", name, "rounding"), bounds=bounds, starts=further)
+    return replace(_of_a_gear(trial), effect=begin, bounds=bounds, starts=further)
 
 
 def _coupled(trial: Trial) -> FreeEffect | None:
@@ -469,7 +482,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "presliding_friction": _law(stribeck_speed_rad_s=_STRIBECK),
     "backlash": _play,
     "nonlinear_stiffness": _hardening,
-    "joint_stiffness": _neutral,
+    "joint_stiffness": _of_a_gear,
     "torque_ripple": _waves,
     "resolver_ripple": _waves,
     "input_delay": _neutral,

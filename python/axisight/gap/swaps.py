@@ -89,9 +89,9 @@ def weighed_again(
     standing = stand(
         tried, held_out_loss(without), floor, layout, entered.axis, explained_share=explained_share
     )
-    if standing is None or standing.best.trial.label == label:
+    found = None if standing is None else standing.usual_first().play_first()
+    if found is None or found.best.trial.label == label:
         return None
-    found = standing.usual_first()
     return fits[found.best.trial.label], (found.best, found)
 
 

@@ -16,6 +16,7 @@ from axisight.errors import InputError
 from axisight.gap.decide import FORMULA_ERROR, Ranked, Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.gear_laws import best_law, others_of_its_gear
 from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
@@ -221,6 +222,50 @@ class Trials:
         self.usual |= {start.option.effect.label for start in begun}
         return [*trials, *self._fitted(pool, begun)]
 
+    def _with_gears(
+        self, pool: ThreadPoolExecutor, trials: list[Trial], options: Sequence[FreeEffect]
+    ) -> list[Trial]:
+        """Add laws of the gear that another one leads on, begun on its curve; or put them where they fit better.
+
+        One that leads then has a curve of its own.
+        """
+        led: set[str] = set()
+        while True:
+            begun = []
+            for standing in self.standings(trials):
+                law = best_law(standing)
+                if law is not None and law.trial.label not in led:
+                    led.add(law.trial.label)
+                    others = others_of_its_gear(law, standing, options, self.fitter.robot)
+                    begun += [(law.trial.evidence, other) for other in others]
+            if not begun:
+                return trials
+            known = {t.label: t for t in trials}
+            for found in pool.map(lambda pair: self._in_its_place(*pair), begun):
+                if found is not None:
+                    before = known.get(found.label)
+                    if before is None or found.evidence.total < before.evidence.total:
+                        known[found.label] = found
+            trials = list(known.values())
+
+    def _in_its_place(self, leader: Evidence, option: FreeEffect) -> Trial | None:
+        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated."""
+        part = self.rough or self.fitter
+        try:
+            found = part.fit([*leader.free[:-1], option], leader, refreshes=_RENEWALS)
+            found = settled(part, found.free, found)
+            if part is not self.fitter:
+                found = self._looked_at(found)
+        except InputError:
+            return None
+        return trial(option, found, self.model)
+
+    def _looked_at(self, begun: Evidence) -> Evidence:
+        """Return a fit to part of the data as all of them have it."""
+        found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
+        # What is taken in is fitted on where it has not settled.
+        return replace(found, renewed=found.renewed and _has_settled(found))
+
     def run_waiting(
         self, trials: list[Trial], options: Sequence[FreeEffect], number: int
     ) -> list[Trial]:
@@ -306,13 +351,21 @@ class Trials:
             )
             for axis in range(self.layout.n_axes)
         ]
-        return [s.usual_first() for s in found if s is not None]
+        return [s.usual_first().play_first() for s in found if s is not None]
 
-    def refined(self, trials: list[Trial], number: int, *, even_felt: bool = False) -> list[Trial]:
+    def refined(
+        self,
+        trials: list[Trial],
+        options: Sequence[FreeEffect],
+        number: int,
+        *,
+        even_felt: bool = False,
+    ) -> list[Trial]:
         """Fit the leaders of each axis again with the simulator's sensitivities renewed.
 
         A large effect bends the re-fitted simulator, and the sensitivities taken from
-        it; the leaders deserve better before one of them is believed.
+        it; the leaders deserve better before one of them is believed. Other laws of a gear that is one
+        begin where it ended.
         """
         label = f"refining the leaders, round {number}"
         with self._threads() as pool:
@@ -324,6 +377,7 @@ class Trials:
                 better = dict(zip(map(id, todo), found, strict=True))
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
+            trials = self._with_gears(pool, trials, options)
         self.progress(label, 1, 1)
         return trials
 
@@ -368,9 +422,7 @@ class Trials:
             needed = _CLOSE * _taken_away(leader, self.model, axis - 1)
             if _taken_away(begun, self.screen.model, axis - 1) < needed:
                 return None
-        found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
-        # What is taken in is fitted on where it has not settled.
-        return replace(found, renewed=found.renewed and _has_settled(found))
+        return self._looked_at(begun)
 
     def _crooked(self, trials: Sequence[Trial]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""

@@ -1,13 +1,13 @@
 //! Backlash: a dead zone between motor and joint.
 
 use super::formulas::{dead_zone, dead_zone_inverse};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "backlash",
     summary: "play in the gear: no torque until the gap is crossed",
-    equation: "tau_g = k D + d D',  D = delta - clip(delta, -b, b), its corners rounded over b/20",
+    equation: "tau_g = k D + d (D' + g (delta' - D')),  D = delta - clip(delta, -b, b), its corners rounded over b/20",
     source: "Nordin, Gutman (2002), Automatica 38(10), dead-zone model",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -22,29 +22,49 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stiff: false,
     absorbed_by: &[Absorber::Backlash],
     shown_by: &[Experiment::Amplitudes],
-    parameters: &[ParameterInfo {
-        name: "half_width_rad",
-        unit: "rad (joint side)",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: 0.0,
-        upper: 0.05,
-        typical: 3e-4,
-    }],
+    parameters: &[
+        ParameterInfo {
+            name: "half_width_rad",
+            unit: "rad (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 0.05,
+            typical: 3e-4,
+        },
+        // Teeth that damp in contact only, or grease and seals that damp on the way too.
+        ParameterInfo {
+            name: "damped",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1.0,
+            typical: 0.5,
+        },
+    ],
 };
 
-struct Backlash<S>(S);
+struct Backlash<S> {
+    half_width: S,
+    damped: S,
+}
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Backlash(p[0]))
+    Box::new(Backlash {
+        half_width: p[0],
+        damped: p[1],
+    })
 }
 
 impl<S: Scalar> Kernel<S> for Backlash<S> {
-    fn deflection(&self, delta: S) -> (S, S) {
-        dead_zone(delta, self.0)
+    fn deflection(&self, delta: S) -> Deflected<S> {
+        let (loaded, slope) = dead_zone(delta, self.half_width);
+        let damped = self.damped.fma(S::one() - slope, slope);
+        Deflected { loaded, slope, damped }
     }
 
     fn deflection_inverse(&self, loaded: S) -> S {
-        dead_zone_inverse(loaded, self.0)
+        dead_zone_inverse(loaded, self.half_width)
     }
 }

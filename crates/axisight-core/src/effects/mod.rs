@@ -8,8 +8,8 @@
 mod harmonics;
 
 pub use axisight_plant::effect::{
-    Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, EffectError, EffectInfo,
-    Experiment, Family, GearError, Joint, Kernel, Linear, Motor, Pair, ParameterInfo,
+    Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, Deflected, EffectError,
+    EffectInfo, Experiment, Family, GearError, Joint, Kernel, Linear, Motor, Pair, ParameterInfo,
     PlantParameters, Role, Scope, Spring, StandsFor,
 };
 pub use axisight_plant::formulas;

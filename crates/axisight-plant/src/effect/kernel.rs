@@ -18,6 +18,17 @@ pub struct Motor<'a, S> {
     pub internal: &'a [S],
 }
 
+/// What a gear makes of its geometric deflection.
+#[derive(Clone, Copy)]
+pub struct Deflected<S> {
+    /// Deflection that loads the spring [rad].
+    pub loaded: S,
+    /// Its slope over the geometric one.
+    pub slope: S,
+    /// Share of the geometric rate that the gear damps.
+    pub damped: S,
+}
+
 /// State of a gear spring as its effects see it.
 #[derive(Debug, Clone, Copy)]
 pub struct Spring<'a, S> {
@@ -209,9 +220,13 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Rates of the effect's own states on a motor [1/s].
     fn motor_rates(&self, _motor: &Motor<'_, S>, _rates: &mut [S]) {}
 
-    /// Deflection that loads the gear spring and its slope, from the geometric deflection [rad].
-    fn deflection(&self, delta: S) -> (S, S) {
-        (delta, S::one())
+    /// What a geometric deflection [rad] makes of the gear.
+    fn deflection(&self, delta: S) -> Deflected<S> {
+        Deflected {
+            loaded: delta,
+            slope: S::one(),
+            damped: S::one(),
+        }
     }
     /// Deflection from the one that loads the spring; `delta` for [`Kernel::deflection`] at rest.
     fn deflection_inverse(&self, loaded: S) -> S {

@@ -10,6 +10,6 @@ pub use info::{
     StandsFor,
 };
 pub use kernel::{
-    Arm, AxisTorque, BaseJoint, CoupledAxis, GearError, Joint, Kernel, Motor, Pair,
+    Arm, AxisTorque, BaseJoint, CoupledAxis, Deflected, GearError, Joint, Kernel, Motor, Pair,
     PlantParameters, Spring,
 };

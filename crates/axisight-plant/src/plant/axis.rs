@@ -128,12 +128,14 @@ impl<S: Scalar> Axis<S> {
         own: &[S],
         own_rates: &mut [S],
     ) -> S {
-        let (mut loaded, mut slope) = (delta, S::one());
+        let (mut loaded, mut slope, mut damped) = (delta, S::one(), S::one());
         for on_gear in &self.on_gear {
-            let (next, factor) = on_gear.kernel.deflection(loaded);
-            (loaded, slope) = (next, slope * factor);
+            let next = on_gear.kernel.deflection(loaded);
+            loaded = next.loaded;
+            slope = slope * next.slope;
+            damped = damped * next.damped;
         }
-        let mut torque = gear.stiffness.fma(loaded, gear.damping * slope * rate);
+        let mut torque = gear.stiffness.fma(loaded, gear.damping * damped * rate);
         for Own { kernel, internal } in &self.on_gear {
             let state = Spring {
                 loaded,

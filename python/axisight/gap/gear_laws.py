@@ -1,0 +1,173 @@
+"""Laws of a gear begun on the curve of torque over deflection that the fit of another one found.
+
+Of laws with several numbers one may lead because the others ended in a wrong valley. Every law is held
+against the leader where its curve comes closest to that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from axisight.effects import Effect, effect_info
+from axisight.effects.stated import PLAY
+from axisight.fitting import robot_parameters
+from axisight.gap.decide import Ranked, Standing, Trial
+from axisight.gap.evidence import FreeEffect
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+Law = Callable[[Array, Mapping[str, float], float], Array]
+
+
+def _play(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
+    width = p["half_width_rad"]
+    return x - np.clip(x, -width, width)
+
+
+def _soft(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
+    width, corner = p["half_width_rad"], p["rounding"] * p["half_width_rad"]
+    middle = np.hypot(x + width, corner) - np.hypot(x - width, corner)
+    scale = float(np.hypot(1.0, p["rounding"])) / 2
+    return np.asarray(x - p["softness"] * scale * middle)
+
+
+def _knee(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
+    beyond = x - np.clip(x, -p["knee_rad"], p["knee_rad"])
+    return (1 + p["within"]) * x + p["step"] * beyond
+
+
+def _cube(x: Array, p: Mapping[str, float], stiffness: float) -> Array:
+    return x + p["cubic_nm_rad3"] / stiffness * x**3
+
+
+def _spring(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
+    return (1 + p["relative_change"]) * x
+
+
+LAWS: Mapping[str, Law] = {
+    "backlash": _play,
+    "lost_motion": _soft,
+    "piecewise_stiffness": _knee,
+    "nonlinear_stiffness": _cube,
+    "joint_stiffness": _spring,
+}
+"""Torque over stiffness [rad] by deflection [rad]: equations of the table, corners of play and knee sharp."""
+
+# Share of what the leader explains from which a law is where it belongs.
+_NEAR = 0.998
+_HALF = 0.5
+_POINTS = 60
+# Deflections looked at, in the largest of the linear spring; and how finely.
+_WIDEST = 20.0
+_FINE = 8_001
+
+
+def best_law(standing: Standing) -> Ranked | None:
+    """Return the law of a gear that explains most of its axis, where one of its gear leads there."""
+    here = standing.axis + 1
+    laws = [r for r in standing.ranked if r.trial.candidate.effect.axis == here and _is_law(r)]
+    if standing.best not in laws:
+        return None
+    return max(laws, key=lambda r: r.score)
+
+
+def _is_law(one: Ranked) -> bool:
+    return one.trial.candidate.effect.name in LAWS
+
+
+def others_of_its_gear(
+    best: Ranked, standing: Standing, options: Sequence[FreeEffect], robot: Robot
+) -> list[FreeEffect]:
+    """Return the other laws of the gear of an axis, begun on the curve of the ``best``.
+
+    Those that explain as much with sensitivities of their own are where they belong; none where the model
+    has a law of the gear already: another one mends that. Play is begun with what is damped in the gap free.
+    """
+    evidence, axis = best.trial.evidence, standing.axis + 1
+    leader = evidence.effects[-1]
+    name = robot.axis_parameter(axis, "stiffness")
+    laws = [e for e in evidence.effects if e.axis == axis and e.name in LAWS]
+    if laws != [leader] or name is None:
+        return []
+    near = _NEAR * best.score
+    done = {r.trial.label for r in standing.ranked if r.score >= near and _in_place(r.trial)}
+    stiffness = evidence.robot_values.get(name, robot_parameters(robot)[name])
+    begun = (
+        on_the_curve(leader, _damped_too(option, leader), stiffness)
+        for option in options
+        if option.effect.axis == axis and option.effect.label not in done
+    )
+    return [option for option in begun if option is not None]
+
+
+def _in_place(one: Trial) -> bool:
+    """Whether a fit of a law has sensitivities of its own, and all its numbers."""
+    option = one.candidate
+    return one.evidence.renewed and (option.effect.name != PLAY[0] or _damps(option))
+
+
+def _damps(option: FreeEffect) -> bool:
+    return PLAY[1] in option.free
+
+
+def _damped_too(option: FreeEffect, leader: Effect) -> FreeEffect:
+    """Return play with what is damped in the gap free too, begun as the leader has it; other laws as they are."""
+    if option.effect.name != PLAY[0] or _damps(option):
+        return option
+    # Laws without a gap damp everywhere.
+    begin = _HALF if leader.name == PLAY[0] else 1.0
+    return replace(option.at({PLAY[1]: begin}), free=(*option.free, PLAY[1]))
+
+
+def on_the_curve(leader: Effect, option: FreeEffect, stiffness_nm_rad: float) -> FreeEffect | None:
+    """Return a law of the same gear begun where its curve comes closest to that of ``leader``.
+
+    What a gear is turned by the mean torque, such as that of gravity, no motor angle shows: curves count from there.
+    None where either is no such law, or nothing is known of the deflections. ``stiffness_nm_rad``: of the
+    spring without laws, as it was re-fitted.
+    """
+    mine, other = LAWS.get(option.effect.name), LAWS.get(leader.name)
+    reach = option.deflections_rad
+    if mine is None or other is None or reach is None or reach[0] == reach[1]:
+        return None
+    top = max(map(abs, reach))
+    grid = np.linspace(-_WIDEST * top, _WIDEST * top, _FINE)
+    torque = np.linspace(*reach, _POINTS)
+
+    def turned(law: Law, values: Mapping[str, float]) -> Array:
+        """Return how far a law turns under the torques, from where it is in the mean."""
+        held = np.maximum.accumulate(law(grid, values, stiffness_nm_rad))
+        deflection = np.interp(torque, held, grid)
+        return np.asarray((deflection - deflection.mean()) / top)
+
+    wanted = turned(other, _named(leader))
+    # What is damped no curve shows.
+    free = [name for name in option.free if name != PLAY[1]]
+    low, high = np.transpose([option.limits(name) for name in free])
+    scale, values = _typical(option.effect, free), _named(option.effect)
+
+    def misfit(scaled: Array) -> Array:
+        return turned(mine, {**values, **dict(zip(free, scaled * scale, strict=True))}) - wanted
+
+    begun = [[{**values, **start}[name] for name in free] for start in ({}, *option.starts)]
+    found = [
+        least_squares(misfit, np.clip(b, low, high) / scale, bounds=(low / scale, high / scale))
+        for b in begun
+    ]
+    best = min(found, key=lambda r: float(r.cost))
+    return option.at(dict(zip(free, (best.x * scale).tolist(), strict=True)))
+
+
+def _named(effect: Effect) -> dict[str, float]:
+    names = (p.name for p in effect_info(effect.name).parameters)
+    return dict(zip(names, effect.values(), strict=True))
+
+
+def _typical(effect: Effect, names: Sequence[str]) -> Array:
+    typical = {p.name: p.typical for p in effect_info(effect.name).parameters}
+    return np.array([typical[name] for name in names])

@@ -1,0 +1,147 @@
+"""Laws of a gear held against one that leads: begun where their curves come closest to its."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, simulate
+from axisight.gap.decide import Standing
+from axisight.gap.evidence import FreeEffect
+from axisight.gap.gear_laws import LAWS, best_law, on_the_curve, others_of_its_gear
+from gap_data import bare_axis, reference
+
+STIFFNESS = 1.46e6
+VALUES = {
+    "backlash": {"half_width_rad": 1e-4, "damped": 0.0},
+    "lost_motion": {"softness": 0.6, "half_width_rad": 1e-4, "rounding": 0.3},
+    "piecewise_stiffness": {"step": 0.8, "within": -0.3, "knee_rad": 1.5e-4},
+    "nonlinear_stiffness": {"cubic_nm_rad3": 2e13},
+    "joint_stiffness": {"relative_change": -0.4},
+}
+FREE = {name: tuple(v for v in values if v != "damped") for name, values in VALUES.items()}
+ABOUT_NOTHING = (-3e-4, 3e-4)
+
+
+def option(name: str, begin: dict, reach: tuple[float, float] = ABOUT_NOTHING, axis: int = 1):
+    return FreeEffect(Effect(name, axis, begin), FREE[name], deflections_rad=reach)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_are_those_of_simulations(name: str):
+    """Newton's law for the driven side, by second differences: 2e-3 at 40 Hz, more where corners are passed."""
+    # Hardly damped: what the gear does is what it does at rest.
+    robot = bare_axis().with_parameters({"axis1.damping": 5.0})
+    step = robot.sample_time_s
+    motion = 0.5 * reference("multisine", 3, 6000, step)
+
+    def of(effects: list[Effect]) -> tuple[np.ndarray, np.ndarray]:
+        data = simulate(robot, motion, effects=effects)
+        assert data.attrs["status"] == "completed"
+        joint = data.joint_position_rad.values[:, 0]
+        delta = robot.gear_ratio[0] * data.motor_position_rad.values[:, 0] - joint
+        return delta[1:-1], np.diff(joint, 2) / step**2
+
+    delta, acceleration = of([])
+    inertia = STIFFNESS * (delta @ acceleration) / (acceleration @ acceleration)
+    delta, acceleration = of([Effect(name, 1, VALUES[name])])
+    torque = STIFFNESS * LAWS[name](delta, VALUES[name], STIFFNESS)
+    off = np.std(torque - inertia * acceleration) / np.std(torque)
+    assert off < 0.02
+    assert np.std(torque - STIFFNESS * delta) > 0.1 * np.std(torque)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_is_found_on_its_own_curve(name: str):
+    """From half the sizes; curves are made of some thousand points, of which sixty are compared."""
+    begin = {k: v * (0.6 if k in FREE[name] else 1.0) for k, v in VALUES[name].items()}
+    found = on_the_curve(Effect(name, 1, VALUES[name]), option(name, begin), STIFFNESS)
+    assert found is not None
+    assert found.effect.parameters == pytest.approx(VALUES[name], rel=0.05)
+
+
+def test_a_middle_without_stiffness_is_play():
+    soft = {"softness": 0.98, "half_width_rad": 2e-4, "rounding": 0.02}
+    begin = option("backlash", {"half_width_rad": 5e-5, "damped": 0.0})
+    found = on_the_curve(Effect("lost_motion", 1, soft), begin, STIFFNESS)
+    assert found.effect.parameters["half_width_rad"] == pytest.approx(2e-4, rel=0.05)
+
+
+def test_about_a_load_a_stiffer_spring_is_a_cube_by_its_slope():
+    """Gravity holds the gear where the cube is as stiff; how far it is turned there no motor angle shows."""
+    stiffer = Effect("joint_stiffness", 1, {"relative_change": 1.5})
+    begin = option("nonlinear_stiffness", {"cubic_nm_rad3": 0.0}, (0.9e-3, 1.1e-3))
+    starts = tuple({"cubic_nm_rad3": share * STIFFNESS / 1e-6} for share in (1.0, 10.0))
+    found = on_the_curve(stiffer, replace(begin, starts=starts), STIFFNESS)
+    cube = found.effect.parameters["cubic_nm_rad3"] / STIFFNESS
+    x = next(r.real for r in np.roots([cube, 0, 1, -1e-3]) if abs(r.imag) < 1e-9)
+    # The slope changes by twice the share that the torque does within the range, to both sides.
+    assert 1 + 3 * cube * x**2 == pytest.approx(2.5, rel=0.03)
+
+
+def test_what_is_no_law_of_a_gear_has_no_curve():
+    friction = Effect("viscous_friction", 1)
+    spring = option("joint_stiffness", {"relative_change": 0.0})
+    assert on_the_curve(friction, spring, STIFFNESS) is None
+    leader = Effect("backlash", 1, VALUES["backlash"])
+    assert on_the_curve(leader, FreeEffect(friction, ("viscous_nm_s_rad",)), STIFFNESS) is None
+    still = option("joint_stiffness", {"relative_change": 0.0}, (0.0, 0.0))
+    assert on_the_curve(leader, still, STIFFNESS) is None
+
+
+def ranked(name: str, score: float, *, renewed: bool = True, beside: tuple = (), free=None):
+    effect = Effect(name, 1, VALUES[name])
+    evidence = SimpleNamespace(effects=(*beside, effect), robot_values={}, renewed=renewed)
+    candidate = SimpleNamespace(effect=effect, free=free or FREE[name])
+    trial = SimpleNamespace(label=effect.label, candidate=candidate, evidence=evidence)
+    return SimpleNamespace(trial=trial, score=score)
+
+
+VISCOUS = Effect("viscous_friction", 1)
+FRICTION = SimpleNamespace(
+    trial=SimpleNamespace(candidate=SimpleNamespace(effect=VISCOUS)), score=0.95
+)
+OPTIONS = [option(name, VALUES[name]) for name in LAWS] + [
+    option("joint_stiffness", VALUES["joint_stiffness"], axis=2)
+]
+
+
+def others(*standing, options=OPTIONS) -> list[str]:
+    return [o.effect.label for o in begun(*standing, options=options)]
+
+
+def begun(*standing, options=OPTIONS) -> list[FreeEffect]:
+    stood = Standing(0, standing, 0.0, 0.0)
+    return others_of_its_gear(best_law(stood), stood, options, bare_axis())
+
+
+def test_the_law_that_explains_most_is_the_one_that_others_begin_on():
+    """Play leads for a middle without stiffness, which has the better curve; elsewhere friction leads."""
+    play, soft, friction = ranked("backlash", 0.8), ranked("lost_motion", 0.9), FRICTION
+    assert best_law(Standing(0, (play, soft), 0.0, 0.0)) is soft
+    assert best_law(Standing(0, (friction, soft), 0.0, 0.0)) is None
+    assert best_law(Standing(1, (soft, play), 0.0, 0.0)) is None
+
+
+def test_laws_that_stay_behind_begin_again_on_the_curve_of_the_leader():
+    leader, near = ranked("piecewise_stiffness", 0.99), ranked("lost_motion", 0.9899)
+    far, borrowed = ranked("joint_stiffness", 0.5), ranked("lost_motion", 0.9899, renewed=False)
+    assert others(leader, near, far) == ["backlash@1", "nonlinear_stiffness@1", "joint_stiffness@1"]
+    # With sensitivities of another, as good is not good enough.
+    assert "lost_motion@1" in others(leader, borrowed)
+
+
+def test_play_begins_again_with_what_is_damped_in_the_gap():
+    play = ranked("backlash", 0.9)
+    (again,) = begun(play, options=OPTIONS[:1])
+    assert again.free == ("half_width_rad", "damped")
+    whole = ranked("backlash", 0.9, free=("half_width_rad", "damped"))
+    assert others(whole, options=OPTIONS[:1]) == []
+
+
+def test_a_second_law_of_a_gear_brings_no_others():
+    play = Effect("backlash", 1, VALUES["backlash"])
+    assert others(ranked("lost_motion", 0.5, beside=(play,))) == []
+    elsewhere = Effect("backlash", 2, VALUES["backlash"])
+    assert others(ranked("lost_motion", 0.5, beside=(elsewhere,))) != []
