@@ -56,16 +56,26 @@ def test_laws_are_those_of_simulations(name: str):
 def test_a_law_is_found_on_its_own_curve(name: str):
     """From half the sizes; curves are made of some thousand points, of which sixty are compared."""
     begin = {k: v * (0.6 if k in FREE[name] else 1.0) for k, v in VALUES[name].items()}
-    found = on_the_curve(Effect(name, 1, VALUES[name]), option(name, begin), STIFFNESS)
-    assert found is not None
+    found, share = on_the_curve(Effect(name, 1, VALUES[name]), option(name, begin), STIFFNESS)
     assert found.effect.parameters == pytest.approx(VALUES[name], rel=0.05)
+    assert share == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_middle_without_stiffness_is_play():
     soft = {"softness": 0.98, "half_width_rad": 2e-4, "rounding": 0.02}
     begin = option("backlash", {"half_width_rad": 5e-5, "damped": 0.0})
-    found = on_the_curve(Effect("lost_motion", 1, soft), begin, STIFFNESS)
+    found, _ = on_the_curve(Effect("lost_motion", 1, soft), begin, STIFFNESS)
     assert found.effect.parameters["half_width_rad"] == pytest.approx(2e-4, rel=0.05)
+
+
+@pytest.mark.parametrize("width", [2e-5, 1e-4, 3e-4])
+def test_a_knee_that_gives_back_what_is_lost_within_is_a_soft_middle(width: float):
+    """Even where it is a hundredth of the deflections: of a knee the width is known."""
+    knee = Effect("piecewise_stiffness", 1, {"step": 0.6, "within": -0.6, "knee_rad": width})
+    soft = {"softness": 0.0, "half_width_rad": 6e-5, "rounding": 0.5}
+    found, _ = on_the_curve(knee, option("lost_motion", soft, (-1.1e-3, 1e-3)), STIFFNESS)
+    # A corner cannot be sharper than two hundredths of the width.
+    assert found.effect.values() == pytest.approx([0.6, width, 0.02], rel=0.01)
 
 
 def test_about_a_load_a_stiffer_spring_is_a_cube_by_its_slope():
@@ -73,7 +83,7 @@ def test_about_a_load_a_stiffer_spring_is_a_cube_by_its_slope():
     stiffer = Effect("joint_stiffness", 1, {"relative_change": 1.5})
     begin = option("nonlinear_stiffness", {"cubic_nm_rad3": 0.0}, (0.9e-3, 1.1e-3))
     starts = tuple({"cubic_nm_rad3": share * STIFFNESS / 1e-6} for share in (1.0, 10.0))
-    found = on_the_curve(stiffer, replace(begin, starts=starts), STIFFNESS)
+    found, _ = on_the_curve(stiffer, replace(begin, starts=starts), STIFFNESS)
     cube = found.effect.parameters["cubic_nm_rad3"] / STIFFNESS
     x = next(r.real for r in np.roots([cube, 0, 1, -1e-3]) if abs(r.imag) < 1e-9)
     # The slope changes by twice the share that the torque does within the range, to both sides.
@@ -108,10 +118,10 @@ OPTIONS = [option(name, VALUES[name]) for name in LAWS] + [
 
 
 def others(*standing, options=OPTIONS) -> list[str]:
-    return [o.effect.label for o in begun(*standing, options=options)]
+    return [o.effect.label for o, _ in begun(*standing, options=options)]
 
 
-def begun(*standing, options=OPTIONS) -> list[FreeEffect]:
+def begun(*standing, options=OPTIONS) -> list[tuple[FreeEffect, dict[str, float]]]:
     stood = Standing(0, standing, 0.0, 0.0)
     return others_of_its_gear(best_law(stood), stood, options, bare_axis())
 
@@ -134,7 +144,7 @@ def test_laws_that_stay_behind_begin_again_on_the_curve_of_the_leader():
 
 def test_play_begins_again_with_what_is_damped_in_the_gap():
     play = ranked("backlash", 0.9)
-    (again,) = begun(play, options=OPTIONS[:1])
+    ((again, _),) = begun(play, options=OPTIONS[:1])
     assert again.free == ("half_width_rad", "damped")
     whole = ranked("backlash", 0.9, free=("half_width_rad", "damped"))
     assert others(whole, options=OPTIONS[:1]) == []

@@ -17,7 +17,8 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.stated import PLAY
 from axisight.fitting import robot_parameters
 from axisight.gap.decide import Ranked, Standing, Trial
-from axisight.gap.evidence import FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.usual import in_common
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -61,10 +62,31 @@ LAWS: Mapping[str, Law] = {
 # Share of what the leader explains from which a law is where it belongs.
 _NEAR = 0.998
 _HALF = 0.5
-_POINTS = 60
+_POINTS = 200
+# By how much the stiffness may be another, and what that counts beside a deflection.
+_OTHERS = 0.25
+_HARDLY = 0.1
 # Deflections looked at, in the largest of the linear spring; and how finely.
 _WIDEST = 20.0
 _FINE = 8_001
+
+
+def begun_on_curves(
+    standings: Sequence[Standing], led: set[str], options: Sequence[FreeEffect], robot: Robot
+) -> list[tuple[Evidence, FreeEffect, dict[str, float]]]:
+    """Return what begins on the curves of laws that were not among those that ``led``, which they join.
+
+    Each with the model whose last effect it takes the place of, and with where the simulator's own
+    parameters begin.
+    """
+    begun = []
+    for standing in standings:
+        law = best_law(standing)
+        if law is not None and law.trial.label not in led:
+            led.add(law.trial.label)
+            others = others_of_its_gear(law, standing, options, robot)
+            begun += [(law.trial.evidence, *other) for other in others]
+    return begun
 
 
 def best_law(standing: Standing) -> Ranked | None:
@@ -82,8 +104,10 @@ def _is_law(one: Ranked) -> bool:
 
 def others_of_its_gear(
     best: Ranked, standing: Standing, options: Sequence[FreeEffect], robot: Robot
-) -> list[FreeEffect]:
+) -> list[tuple[FreeEffect, dict[str, float]]]:
     """Return the other laws of the gear of an axis, begun on the curve of the ``best``.
+
+    Each with the values that the simulator's own parameters begin at.
 
     Those that explain as much with sensitivities of their own are where they belong; none where the model
     has a law of the gear already: another one mends that. Play is begun with what is damped in the gap free.
@@ -102,7 +126,11 @@ def others_of_its_gear(
         for option in options
         if option.effect.axis == axis and option.effect.label not in done
     )
-    return [option for option in begun if option is not None]
+    return [
+        (found[0], {**evidence.robot_values, name: found[1] * stiffness})
+        for found in begun
+        if found is not None
+    ]
 
 
 def _in_place(one: Trial) -> bool:
@@ -124,9 +152,12 @@ def _damped_too(option: FreeEffect, leader: Effect) -> FreeEffect:
     return replace(option.at({PLAY[1]: begin}), free=(*option.free, PLAY[1]))
 
 
-def on_the_curve(leader: Effect, option: FreeEffect, stiffness_nm_rad: float) -> FreeEffect | None:
+def on_the_curve(
+    leader: Effect, option: FreeEffect, stiffness_nm_rad: float
+) -> tuple[FreeEffect, float] | None:
     """Return a law of the same gear begun where its curve comes closest to that of ``leader``.
 
+    With the share of the stiffness that its spring begins with: parameters of the simulator are fitted beside it.
     What a gear is turned by the mean torque, such as that of gravity, no motor angle shows: curves count from there.
     None where either is no such law, or nothing is known of the deflections. ``stiffness_nm_rad``: of the
     spring without laws, as it was re-fitted.
@@ -139,28 +170,34 @@ def on_the_curve(leader: Effect, option: FreeEffect, stiffness_nm_rad: float) ->
     grid = np.linspace(-_WIDEST * top, _WIDEST * top, _FINE)
     torque = np.linspace(*reach, _POINTS)
 
-    def turned(law: Law, values: Mapping[str, float]) -> Array:
+    def turned(law: Law, values: Mapping[str, float], share: float = 1.0) -> Array:
         """Return how far a law turns under the torques, from where it is in the mean."""
-        held = np.maximum.accumulate(law(grid, values, stiffness_nm_rad))
+        held = np.maximum.accumulate(share * law(grid, values, share * stiffness_nm_rad))
         deflection = np.interp(torque, held, grid)
         return np.asarray((deflection - deflection.mean()) / top)
 
     wanted = turned(other, _named(leader))
     # What is damped no curve shows.
     free = [name for name in option.free if name != PLAY[1]]
-    low, high = np.transpose([option.limits(name) for name in free])
-    scale, values = _typical(option.effect, free), _named(option.effect)
+    low, high = np.transpose([(1 - _OTHERS, 1 + _OTHERS), *(option.limits(n) for n in free)])
+    scale = np.array([1.0, *_typical(option.effect, free)])
+    values = _named(option.effect)
 
     def misfit(scaled: Array) -> Array:
-        return turned(mine, {**values, **dict(zip(free, scaled * scale, strict=True))}) - wanted
+        share, *found = scaled * scale
+        off = turned(mine, {**values, **dict(zip(free, found, strict=True))}, share) - wanted
+        # Of two that do alike the one that leaves the stiffness as it is.
+        return np.append(off, _HARDLY * (share - 1))
 
-    begun = [[{**values, **start}[name] for name in free] for start in ({}, *option.starts)]
+    # Of a knee the width of a soft middle is known; the rest is found from there.
+    starts = (in_common(leader, effect_info(option.effect.name)), {}, *option.starts)
+    begun = [[1.0, *({**values, **start}[name] for name in free)] for start in starts]
     found = [
         least_squares(misfit, np.clip(b, low, high) / scale, bounds=(low / scale, high / scale))
         for b in begun
     ]
-    best = min(found, key=lambda r: float(r.cost))
-    return option.at(dict(zip(free, (best.x * scale).tolist(), strict=True)))
+    share, *best = (min(found, key=lambda r: float(r.cost)).x * scale).tolist()
+    return option.at(dict(zip(free, best, strict=True))), share
 
 
 def _named(effect: Effect) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -16,7 +16,7 @@ from axisight.errors import InputError
 from axisight.gap.decide import FORMULA_ERROR, Ranked, Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.gear_laws import best_law, others_of_its_gear
+from axisight.gap.gear_laws import begun_on_curves
 from axisight.gap.kept import KeptColumns
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
@@ -230,29 +230,27 @@ class Trials:
         One that leads then has a curve of its own.
         """
         led: set[str] = set()
-        while True:
-            begun = []
-            for standing in self.standings(trials):
-                law = best_law(standing)
-                if law is not None and law.trial.label not in led:
-                    led.add(law.trial.label)
-                    others = others_of_its_gear(law, standing, options, self.fitter.robot)
-                    begun += [(law.trial.evidence, other) for other in others]
-            if not begun:
-                return trials
+        while begun := begun_on_curves(self.standings(trials), led, options, self.fitter.robot):
             known = {t.label: t for t in trials}
-            for found in pool.map(lambda pair: self._in_its_place(*pair), begun):
+            for found in pool.map(lambda one: self._in_its_place(*one), begun):
                 if found is not None:
                     before = known.get(found.label)
                     if before is None or found.evidence.total < before.evidence.total:
                         known[found.label] = found
             trials = list(known.values())
+        return trials
 
-    def _in_its_place(self, leader: Evidence, option: FreeEffect) -> Trial | None:
-        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated."""
+    def _in_its_place(
+        self, leader: Evidence, option: FreeEffect, values: Mapping[str, float]
+    ) -> Trial | None:
+        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated.
+
+        ``values``: where the simulator's own parameters begin.
+        """
         part = self.rough or self.fitter
         try:
-            found = part.fit([*leader.free[:-1], option], leader, refreshes=_RENEWALS)
+            free = [*leader.free[:-1], option]
+            found = part.fit(free, leader, robot_values=values, refreshes=_RENEWALS)
             found = settled(part, found.free, found)
             if part is not self.fitter:
                 found = self._looked_at(found)

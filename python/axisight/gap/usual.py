@@ -27,14 +27,14 @@ def begun_where_it_ended(
     for option in options:
         effect = option.effect
         if effect.name in usual and effect.axis == fitted.axis and effect.label not in tried:
-            shared = _in_common(fitted, effect_info(effect.name))
+            shared = in_common(fitted, effect_info(effect.name))
             if shared:
                 start = Start(option.at(shared), leader.evidence.robot_values, 0.0)
                 starts.append(start)
     return starts
 
 
-def _in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
+def in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
     """Return the values of a fitted effect that another one takes, of the same quantity.
 
     That is one with a unit; the same name says so, or the same unit where only one parameter has it.

@@ -37,6 +37,8 @@ fn at_work(info: &EffectInfo) -> Vec<f64> {
         Role::Amplitude => p.neutral + 0.7 * p.typical,
         // Orders of harmonics that are switched off; different ones.
         Role::Shape if p.neutral <= p.lower && p.name.starts_with("order") => 2.0 + i as f64 / 3.0,
+        // Between its bounds.
+        Role::Shape if p.name == "damped" => p.typical,
         Role::Shape => p.neutral,
     };
     info.parameters.iter().enumerate().map(value).collect()
@@ -117,18 +119,20 @@ fn derivatives_agree_with_finite_differences() {
     let mut robot = robot(PRESET);
     robot.operating_point = vec![0.1, 0.3, -0.2];
     for info in EFFECTS {
-        // Axis 2 carries gravity, so that its gear does not leave its side of a gap; beyond a knee it
-        // would not come back to it, and lowering its load it draws no power.
+        // Axis 2 carries gravity, so that its gear does not leave its side of a gap or come back to a
+        // knee, and lowering its load it draws no power.
         let own = ["knee", "softness", "sag"];
         let unloaded = |name: &str| own.iter().any(|start| name.starts_with(start));
         let axis = usize::from(!info.parameters.iter().any(|p| unloaded(p.name)));
-        let place = (info.scope != Scope::Arm).then_some(axis);
         let start = at_work(info);
         // Rounding has no derivative: it is read off the logs, no fit asks for one.
         if info.name == "position_quantization" {
             continue;
         }
         for (i, p) in info.parameters.iter().enumerate() {
+            // What is damped in a gap shows where it is crossed, which is no place to change its width.
+            let axis = if p.name == "damped" { 0 } else { axis };
+            let place = (info.scope != Scope::Arm).then_some(axis);
             // Orders multiply a motor angle of 70 rad.
             let share = if p.name.starts_with("order") {
                 1e-4
@@ -373,6 +377,8 @@ fn strongly_nonlinear_spring_finds_its_rest() {
 fn as_meant(info: &EffectInfo) -> Box<dyn Kernel<f64>> {
     let value = |p: &axisight_core::effects::ParameterInfo| match p.role {
         Role::Amplitude => p.typical,
+        // Between its bounds.
+        Role::Shape if p.name == "damped" => p.typical,
         Role::Shape => p.neutral,
     };
     let values: Vec<f64> = info.parameters.iter().map(value).collect();

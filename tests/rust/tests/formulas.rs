@@ -347,7 +347,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
             "stribeck_friction",
             &[value(6), value(8), fixed(STRIBECK_SPEED), fixed(SMOOTHING)],
         ),
-        setting("backlash", &[value(7)]),
+        setting("backlash", &[value(7), fixed(0.0)]),
         setting("nonlinear_stiffness", &[value(3)]),
         ripple,
     ];

@@ -427,7 +427,7 @@ fn misuse_is_refused_by_name() {
     let robot = robot(PRESET);
     for (name, parameters) in [
         ("coulomb_friction", vec![0.5, 0.5]),
-        ("backlash", vec![1e-4]),
+        ("backlash", vec![1e-4, 0.0]),
         ("quadratic_drag", vec![1e-3]),
         ("transmission_error", vec![2.0, 1e-4, 0.0, 1.0, 0.0, 0.0]),
     ] {
@@ -438,7 +438,7 @@ fn misuse_is_refused_by_name() {
         }
     }
     // At its neutral value an effect does nothing, and may stay.
-    let neutral = effect("backlash", Some(0), &[0.0]);
+    let neutral = effect("backlash", Some(0), &[0.0; 2]);
     assert!(LinearPlant::new(&robot, &[neutral], &[0.0; 3]).is_ok());
     for (settings, start, message) in [
         (

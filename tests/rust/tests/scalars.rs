@@ -13,7 +13,7 @@ fn settings<S: Scalar>() -> Vec<EffectSetting<S>> {
     vec![
         effect("stribeck_friction", Some(0), &[0.5, 0.3, 3.0, 0.1]),
         effect("nonlinear_stiffness", Some(1), &[2e11]),
-        effect("backlash", Some(0), &[1e-4]),
+        effect("backlash", Some(0), &[1e-4, 0.3]),
         effect(
             "torque_ripple",
             Some(2),
