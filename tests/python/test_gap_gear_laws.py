@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from axisight import Effect, simulate
+from axisight.effects.gear_curves import CURVES
 from axisight.gap.decide import Standing
 from axisight.gap.evidence import FreeEffect
-from axisight.gap.gear_laws import LAWS, best_law, on_the_curve, others_of_its_gear
+from axisight.gap.gear_laws import best_law, on_the_curve, others_of_its_gear
 from gap_data import bare_axis, reference
 
 STIFFNESS = 1.46e6
@@ -28,7 +29,7 @@ def option(name: str, begin: dict, reach: tuple[float, float] = ABOUT_NOTHING, a
     return FreeEffect(Effect(name, axis, begin), FREE[name], deflections_rad=reach)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", CURVES)
 def test_laws_are_those_of_simulations(name: str):
     """Newton's law for the driven side, by second differences: 2e-3 at 40 Hz, more where corners are passed."""
     # Hardly damped: what the gear does is what it does at rest.
@@ -46,13 +47,13 @@ def test_laws_are_those_of_simulations(name: str):
     delta, acceleration = of([])
     inertia = STIFFNESS * (delta @ acceleration) / (acceleration @ acceleration)
     delta, acceleration = of([Effect(name, 1, VALUES[name])])
-    torque = STIFFNESS * LAWS[name](delta, VALUES[name], STIFFNESS)
+    torque = STIFFNESS * CURVES[name](delta, VALUES[name], STIFFNESS)
     off = np.std(torque - inertia * acceleration) / np.std(torque)
     assert off < 0.02
     assert np.std(torque - STIFFNESS * delta) > 0.1 * np.std(torque)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", CURVES)
 def test_a_law_is_found_on_its_own_curve(name: str):
     """From half the sizes; curves are made of some thousand points, of which sixty are compared."""
     begin = {k: v * (0.6 if k in FREE[name] else 1.0) for k, v in VALUES[name].items()}
@@ -112,7 +113,7 @@ VISCOUS = Effect("viscous_friction", 1)
 FRICTION = SimpleNamespace(
     trial=SimpleNamespace(candidate=SimpleNamespace(effect=VISCOUS)), score=0.95
 )
-OPTIONS = [option(name, VALUES[name]) for name in LAWS] + [
+OPTIONS = [option(name, VALUES[name]) for name in CURVES] + [
     option("joint_stiffness", VALUES["joint_stiffness"], axis=2)
 ]
 

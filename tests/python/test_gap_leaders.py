@@ -1,5 +1,6 @@
 """Which leaders of a round are fitted again before one of them is believed."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -143,6 +144,7 @@ def test_a_rival_left_far_behind_on_part_of_the_data_is_not_looked_at_on_all(
         screen=SimpleNamespace(model=fit_of("none")),
         fitter=whole,
     )
+    field._looked_at = partial(Trials._looked_at, field)
     found = Trials._compared(field, fit_of("none"), fit_of("leader"))
     assert (found is not None) == looked_at == bool(looked)
     # A leader is looked at, however little it takes away.

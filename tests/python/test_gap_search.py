@@ -133,6 +133,9 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _worth_refining(self, trials, crooked, *, even_felt):
             return [t for t in trials if t.label not in self.done]
 
+        def _with_gears(self, pool, trials, options):
+            return trials
+
     def settled(fitter, free_, start):
         if start is whole.evidence:
             raise InputError("the simulation failed")
@@ -146,7 +149,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     field.done = set()
     monkeypatch.setattr(trials, "settled", settled)
     monkeypatch.setattr(trials, "trial", lambda candidate, evidence, model: other)
-    assert Trials.refined(field, [whole, other], 1) == [other]
+    assert Trials.refined(field, [whole, other], [], 1) == [other]
     assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}
 
 

@@ -447,15 +447,15 @@ def coupling(monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_effects_between_axes_have_both_in_their_label(coupling: str) -> None:
-    effect = Effect(coupling, axes=(5, 6), parameters={"half_width_rad": 1e-3})
+    effect = Effect(coupling, axes=(5, 6), parameters={"half_width_rad": 1e-3, "damped": 0.0})
     assert effect.label == "coupling@5,6" and effect.place == (5, 6)
-    assert effects.core_effects([effect]) == [("coupling", (5, 6), [1e-3])]
-    assert effects.effect_of_core(("coupling", (5, 6), [1e-3])) == effect
+    assert effects.core_effects([effect]) == [("coupling", (5, 6), [1e-3, 0.0])]
+    assert effects.effect_of_core(("coupling", (5, 6), [1e-3, 0.0])) == effect
     assert effect.with_values({"half_width_rad": 2e-3}).axes == (5, 6)
     assert effect != replace(effect, axes=(6, 5))
     text = stated(ARM.toml, [effect])
     assert tomllib.loads(text)["effect"] == [
-        {"name": "coupling", "axes": [5, 6], "half_width_rad": 1e-3}
+        {"name": "coupling", "axes": [5, 6], "half_width_rad": 1e-3, "damped": 0.0}
     ]
 
 

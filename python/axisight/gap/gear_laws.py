@@ -6,7 +6,7 @@ against the leader where its curve comes closest to that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from axisight.effects import Effect, effect_info
+from axisight.effects.gear_curves import CURVES, Curve
 from axisight.effects.stated import PLAY
 from axisight.fitting import robot_parameters
 from axisight.gap.decide import Ranked, Standing, Trial
@@ -22,42 +23,6 @@ from axisight.gap.usual import in_common
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
-Law = Callable[[Array, Mapping[str, float], float], Array]
-
-
-def _play(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
-    width = p["half_width_rad"]
-    return x - np.clip(x, -width, width)
-
-
-def _soft(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
-    width, corner = p["half_width_rad"], p["rounding"] * p["half_width_rad"]
-    middle = np.hypot(x + width, corner) - np.hypot(x - width, corner)
-    scale = float(np.hypot(1.0, p["rounding"])) / 2
-    return np.asarray(x - p["softness"] * scale * middle)
-
-
-def _knee(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
-    beyond = x - np.clip(x, -p["knee_rad"], p["knee_rad"])
-    return (1 + p["within"]) * x + p["step"] * beyond
-
-
-def _cube(x: Array, p: Mapping[str, float], stiffness: float) -> Array:
-    return x + p["cubic_nm_rad3"] / stiffness * x**3
-
-
-def _spring(x: Array, p: Mapping[str, float], _stiffness: float) -> Array:
-    return (1 + p["relative_change"]) * x
-
-
-LAWS: Mapping[str, Law] = {
-    "backlash": _play,
-    "lost_motion": _soft,
-    "piecewise_stiffness": _knee,
-    "nonlinear_stiffness": _cube,
-    "joint_stiffness": _spring,
-}
-"""Torque over stiffness [rad] by deflection [rad]: equations of the table, corners of play and knee sharp."""
 
 # Share of what the leader explains from which a law is where it belongs.
 _NEAR = 0.998
@@ -99,7 +64,7 @@ def best_law(standing: Standing) -> Ranked | None:
 
 
 def _is_law(one: Ranked) -> bool:
-    return one.trial.candidate.effect.name in LAWS
+    return one.trial.candidate.effect.name in CURVES
 
 
 def others_of_its_gear(
@@ -115,7 +80,7 @@ def others_of_its_gear(
     evidence, axis = best.trial.evidence, standing.axis + 1
     leader = evidence.effects[-1]
     name = robot.axis_parameter(axis, "stiffness")
-    laws = [e for e in evidence.effects if e.axis == axis and e.name in LAWS]
+    laws = [e for e in evidence.effects if e.axis == axis and e.name in CURVES]
     if laws != [leader] or name is None:
         return []
     near = _NEAR * best.score
@@ -162,7 +127,7 @@ def on_the_curve(
     None where either is no such law, or nothing is known of the deflections. ``stiffness_nm_rad``: of the
     spring without laws, as it was re-fitted.
     """
-    mine, other = LAWS.get(option.effect.name), LAWS.get(leader.name)
+    mine, other = CURVES.get(option.effect.name), CURVES.get(leader.name)
     reach = option.deflections_rad
     if mine is None or other is None or reach is None or reach[0] == reach[1]:
         return None
@@ -170,7 +135,7 @@ def on_the_curve(
     grid = np.linspace(-_WIDEST * top, _WIDEST * top, _FINE)
     torque = np.linspace(*reach, _POINTS)
 
-    def turned(law: Law, values: Mapping[str, float], share: float = 1.0) -> Array:
+    def turned(law: Curve, values: Mapping[str, float], share: float = 1.0) -> Array:
         """Return how far a law turns under the torques, from where it is in the mean."""
         held = np.maximum.accumulate(share * law(grid, values, share * stiffness_nm_rad))
         deflection = np.interp(torque, held, grid)
