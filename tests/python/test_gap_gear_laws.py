@@ -10,7 +10,7 @@ from axisight import Effect, simulate
 from axisight.effects.gear_curves import CURVES
 from axisight.gap.decide import Standing
 from axisight.gap.evidence import FreeEffect
-from axisight.gap.gear_laws import best_law, on_the_curve, others_of_its_gear
+from axisight.gap.gear_laws import begun_on_curves, best_law, on_the_curve, others_of_its_gear
 from gap_data import bare_axis, reference
 
 STIFFNESS = 1.46e6
@@ -91,6 +91,16 @@ def test_about_a_load_a_stiffer_spring_is_a_cube_by_its_slope():
     assert 1 + 3 * cube * x**2 == pytest.approx(2.5, rel=0.03)
 
 
+def test_what_cannot_bend_as_the_leader_does_is_no_rival():
+    """Play and a middle without stiffness bend alike; a spring hardly bends, a cube not at one place."""
+    play = Effect("backlash", 1, VALUES["backlash"])
+    kept = [o.effect.name for o in OPTIONS[:5] if on_the_curve(play, o, STIFFNESS) is not None]
+    assert kept == ["backlash", "lost_motion", "piecewise_stiffness"]
+    # Of what is as good as straight nobody can say how it bends.
+    tiny = Effect("backlash", 1, {"half_width_rad": 2e-6, "damped": 0.0})
+    assert all(on_the_curve(tiny, o, STIFFNESS) is not None for o in OPTIONS[:5])
+
+
 def test_what_is_no_law_of_a_gear_has_no_curve():
     friction = Effect("viscous_friction", 1)
     spring = option("joint_stiffness", {"relative_change": 0.0})
@@ -138,17 +148,32 @@ def test_the_law_that_explains_most_is_the_one_that_others_begin_on():
 def test_laws_that_stay_behind_begin_again_on_the_curve_of_the_leader():
     leader, near = ranked("piecewise_stiffness", 0.99), ranked("lost_motion", 0.9899)
     far, borrowed = ranked("joint_stiffness", 0.5), ranked("lost_motion", 0.9899, renewed=False)
-    assert others(leader, near, far) == ["backlash@1", "nonlinear_stiffness@1", "joint_stiffness@1"]
+    # Play cannot bend like this knee: it is no law that is left to try.
+    assert others(leader, near, far) == ["nonlinear_stiffness@1"]
     # With sensitivities of another, as good is not good enough.
     assert "lost_motion@1" in others(leader, borrowed)
 
 
-def test_play_begins_again_with_what_is_damped_in_the_gap():
-    play = ranked("backlash", 0.9)
-    ((again, _),) = begun(play, options=OPTIONS[:1])
+def test_play_begins_again_with_what_is_damped_in_the_gap_before_others_do():
+    play = ranked("backlash", 0.99)
+    ((again, _),) = begun(play)
     assert again.free == ("half_width_rad", "damped")
-    whole = ranked("backlash", 0.9, free=("half_width_rad", "damped"))
-    assert others(whole, options=OPTIONS[:1]) == []
+    whole = ranked("backlash", 0.99, free=again.free)
+    assert others(whole) == ["lost_motion@1", "piecewise_stiffness@1"]
+    # Those would have to become play to be as good.
+    assert others(ranked("backlash", 0.999, free=again.free)) == []
+
+
+def test_play_that_leads_once_more_is_looked_at_once_more():
+    led: set[str] = set()
+
+    def standing(**kwargs) -> list[Standing]:
+        return [Standing(0, (ranked("backlash", 0.99, **kwargs),), 0.0, 0.0)]
+
+    assert len(begun_on_curves(standing(), led, OPTIONS, bare_axis())) == 1
+    assert begun_on_curves(standing(), led, OPTIONS, bare_axis()) == []
+    whole = standing(free=("half_width_rad", "damped"))
+    assert len(begun_on_curves(whole, led, OPTIONS, bare_axis())) == 2
 
 
 def test_a_second_law_of_a_gear_brings_no_others():

@@ -104,6 +104,23 @@ def test_coordinates_that_nothing_shows_are_idle():
     assert cost((2.0, 1.0, 1.0, 0.0), alike=20.0) == 2.0
 
 
+def test_a_balancer_that_stands_upright_has_one_number():
+    found = load((0.0, 0.0, 1.0, 0.0))
+    names = ("sine_nm", "cosine_nm")
+    effect = Effect("gravity_compensation", 1, {"sine_nm": 1.0, "cosine_nm": 1e-3})
+    upright = replace(
+        found,
+        effects=(effect,),
+        free=(FreeEffect(effect, names),),
+        parameters=((None, "p"), (None, "q"), *((0, n) for n in names)),
+    )
+    assert trial(upright.free[0], upright).cost == 1.0
+    askew = replace(
+        upright, effects=(Effect("gravity_compensation", 1, dict.fromkeys(names, 1.0)),)
+    )
+    assert trial(askew.free[0], askew).cost == 2.0
+
+
 def test_of_a_centre_of_mass_one_coordinate_stays():
     found = load((0.0, 0.0, 0.0, 0.0))
     names = ("x_m", "y_m", "z_m")

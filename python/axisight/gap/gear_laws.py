@@ -31,6 +31,10 @@ _POINTS = 200
 # By how much the stiffness may be another, and what that counts beside a deflection.
 _OTHERS = 0.25
 _HARDLY = 0.1
+# A law bends as the leader does where it leaves no more than this share of the bend; less than a
+# hundredth of the largest deflection is none.
+_FOLLOWED = 0.5
+_STRAIGHT = 0.01
 # Deflections looked at, in the largest of the linear spring; and how finely.
 _WIDEST = 20.0
 _FINE = 8_001
@@ -47,8 +51,8 @@ def begun_on_curves(
     begun = []
     for standing in standings:
         law = best_law(standing)
-        if law is not None and law.trial.label not in led:
-            led.add(law.trial.label)
+        if law is not None and (label := _led_as(law.trial)) not in led:
+            led.add(label)
             others = others_of_its_gear(law, standing, options, robot)
             begun += [(law.trial.evidence, *other) for other in others]
     return begun
@@ -63,6 +67,11 @@ def best_law(standing: Standing) -> Ranked | None:
     return max(laws, key=lambda r: r.score)
 
 
+def _led_as(law: Trial) -> str:
+    """Return what a law that leads is remembered by: play with what is damped in its gap is another."""
+    return " ".join((law.label, *law.candidate.free))
+
+
 def _is_law(one: Ranked) -> bool:
     return one.trial.candidate.effect.name in CURVES
 
@@ -75,7 +84,9 @@ def others_of_its_gear(
     Each with the values that the simulator's own parameters begin at.
 
     Those that explain as much with sensitivities of their own are where they belong; none where the model
-    has a law of the gear already: another one mends that. Play is begun with what is damped in the gap free.
+    has a law of the gear already: another one mends that. Play is first fitted with what is damped in the
+    gap free; the others have no corners, and come as close where they are nearly play themselves, which is
+    needed only where it leaves something.
     """
     evidence, axis = best.trial.evidence, standing.axis + 1
     leader = evidence.effects[-1]
@@ -86,6 +97,11 @@ def others_of_its_gear(
     near = _NEAR * best.score
     done = {r.trial.label for r in standing.ranked if r.score >= near and _in_place(r.trial)}
     stiffness = evidence.robot_values.get(name, robot_parameters(robot)[name])
+    if leader.name == PLAY[0]:
+        if not _in_place(best.trial):
+            options = [o for o in options if o.effect.name == PLAY[0]]
+        elif best.score >= _NEAR:
+            return []
     begun = (
         on_the_curve(leader, _damped_too(option, leader), stiffness)
         for option in options
@@ -124,8 +140,8 @@ def on_the_curve(
 
     With the share of the stiffness that its spring begins with: parameters of the simulator are fitted beside it.
     What a gear is turned by the mean torque, such as that of gravity, no motor angle shows: curves count from there.
-    None where either is no such law, or nothing is known of the deflections. ``stiffness_nm_rad``: of the
-    spring without laws, as it was re-fitted.
+    None where either is no such law, nothing is known of the deflections, or the law cannot bend as the
+    leader does. ``stiffness_nm_rad``: of the spring without laws, as it was re-fitted.
     """
     mine, other = CURVES.get(option.effect.name), CURVES.get(leader.name)
     reach = option.deflections_rad
@@ -161,8 +177,19 @@ def on_the_curve(
         least_squares(misfit, np.clip(b, low, high) / scale, bounds=(low / scale, high / scale))
         for b in begun
     ]
-    share, *best = (min(found, key=lambda r: float(r.cost)).x * scale).tolist()
+    closest = min(found, key=lambda r: float(r.cost))
+    bend, left = (_bend(torque, x) for x in (wanted, closest.fun[:-1]))
+    if left > max(_FOLLOWED * bend, _STRAIGHT):
+        return None
+    share, *best = (closest.x * scale).tolist()
     return option.at(dict(zip(free, best, strict=True))), share
+
+
+def _bend(torque: Array, deflection: Array) -> float:
+    """Return how far a deflection is from a straight line over the torque, root mean square."""
+    centred = torque - torque.mean()
+    line = centred * float(centred @ deflection) / float(centred @ centred)
+    return float(np.std(deflection - line))
 
 
 def _named(effect: Effect) -> dict[str, float]:

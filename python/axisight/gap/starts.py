@@ -356,6 +356,12 @@ def _point_mass(trial: Trial) -> FreeEffect | None:
     )
 
 
+def _pulling_back(trial: Trial) -> FreeEffect:
+    """Begin at the neutral value; what pushes on is no cable, but gravity that is not balanced."""
+    stiffness = trial.info.parameters[0]
+    return replace(_neutral(trial), bounds={stiffness.name: (0.0, stiffness.upper)})
+
+
 def _balancer(trial: Trial) -> FreeEffect | None:
     """Begin at the neutral values; what slides has no angle that gravity turns with."""
     return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
@@ -495,7 +501,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "quadratic_drag": _neutral,
     "load_dependent_friction": _law(smoothing_rad_s=_SMOOTHING),
     "gravity_compensation": _balancer,
-    "cable_stiffness": _neutral,
+    "cable_stiffness": _pulling_back,
     "transmission_error": _gear_waves,
     "torque_saturation": _limit,
     "gear_hysteresis": _slip,

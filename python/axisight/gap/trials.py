@@ -254,7 +254,8 @@ class Trials:
             found = settled(part, found.free, found)
             if part is not self.fitter:
                 found = self._looked_at(found)
-        except InputError:
+        except InputError as error:
+            self.skipped.setdefault(option.effect.label, str(error))
             return None
         return trial(option, found, self.model)
 
