@@ -49,7 +49,7 @@ def mjcf(machine: Machine, step_s: float) -> str:
             f'<inertial pos="0 0 0" mass="{ends.tip_kg!r}" diaginertia="1e-6 1e-6 1e-6"/></body>'
         )
     return f"""<mujoco><compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
-    <option timestep="{step_s!r}" integrator="RK4" gravity="{_vector(robot.gravity_m_s2)}">
+    <option timestep="{step_s!r}" integrator="RK4" gravity="{_vector(machine.gravity_m_s2())}">
     <flag contact="disable"/></option>
     <worldbody>{parts.rotors}{parts.bodies}{parts.close}</worldbody>
     <tendon>{parts.tendons}</tendon><actuator>{parts.actuators}</actuator></mujoco>"""

@@ -36,6 +36,16 @@ class Place:
     """Of the gear [Nm s/rad]."""
 
     @property
+    def joint(self) -> Array:
+        """Angle of the joint [rad]."""
+        return np.asarray(self.gear_ratio * self.motor - self.deflection)
+
+    @property
+    def joint_speed(self) -> Array:
+        """Of the joint [rad/s]."""
+        return np.asarray(self.gear_ratio * self.motor_speed - self.deflection_rate)
+
+    @property
     def gear_torque(self) -> Array:
         """Of spring and damper, on the joint [Nm]."""
         return np.asarray(self.stiffness * self.deflection + self.damping * self.deflection_rate)
@@ -112,6 +122,33 @@ class DahlFriction(Formula):
         """Keep the strain."""
         self.torque_nm = -np.asarray(self.torque(at)[0])
         self.motor = at.motor
+
+
+@dataclass
+class OneSidedFriction(Formula):
+    """Dry friction that is larger one way, as an arc tangent of speed."""
+
+    forward_nm: float
+    backward_nm: float
+    corner_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        size = np.where(at.motor_speed > 0, self.forward_nm, self.backward_nm)
+        return -size * (2 / np.pi) * np.arctan(at.motor_speed / self.corner_rad_s), 0.0
+
+
+@dataclass
+class Churning(Formula):
+    """Oil that is churned: the power 7/4 of speed, of turbulent flow (Blasius 1913)."""
+
+    torque_nm: float
+    speed_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        share = at.motor_speed / self.speed_rad_s
+        return -self.torque_nm * np.sign(share) * np.abs(share) ** 1.75, 0.0
 
 
 @dataclass

@@ -108,6 +108,32 @@ class LoadFriction(Law):
         return -self.share * load * v / (abs(v) + self.corner_rad_s), 0.0
 
 
+@dataclass
+class OneSidedFriction(Law):
+    """Dry friction that is larger one way, sign smoothed by v / (|v| + v0)."""
+
+    forward_nm: float
+    backward_nm: float
+    corner_rad_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        v = at.motor_speed
+        size = self.forward_nm if v > 0 else self.backward_nm
+        return -size * v / (abs(v) + self.corner_rad_s), 0.0
+
+
+@dataclass
+class Drag(Law):
+    """Friction with the square of speed."""
+
+    drag_nm_s2_rad2: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        return -self.drag_nm_s2_rad2 * at.motor_speed * abs(at.motor_speed), 0.0
+
+
 class MaxwellSlip(Law):
     """A gear that slips: springs in parallel, each through a slider that gives way."""
 

@@ -58,13 +58,15 @@ class Ends:
     """What differs at both ends of the arm.
 
     ``tip_kg`` at ``tip_m`` in the frame of the last link; ``rocks_rad_nm``: compliance of the base about
-    x and y, none where it is zero, ``rocks_s`` their damping over stiffness.
+    x and y, none where it is zero, ``rocks_s`` their damping over stiffness; ``tilted_rad``: by how much the
+    base is turned about its y, then about its x.
     """
 
     tip_kg: float = 0.0
     tip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rocks_rad_nm: tuple[float, float] = (0.0, 0.0)
     rocks_s: float = 0.0
+    tilted_rad: tuple[float, float] = (0.0, 0.0)
 
     @property
     def springs(self) -> list[tuple[tuple[float, float, float], float]]:
@@ -96,6 +98,12 @@ class Machine:
         at = np.arange(len(reference), dtype=np.float64)
         wanted = np.minimum(at * (1 + self.fast), at[-1])
         return np.asarray(scipy.interpolate.CubicSpline(at, reference)(wanted))
+
+    def gravity_m_s2(self) -> Array:
+        """Return gravity (3,) as the base feels it."""
+        about_x, about_y = self.ends.tilted_rad
+        turned = scipy.spatial.transform.Rotation.from_euler("yx", [about_y, about_x])
+        return np.asarray(turned.inv().apply(self.robot.gravity_m_s2))
 
     def along(self) -> Array:
         """Return by how much each motor's turn turns the joints' gears (n_axes, n_axes): its own and the next."""

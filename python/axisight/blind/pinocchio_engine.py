@@ -90,7 +90,7 @@ class _Chain:
 def _chain(machine: Machine) -> _Chain:
     robot, ends = machine.robot, machine.ends
     chain = _Chain(pinocchio.Model())
-    chain.model.gravity.linear = np.asarray(robot.gravity_m_s2, np.float64)
+    chain.model.gravity.linear = machine.gravity_m_s2()
     for k, (axis, stiffness) in enumerate(ends.springs):
         chain.add(f"base{k}", np.array(axis), np.zeros(3))
         chain.spring(stiffness, stiffness * ends.rocks_s)

@@ -56,6 +56,14 @@ class Scene:
         """Return the unit of lost motion and of errors of gears: 1 on axes that turn."""
         return self.deflection(axis) if self.robot.axis_is_prismatic[axis - 1] else 1.0
 
+    def rated_nm(self, axis: int) -> float:
+        """Return the rated torque of a motor, on its joint [Nm]."""
+        return _RATED_NM * self.torque(axis) / abs(float(self.robot.gear_ratio[axis - 1]))
+
+    def speed(self, axis: int) -> float:
+        """Return the largest speed of a motor that its references ask for [rad/s]."""
+        return max(float(np.abs(x[:, axis - 1]).max()) for x in self.references)
+
     def holds(self, axis: int) -> float:
         """Return the torque that holds an axis at rest, over the rated one of its motor."""
         return float(np.abs(self._at_rest[axis - 1])) / (_RATED_NM * self.torque(axis))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from axisight.blind import laws
+from axisight.blind import joint_laws, laws
 from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE
 from axisight.blind.machine import Ends, Native
 from axisight.blind.scene import (
@@ -56,6 +56,55 @@ def _load_friction(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     return Drawn("load_dependent_friction", axis, {"coefficient": share}, laws=[law])
 
 
+def _asymmetric(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = between(rng, 0.3, 0.8) * scene.torque(axis)
+    more = sign(rng) * float(rng.uniform(0.2, 0.6))
+    values = {"forward_nm": size * (1 + more), "backward_nm": size * (1 - more)}
+    law = laws.OneSidedFriction(values["forward_nm"], values["backward_nm"], 0.05)
+    return Drawn("asymmetric_friction", axis, values, laws=[law])
+
+
+def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    # As much at the largest speed as the friction that the simulator has there, about.
+    share = between(rng, 0.4, 1.5) * scene.of_joint(axis, "viscous_friction")
+    drag = share / scene.speed(axis)
+    return Drawn("quadratic_drag", axis, {"drag_nm_s2_rad2": drag}, laws=[laws.Drag(drag)])
+
+
+def _balancer(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = sign(rng) * between(rng, 0.05, 0.3) * scene.rated_nm(axis)
+    # Most stand upright where their axis does.
+    angle = float(rng.choice([0.0, rng.uniform(-0.5, 0.5)]))
+    values = {"sine_nm": size * float(np.cos(angle)), "cosine_nm": size * float(np.sin(angle))}
+    law = joint_laws.Balancer(values["sine_nm"], values["cosine_nm"])
+    return Drawn("gravity_compensation", axis, values, laws=[law])
+
+
+def _cable(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    stiffness = between(rng, 0.05, 0.3) * scene.rated_nm(axis)
+    law = joint_laws.Cable(stiffness)
+    return Drawn("cable_stiffness", axis, {"stiffness_nm_rad": stiffness}, laws=[law])
+
+
+def _swinging(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    ratio = float(scene.robot.gear_ratio[axis - 1])
+    inertia = between(rng, 0.05, 0.3) * scene.of_joint(axis, "motor_inertia") / ratio**2
+    values = {
+        "inertia_kg_m2": inertia,
+        "frequency_hz": between(rng, 6.0, 30.0),
+        "damping": between(rng, 0.01, 0.1),
+    }
+    law = joint_laws.Swing(inertia, values["frequency_hz"], values["damping"])
+    return Drawn("extra_mode", axis, values, laws=[law])
+
+
+def _tilt(rng: Rng, _scene: Scene, _axis: int) -> Drawn:
+    # One to three degrees: of a plate that was not levelled.
+    about = [sign(rng) * between(rng, 0.015, 0.05) for _ in range(2)]
+    values = {"about_x_rad": about[0], "about_y_rad": about[1]}
+    return Drawn("base_tilt", None, values, ends=Ends(tilted_rad=(about[0], about[1])))
+
+
 def _backlash(rng: Rng, scene: Scene, axis: int) -> Drawn:
     width = between(rng, 0.8e-4, 4e-4) * scene.play(axis)
     return Drawn("backlash", axis, {"half_width_rad": width}, Native(half_width_rad=width))
@@ -83,8 +132,7 @@ def _lost_motion(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 def _sag(rng: Rng, scene: Scene, axis: int) -> Drawn:
     # A supply that gives a tenth to a half less at the largest power.
-    speed = max(float(np.abs(x[:, axis - 1]).max()) for x in scene.references)
-    share = between(rng, 0.1, 0.5) / (speed * float(scene.largest_nm[axis - 1]))
+    share = between(rng, 0.1, 0.5) / (scene.speed(axis) * float(scene.largest_nm[axis - 1]))
     return Drawn("power_supply_sag", axis, {"sag_1_w": share}, laws=[laws.Sag(share)])
 
 
@@ -338,6 +386,12 @@ KINDS: Mapping[str, Kind] = {
     "stribeck_friction": Kind(_stribeck),
     "viscous_friction": Kind(_viscous),
     "load_dependent_friction": Kind(_load_friction),
+    "asymmetric_friction": Kind(_asymmetric),
+    "quadratic_drag": Kind(_drag),
+    "gravity_compensation": Kind(_balancer, axes=turning),
+    "cable_stiffness": Kind(_cable),
+    "extra_mode": Kind(_swinging),
+    "base_tilt": Kind(_tilt),
     "backlash": Kind(_backlash),
     "nonlinear_stiffness": Kind(_cubic),
     "joint_stiffness": Kind(_softer),

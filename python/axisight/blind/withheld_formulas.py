@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from axisight.blind import formulas
+from axisight.blind import formulas, joint_formulas
 from axisight.blind.formulas import Formula
 from axisight.blind.machine import NOTHING, Native
-from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, unloaded
+from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning, unloaded
 from axisight.blind.withheld import KINDS
 
 # Angle of a motor over which dry friction comes after a reversal.
@@ -68,6 +68,31 @@ def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     values = {"coulomb_nm": dry, "tanh_excess_nm": excess, "tanh_speed_rad_s": speed}
     law = formulas.TanhStribeck(dry, excess, speed, 0.1)
     return Drawn("stribeck_friction", axis, values, laws=[law])
+
+
+def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    speed = scene.speed(axis)
+    size = between(rng, 0.4, 1.5) * scene.of_joint(axis, "viscous_friction") * speed
+    # A power of 7/4 is no square.
+    values = {"churning_nm": size, "churning_speed_rad_s": speed}
+    return Drawn("quadratic_drag", axis, values, laws=[formulas.Churning(size, speed)])
+
+
+def _balancer(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    force = sign(rng) * between(rng, 0.1, 0.6) * scene.rated_nm(axis)
+    crank, free = float(rng.uniform(0.1, 0.3)), float(rng.uniform(0.3, 0.6))
+    angle = float(rng.choice([0.0, rng.uniform(-0.5, 0.5)]))
+    # Of a spring with a free length the torque is no sine.
+    values = {"spring_nm": force, "free_length": free, "upright_rad": angle}
+    law = joint_formulas.SpringBalancer(force, crank, free, angle)
+    return Drawn("gravity_compensation", axis, values, laws=[law])
+
+
+def _hose(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    stiffness, wound = between(rng, 0.05, 0.3) * scene.rated_nm(axis), between(rng, 1.0, 3.0)
+    values = {"unwound_nm_rad": stiffness, "wound_rad": wound}
+    law = joint_formulas.WoundHose(stiffness, wound)
+    return Drawn("cable_stiffness", axis, values, laws=[law])
 
 
 def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -157,6 +182,12 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
             "friction_warmup": lambda _r, _s, _a, v: formulas.WarmingFriction(
                 v["viscous_nm_s_rad"], v["time_constant_s"]
             ),
+            "asymmetric_friction": lambda _r, _s, _a, v: formulas.OneSidedFriction(
+                v["forward_nm"], v["backward_nm"], 0.1
+            ),
+            "extra_mode": lambda _r, _s, _a, v: joint_formulas.HungMass(
+                v["inertia_kg_m2"], v["frequency_hz"], v["damping"]
+            ),
             "backlash": lambda _r, _s, _a, v: formulas.Play(v["half_width_rad"]),
             "piecewise_stiffness": _knee,
             "power_supply_sag": lambda _r, _s, _a, v: formulas.WeakSupply(v["sag_1_w"]),
@@ -184,6 +215,9 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
     }
     | {
         "stribeck_friction": Kind(_stribeck),
+        "quadratic_drag": Kind(_drag),
+        "gravity_compensation": Kind(_balancer, axes=turning),
+        "cable_stiffness": Kind(_hose),
         "nonlinear_stiffness": Kind(_cubic),
         "gear_hysteresis": Kind(_hysteresis),
         "lost_motion": Kind(_lost_motion, axes=unloaded),
