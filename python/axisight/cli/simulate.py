@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from axisight.cli.common import Columns, Force, From, To, errors, numbers, say
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
+from axisight.excitation.files import holds_references, read_references
 from axisight.gap.inputs import part_of
 from axisight.logs import Log, read_log
 from axisight.logs.sources import files_of
@@ -28,7 +29,11 @@ _SAME_RATE = 1e-4
 def simulate_command(
     robot: Annotated[str, typer.Argument(help="robot.toml or a preset.")],
     log: Annotated[
-        Path, typer.Argument(help="Log whose velocity references (or torques) drive the run.")
+        Path,
+        typer.Argument(
+            help="Log whose velocity references (or torques) drive the run, "
+            "or references of axisight excite."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Parquet log to write.")],
     columns: Columns = None,
@@ -63,6 +68,10 @@ def simulate_command(
     ] = 0.0,
     start_s: From = 0.0,
     stop_s: To = None,
+    experiment: Annotated[
+        int | None, typer.Option(help="Of references with several: the one to simulate, from 1.")
+    ] = None,
+    periods: Annotated[int, typer.Option(help="Of references: how many of them.")] = 1,
     force: Force = False,
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
@@ -70,8 +79,15 @@ def simulate_command(
         given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
         check_targets({"--out": out}, inputs=given, replaces={"--out": (".parquet",)}, force=force)
         machine = load_simulator(robot, parse_effects(effect))
-        used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
-        inputs = _inputs(used, machine, torque=torque)
+        if holds_references(log):
+            if (start_s, stop_s, torque) != (0.0, None, False):
+                raise InputError(f"--from, --to, --torque: expected a log, got references in {log}")
+            inputs = _designed(log, machine, experiment, periods)
+        elif experiment is not None or periods != 1:
+            raise InputError(f"--experiment, --periods: expected references, got the log {log}")
+        else:
+            used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
+            inputs = _inputs(used, machine, torque=torque)
         result = simulate(
             machine,
             **inputs,
@@ -91,18 +107,40 @@ def simulate_command(
             raise typer.Exit(1)
 
 
+def _designed(
+    path: Path, robot: Robot, experiment: int | None, periods: int
+) -> dict[str, NDArray[np.float64]]:
+    """Return one experiment of designed references as the input of `simulate`."""
+    references = read_references(path)
+    if references.unit != "rad/s":
+        raise InputError(f"{path}: expected velocity references in rad/s, got {references.unit}")
+    _same_rate(path, references.sample_time_s, robot)
+    count = len(references.period)
+    if experiment is None and count == 1:
+        experiment = 1
+    if experiment is None or not 1 <= experiment <= count:
+        raise InputError(f"--experiment: expected one of 1 to {count} of {path}, got {experiment}")
+    if periods < 1:
+        raise InputError(f"--periods: expected a positive number, got {periods}")
+    return {"velocity_ref_rad_s": np.tile(references.period[experiment - 1], (periods, 1))}
+
+
 def _inputs(log: Log, robot: Robot, *, torque: bool) -> dict[str, NDArray[np.float64]]:
     """Return the input of `simulate` that the log has, by name."""
-    if abs(log.sample_time_s / robot.sample_time_s - 1) > _SAME_RATE:
-        raise InputError(
-            f"{log.source}: expected the sample time of the robot, {robot.sample_time_s:g} s, "
-            f"got {log.sample_time_s:g} s; resample the log or change the robot"
-        )
+    _same_rate(log.source, log.sample_time_s, robot)
     if torque:
         return {"torque_nm": log.torque_nm}
     if log.velocity_ref_rad_s is None:
         raise InputError(f"{log.source}: expected velocity references; --torque does without")
     return {"velocity_ref_rad_s": log.velocity_ref_rad_s}
+
+
+def _same_rate(source: object, sample_time_s: float, robot: Robot) -> None:
+    if abs(sample_time_s / robot.sample_time_s - 1) > _SAME_RATE:
+        raise InputError(
+            f"{source}: expected the sample time of the robot, {robot.sample_time_s:g} s, "
+            f"got {sample_time_s:g} s; resample it or change the robot"
+        )
 
 
 def _log_table(result: xr.Dataset, inputs: dict[str, NDArray[np.float64]]) -> pd.DataFrame:

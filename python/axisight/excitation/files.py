@@ -76,6 +76,19 @@ def _bytes(reference: References, text: str, kind: str) -> bytes:
     return buffer.getvalue()
 
 
+def holds_references(path: Path | str) -> bool:
+    """Return whether :func:`write_references` wrote a file: its design is with it."""
+    source = path_of("path", path)
+    if source.suffix == ".csv":
+        return _beside(source).exists()
+    try:
+        if source.suffix == ".parquet":
+            return _KEY in (pq.read_schema(source).metadata or {})
+        return source.suffix == ".mat" and "design" in load_arrays(source)
+    except (OSError, pa.ArrowException, LogError):
+        return False
+
+
 def read_references(path: Path | str) -> References:
     """Return what :func:`write_references` wrote; raises InputError naming file and field."""
     source = _known(path)
