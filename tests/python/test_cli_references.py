@@ -53,7 +53,7 @@ def test_what_references_have_not_is_refused(tmp_path: Path, more: list[str], wo
 def test_references_of_another_rate_are_refused(tmp_path: Path):
     robot = tmp_path / "robot.toml"
     text = load_robot("irb6600_like").toml
-    slower = text.replace("sample_time_s = 0.0005", "sample_time_s = 0.001")
+    slower = text.replace("sample_time = 5.0e-4", "sample_time = 1.0e-3")
     assert slower != text
     robot.write_text(slower, "utf-8")
     command = ["simulate", str(robot), excited(tmp_path, ".parquet"), "--experiment", "1"]

@@ -96,6 +96,15 @@ def test_quiet_says_nothing_and_writes_what_is_asked(case, quick, tmp_path):
     assert piped.stderr == ""
 
 
+def test_quiet_may_stand_before_the_command(case, quick, tmp_path):
+    verdict = tmp_path / "v.json"
+    done = run("-q", "diagnose", case, "--json", verdict)
+    assert (done.stdout, done.stderr) == ("", "")
+    assert json.loads(verdict.read_text())["verdict"] == "explained"
+    # What only prints has nothing else to do.
+    assert run("-q", "schema").stdout == run("schema").stdout
+
+
 def test_quiet_says_errors_and_keeps_exit_codes(case, tmp_path):
     refused = run("diagnose", case, "--tolerance", "mass", "-q", status=2)
     assert refused.stdout == ""

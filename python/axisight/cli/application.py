@@ -214,7 +214,13 @@ def _options(
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
+    quiet: Annotated[
+        bool,
+        typer.Option("--quiet", "-q", help="Print errors only, as after the name of a command."),
+    ] = False,
 ) -> None:
     """Identify industrial robots, simulate them, and explain the sim-to-real gap."""
+    # Of what only prints there would be nothing.
+    _be_quiet(quiet and ctx.invoked_subcommand not in _ONLY_PRINT)
     if ctx.invoked_subcommand is None:
         typer.echo(_NEXT_STEPS)
