@@ -5,10 +5,11 @@ import pytest
 
 from axisight import Effect, Settings, load_robot
 from axisight.gap.closed_loop import ClosedLoopView
-from axisight.gap.decide import likelier
+from axisight.gap.decide import Ranked, Standing, Trial, likelier
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import layout_of
 from axisight.gap.merged import one_for_several, several_together
+from axisight.gap.search import _simpler
 from gap_data import bare_axis, log_of, logs_of, reference
 
 PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
@@ -64,6 +65,39 @@ def test_two_laws_that_are_there_stay(viscous):
 def test_effects_of_other_kinds_are_not_several(viscous):
     model, label = found(viscous, [COULOMB, OFFSET])
     assert not several_together(model)
+    assert label is None
+
+
+ONE_SIDED = Effect(
+    "asymmetric_friction", 1, {"forward_nm": 0.6, "backward_nm": 0.2, "smoothing_rad_s": 2.0}
+)
+
+
+def test_dry_friction_and_a_constant_are_friction_that_is_larger_one_way():
+    """Three numbers either way; about standstill it is no constant."""
+    _, label = found([ONE_SIDED], [COULOMB, OFFSET])
+    assert label == "asymmetric_friction@1"
+
+
+def test_friction_that_does_nearly_as_well_is_named_beside_what_it_is_a_part_of():
+    def ranked(effect: Effect, probability: float) -> Ranked:
+        candidate = FreeEffect(effect, tuple(effect.parameters or {}))
+        return Ranked(Trial(candidate, None, np.ones(1)), 0.99, 1.0, 9.0, probability)
+
+    standing = Standing(0, (ranked(ONE_SIDED, 0.6), ranked(COULOMB.effect, 0.4)), 0.0, 0.0)
+    led = _simpler(standing, None)
+    assert [(r.trial.label, r.probability) for r in led.inseparable()] == [
+        ("coulomb_friction@1", 0.4),
+        ("asymmetric_friction@1", 0.6),
+    ]
+
+
+def test_dry_friction_and_a_constant_that_are_there_stay():
+    real = [
+        COULOMB.effect.with_values({"coulomb_nm": 0.4}),
+        Effect("torque_offset", 1, {"offset_nm": 0.3}),
+    ]
+    _, label = found(real, [COULOMB, OFFSET])
     assert label is None
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
+from axisight.effects import effect_info, effect_table
 from axisight.errors import InputError
 from axisight.gap.decide import (
     FORMULA_ERROR,
@@ -57,20 +57,12 @@ def one_for_several(
     last link: at its centre it is no more than that.
     """
     groups = {**several_together(model), **_lone_load(model, layout.n_axes)}
+    if not fitter.adds_up:
+        groups = {**_beside_a_part(model), **groups}
     for (axis, family), several in groups.items():
         rest = [f for f in model.free if f not in several]
         count = sum(numbers(f) for f in several)
-        labels = {f.effect.label for f in several}
-        new = [
-            o
-            for o in options
-            if o.effect.axis in (axis, None)
-            and effect_info(o.effect.name).family == family
-            and o.effect.label not in labels
-        ]
-        # One of them may do it alone from where it is now, and could not from its start.
-        most = count if family == "load" and len(several) > 1 else count - 1
-        others = [o for o in (*new, *several) if numbers(o) <= most]
+        others = _others(axis, family, several, options)
         try:
             without = fitter.fit(rest, model, lazy=True)
         except InputError:
@@ -101,6 +93,47 @@ def one_for_several(
             # What leaves more than that is none in their place.
             standing = standing.without(ranked.trial.label)
     return None
+
+
+def _others(
+    axis: int, family: str, several: Sequence[FreeEffect], options: Sequence[FreeEffect]
+) -> list[FreeEffect]:
+    """Return what may take the place of several effects: of their family, with no more numbers than they need.
+
+    Of effects of several families only what has the first as a part.
+    """
+    labels = {f.effect.label for f in several}
+    count = sum(numbers(f) for f in several)
+    new = [
+        o
+        for o in options
+        if o.effect.axis in (axis, None)
+        and effect_info(o.effect.name).family == family
+        and o.effect.label not in labels
+    ]
+    if any(effect_info(f.effect.name).family != family for f in several):
+        first = several[0].effect.name
+        return [o for o in new if first in effect_info(o.effect.name).parts and numbers(o) <= count]
+    # One of them may do it alone from where it is now, and could not from its start.
+    most = count if family == "load" and len(several) > 1 else count - 1
+    return [o for o in (*new, *several) if numbers(o) <= most]
+
+
+def _beside_a_part(model: Evidence) -> dict[tuple[int, str], list[FreeEffect]]:
+    """Return parts of composites, each with a cause of another family on its axis, by axis and family.
+
+    A search names the first part where the others do as well, and what it finds then may be the second, by
+    whatever name: a balancer for an offset.
+    """
+    composites = [info for info in effect_table().values() if info.parts]
+    found: dict[tuple[int, str], list[FreeEffect]] = {}
+    for part in model.free:
+        axis = part.effect.axis
+        others = [f for f in model.free if f.effect.axis == axis and f is not part]
+        for info in composites:
+            if part.effect.name == info.parts[0] and axis is not None and len(others) == 1:
+                found[axis, info.family] = [part, *others]
+    return found
 
 
 def several_together(model: Evidence) -> dict[tuple[int, str], list[FreeEffect]]:

@@ -519,10 +519,15 @@ def _first_part(standing: Standing) -> Ranked | None:
 
 
 def _simpler(standing: Standing, fitter: ModelFitter) -> Standing:
-    """Return a standing led by the first part of a composite winner whose parts do as well."""
+    """Return a standing led by the first part of a composite winner whose parts do as well.
+
+    Where that does nearly as well alone, the composite stays a rival.
+    """
     part = _first_part(standing)
     if part is None:
         return standing
+    if part in standing.inseparable():
+        return standing.led_by(part)
     winner = standing.best
     effect = winner.trial.candidate.effect
     second = effect_info(effect.name).parts[1]
