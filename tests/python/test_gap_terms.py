@@ -105,20 +105,24 @@ def test_coordinates_that_nothing_shows_are_idle():
 
 
 def test_a_balancer_that_stands_upright_has_one_number():
-    found = load((0.0, 0.0, 1.0, 0.0))
+    """One that does not, but where its torque is largest, has two: else every constant would be one."""
     names = ("sine_nm", "cosine_nm")
-    effect = Effect("gravity_compensation", 1, {"sine_nm": 1.0, "cosine_nm": 1e-3})
-    upright = replace(
-        found,
-        effects=(effect,),
-        free=(FreeEffect(effect, names),),
-        parameters=((None, "p"), (None, "q"), *((0, n) for n in names)),
-    )
-    assert trial(upright.free[0], upright).cost == 1.0
-    askew = replace(
-        upright, effects=(Effect("gravity_compensation", 1, dict.fromkeys(names, 1.0)),)
-    )
-    assert trial(askew.free[0], askew).cost == 2.0
+
+    def cost(sine: float, cosine: float) -> float:
+        found = load((0.0, 0.0, sine, cosine))
+        effect = Effect("gravity_compensation", 1, {"sine_nm": sine, "cosine_nm": cosine})
+        return trial(
+            FreeEffect(effect, names),
+            replace(
+                found,
+                effects=(effect,),
+                free=(FreeEffect(effect, names),),
+                parameters=((None, "p"), (None, "q"), *((0, n) for n in names)),
+            ),
+        ).cost
+
+    assert cost(1.0, 1e-3) == 1.0
+    assert cost(1e-3, 1.0) == cost(1.0, 1.0) == 2.0
 
 
 def test_of_a_centre_of_mass_one_coordinate_stays():
