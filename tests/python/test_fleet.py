@@ -1,7 +1,6 @@
 """Many cases at once: one table, causes that grow, the same bits wherever they are diagnosed."""
 
 import json
-import re
 import shutil
 from pathlib import Path
 
@@ -11,34 +10,16 @@ import pytest
 from typer.testing import CliRunner
 
 from axisight import InputError, Settings
-from axisight.blind.case_files import CaseFolder
 from axisight.cli.application import app
 from axisight.effects import Effect
 from axisight.fleet import diagnose_fleet, fleet_cases, fleet_table, render_fleet, trends
-from axisight.robot import load_robot
-from gap_data import bare_axis, logs_of, scattered
+from fleet_data import write_case
 from montecarlo_data import dask_cluster, kill
 from pages import assert_strict
 
 QUICK = Settings(bootstrap=50)
-PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
-HELD = {"fresh": ("multisine", 9)}
 # Dry friction of the first machine, day by day [Nm].
 DAYS = (0.0, 0.3, 0.45, 0.6, 0.75, 0.9)
-
-
-def write_case(folder: Path, effects: list[Effect], seed: int) -> None:
-    machine = scattered(bare_axis(), seed)
-    case = CaseFolder(folder, folder.name)
-    for role, plan in (("estimation", PLAN), ("validation", HELD)):
-        for log in logs_of(machine, effects, plan, seconds=4.0):
-            data = log.velocity_ref_rad_s, log.torque_nm, log.position_rad
-            case.add(log.name, role, log.time_s, *data)
-    case.finish("two_mass_axis")
-    # The preset has effects of its own, which these machines have not.
-    path = folder / "robot.toml"
-    path.write_text(re.sub(r"\[\[effect\]\][^\[]*", "", path.read_text("utf-8")), "utf-8")
-    assert load_robot(path).effects == ()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,130 @@
+"""What the crash trial is tried on: a Monte Carlo study and a fleet; both go on where they were stopped."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+
+from axisight import Effect, Settings
+from axisight import montecarlo as mc
+from axisight.fleet import diagnose_fleet
+from fleet_data import write_case
+from montecarlo_data import same_bits, small_study, start
+
+# To call with what has been done so far.
+Told = Callable[[int], None]
+
+
+class Subject(ABC):
+    """Long work that leaves files in a folder ``out``."""
+
+    name: str
+    steps: int
+    """How often it says what has been done."""
+
+    @abstractmethod
+    def process(self, out: Path) -> subprocess.Popen[bytes]:
+        """Begin it, or go on with it, in a process of its own."""
+
+    @abstractmethod
+    def finish(self, out: Path) -> object:
+        """Return what comes out when it has been gone on with to its end."""
+
+    @abstractmethod
+    def on_cluster(self, out: Path, scheduler: str, told: Told) -> object:
+        """Return the same, done by the workers of a scheduler."""
+
+    @abstractmethod
+    def compare(self, found: object, whole: object) -> None:
+        """Raise AssertionError where bits differ."""
+
+    def few(self) -> Subject:
+        """Return one with fewer files, of which each is damaged."""
+        return self
+
+
+_RUN_STUDY = (
+    "import sys; sys.path.insert(0, sys.argv[1]); from pathlib import Path;"
+    "from crash_subjects import Studies; Studies(int(sys.argv[3])).finish(Path(sys.argv[2]))"
+)
+
+
+class Studies(Subject):
+    """A Monte Carlo study in blocks of eight runs."""
+
+    def __init__(self, runs: int = 400) -> None:
+        self.name, self.runs, self.steps = "study", runs, runs // 8
+        self.study = small_study(runs=runs, block_runs=8)
+
+    def process(self, out: Path) -> subprocess.Popen[bytes]:
+        """Begin it, or go on with it."""
+        return start("-c", _RUN_STUDY, str(Path(__file__).parent), str(out), str(self.runs))
+
+    def finish(self, out: Path) -> object:
+        """Return the study."""
+        return mc.run(self.study, out=out, resume=(out / "study.zarr").exists())
+
+    def on_cluster(self, out: Path, scheduler: str, told: Told) -> object:
+        """Return the study."""
+        return mc.run(
+            self.study,
+            out=out,
+            backend="dask",
+            scheduler=scheduler,
+            progress=lambda state: told(state.done),
+        )
+
+    def compare(self, found: object, whole: object) -> None:
+        """Compare every variable."""
+        same_bits(found, whole)
+
+    def few(self) -> Subject:
+        """Return one of three blocks."""
+        return Studies(24)
+
+
+class Fleets(Subject):
+    """Cases of small axes: what runs the benchmark of withheld effects, too."""
+
+    name = "fleet"
+
+    def __init__(self, folder: Path, cases: int = 4) -> None:
+        self.folder, self.steps = folder, cases
+        for day in range(cases):
+            friction = {"coulomb_nm": 0.2 + 0.1 * day, "smoothing_rad_s": 0.05}
+            effects = [Effect("coulomb_friction", 1, friction)] if day else []
+            write_case(folder / "welder" / f"day_{day}", effects, day)
+
+    def process(self, out: Path) -> subprocess.Popen[bytes]:
+        """Begin it, or go on with it, by the command."""
+        call = "import sys; from axisight.cli import main; sys.argv[0] = 'axisight'; main()"
+        where = ["--fleet", str(self.folder), "--out", str(out), "--workers", "2", "-q"]
+        return start("-c", call, "diagnose", *where, stderr=subprocess.DEVNULL)
+
+    def finish(self, out: Path) -> object:
+        """Return its verdicts."""
+        return diagnose_fleet(self.folder, out, Settings(), workers=2)
+
+    def on_cluster(self, out: Path, scheduler: str, told: Told) -> object:
+        """Return its verdicts."""
+        return diagnose_fleet(
+            self.folder,
+            out,
+            Settings(),
+            scheduler=scheduler,
+            progress=lambda _label, done, _total: told(done),
+        )
+
+    def compare(self, found: object, whole: object) -> None:
+        """Compare every verdict."""
+        assert found == whole
+
+
+def subjects(folder: Path) -> list[Subject]:
+    """Return all of them; what they need goes to a folder."""
+    if sys.platform == "win32":
+        raise SystemExit("the crash trial kills as POSIX does")
+    return [Studies(), Fleets(folder / "fleet")]

@@ -1,0 +1,27 @@
+"""Cases of one axis for the tests of fleets and the crash trial."""
+
+import re
+from pathlib import Path
+
+from axisight.blind.case_files import CaseFolder
+from axisight.effects import Effect
+from axisight.robot import load_robot
+from gap_data import bare_axis, logs_of, scattered
+
+PLAN = {"multisine": ("multisine", 1), "moves": ("moves", 0)}
+HELD = {"fresh": ("multisine", 9)}
+
+
+def write_case(folder: Path, effects: list[Effect], seed: int) -> None:
+    """Write a case of the two-mass axis, whose machine scatters and has effects."""
+    machine = scattered(bare_axis(), seed)
+    case = CaseFolder(folder, folder.name)
+    for role, plan in (("estimation", PLAN), ("validation", HELD)):
+        for log in logs_of(machine, effects, plan, seconds=4.0):
+            data = log.velocity_ref_rad_s, log.torque_nm, log.position_rad
+            case.add(log.name, role, log.time_s, *data)
+    case.finish("two_mass_axis")
+    # The preset has effects of its own, which these machines have not.
+    path = folder / "robot.toml"
+    path.write_text(re.sub(r"\[\[effect\]\][^\[]*", "", path.read_text("utf-8")), "utf-8")
+    assert load_robot(path).effects == ()
