@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
 from axisight.logs.lazy import Reader, refusing
+from axisight.logs.parquet_footer import chunks
 
 # Lists with more entries per sample than that hold no signals of axes.
 _MOST_ENTRIES = 4096
@@ -28,7 +29,7 @@ def load_parquet(path: Path, budget: Budget, filters: Any = None) -> dict[str, R
     """
     with pq.ParquetFile(path) as file:
         metadata, schema = file.metadata, file.schema_arrow
-        leaves = _leaves(metadata)
+    leaves = _leaves(path)
     readers: dict[str, Reader] = {}
     for field in schema:
         if schema.names.count(field.name) > 1:
@@ -46,17 +47,13 @@ def load_parquet(path: Path, budget: Budget, filters: Any = None) -> dict[str, R
     return readers
 
 
-def _leaves(metadata: Any) -> dict[str, tuple[int, int]]:
+def _leaves(path: Path) -> dict[str, tuple[int, int]]:
     """Return the number of values and the bytes that every column declares, unpacked."""
     found: dict[str, tuple[int, int]] = {}
-    for group in range(metadata.num_row_groups):
-        row_group = metadata.row_group(group)
-        for k in range(row_group.num_columns):
-            chunk = row_group.column(k)
-            name = _column_of(chunk.path_in_schema)
-            for own in {chunk.path_in_schema, *name}:
-                values, size = found.get(own, (0, 0))
-                found[own] = values + chunk.num_values, size + chunk.total_uncompressed_size
+    for chunk in chunks(path):
+        for own in {chunk.path, *_column_of(chunk.path)}:
+            values, size = found.get(own, (0, 0))
+            found[own] = values + chunk.values, size + chunk.unpacked_bytes
     return found
 
 
