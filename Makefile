@@ -10,8 +10,9 @@
 #   make gallery draw the effects anew for their page
 #   make wheel-smoke   the wheel in an empty environment: installed, asked, its demo run, timed
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
-#   make crash   studies killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
+#   make crash   studies and fleets killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
 #   make deny    licences, doubles and sources of the Rust dependencies, by cargo deny where it is
+#   make lock    versions of all Python packages of setup and docs, which the gate installs
 #   make lowest  the package with the lowest versions of its Python dependencies
 #   make bench   criterion benches, then side-by-side runs against other libraries
 #   make clean   remove everything that was built
@@ -44,7 +45,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs gallery wheel-smoke fuzz crash deny lowest bench clean force
+.PHONY: setup demo test test-rust test-python lint format docs gallery wheel-smoke fuzz crash deny lock lowest bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -96,6 +97,10 @@ fuzz: $(STAMPS)/test-tools
 
 crash: $(STAMPS)/test-tools
 	$(BIN)/python tests/python/crash_trial.py $(KILLS)
+
+lock: $(STAMPS)/test-tools $(STAMPS)/docs-tools
+	{ echo "# Written by make lock: what the gate installs of Python packages."; \
+	$(BIN)/python -m pip freeze --exclude axisight --exclude axisight-thesis; } > .ci/constraints.txt
 
 # Lowest versions of what pyproject.toml asks for, in an environment of their own.
 LOWEST := $(VENV)/lowest
