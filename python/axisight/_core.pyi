@@ -332,6 +332,9 @@ class Robot:
     def velocity_feedforward(self) -> bool:
         """Whether a controller with targets of positions takes their rate as its speed reference."""
     @property
+    def computed_torque(self) -> bool:
+        """Whether the gains of a controller are of accelerations [1/s^2, 1/s]."""
+    @property
     def stepped(self) -> tuple[float, list[float]] | None:
         """Step of the simulator that holds the controller's law [s], and inertia that it adds [kg m^2]."""
 

@@ -7,7 +7,7 @@ use axisight_core::plant::{
     Linearization, assemble, equilibrium, linearize, zoh_frequency_response,
 };
 use axisight_core::robot::{
-    Controller, Joint, Motion, Parameter, RigidBody, RobotDescription, ShapeError,
+    Controller, Joint, Known, Motion, Parameter, RigidBody, RobotDescription, ShapeError,
 };
 use axisight_core::robot_file::read_robot;
 use axisight_identification::frequency::modes;
@@ -197,6 +197,18 @@ impl Robot {
             self.description.controller,
             Controller::PdPosition {
                 feeds_speed: false,
+                ..
+            }
+        )
+    }
+
+    /// Whether gains of a controller are of accelerations, which it makes torques of by the robot's dynamics.
+    #[getter]
+    fn computed_torque(&self) -> bool {
+        matches!(
+            self.description.controller,
+            Controller::PdPosition {
+                known: Some(Known::Dynamics(_)),
                 ..
             }
         )

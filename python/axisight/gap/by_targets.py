@@ -15,7 +15,7 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import Weighting
 from axisight.gap.closed_loop import ClosedLoopFitter, Record
-from axisight.gap.feedback import controller_response, loop_responses
+from axisight.gap.feedback import controller_response, inertia_of_motors, loop_responses
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
@@ -202,12 +202,18 @@ def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
     """
     out = dict(settings.tolerances_of(robot))
     values, late_s = robot.parameters(), _WHEN * robot.sample_time_s
-    for axis, gain in zip(robot.axis_numbers(), robot.controller_gains["kp"], strict=True):
+    for axis, gain in zip(robot.axis_numbers(), _stiffness(robot), strict=True):
         name = robot.axis_parameter(axis, "viscous_friction")
         if name is not None and values[name] > 0:
             stated = out.get(name, out["viscous_friction"])
             out[name] = float(np.hypot(stated, gain * late_s / values[name]))
     return out
+
+
+def _stiffness(robot: Robot) -> Array:
+    """Return the torque of each motor for its own error of angle (n_axes,) [Nm/rad], at the operating point."""
+    gain = np.asarray(robot.controller_gains["kp"])
+    return gain * np.diag(inertia_of_motors(robot)) if robot.computed_torque else gain
 
 
 def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:

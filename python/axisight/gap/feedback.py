@@ -36,16 +36,38 @@ def gain_shares(
 ) -> tuple[Array, Array]:
     """Return what the proportional and the integral gain make of the errors, as in `feedback`.
 
-    Of a controller that is told positions those are the gains of position and of speed.
+    Of a controller that is told positions those are the gains of position and of speed; of a computed torque
+    at the operating point, other axes apart where one is asked for.
     """
     gains = {k: v if axis is None else v[axis] for k, v in robot.controller_gains.items()}
     kp, ki = gains["kp"], gains.get("ki", 0.0)
     if "kd" in gains:
-        return np.asarray(kp * angle), np.asarray(gains["kd"] * speed)
+        shares = np.asarray(kp * angle), np.asarray(gains["kd"] * speed)
+        if not robot.computed_torque:
+            return shares
+        inertia = inertia_of_motors(robot)
+        if axis is not None:
+            return shares[0] * inertia[axis, axis], shares[1] * inertia[axis, axis]
+        return shares[0] @ inertia, shares[1] @ inertia
     if "kv" not in gains:
         return np.asarray(kp * speed), np.asarray(ki * angle)
     error = speed + gains["kv"] * angle
     return np.asarray(kp * error), np.asarray(ki * before(error) * robot.sample_time_s)
+
+
+def inertia_of_motors(robot: Robot) -> Array:
+    """Return what motors feel of a rigid robot at its operating point (n_axes, n_axes) [kg m^2], symmetric."""
+    at = np.zeros(robot.n_joints)
+    at[robot.axis_joints] = robot.operating_point
+    driven = np.ix_(robot.axis_joints, robot.axis_joints)
+    felt = robot.inertia_matrix(at)[driven] * np.outer(robot.gear_ratio, robot.gear_ratio)
+    return np.asarray(felt + np.diag(rotors(robot)))
+
+
+def rotors(robot: Robot) -> Array:
+    """Return the inertia of each motor (n_axes,) [kg m^2]."""
+    values = robot.parameters()
+    return np.array([values[f"{joint}.motor_inertia"] for joint in robot.axis_names])
 
 
 def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
@@ -56,7 +78,8 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
     out = (1 - back) / time
     if "kd" in gains:
         out = gains["kd"] * out + kp
-        return np.asarray(out[:, :, None] * np.eye(robot.n_axes))
+        moved = inertia_of_motors(robot) if robot.computed_torque else np.eye(robot.n_axes)
+        return np.asarray(moved * out[:, None, :])
     # The error of a cascade is summed up to the sample before.
     cascade = "kv" in gains
     summed = ki * time * back / (1 - back)

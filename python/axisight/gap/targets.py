@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from axisight.errors import InputError
-from axisight.gap.feedback import feedback
+from axisight.gap.feedback import feedback, rotors
 from axisight.gap.noise import position_noise_std
 from axisight.gap.poses import at_their_poses
 from axisight.logs import Log
@@ -83,7 +83,9 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     time = robot.sample_time_s
     step = round(logs[0].sample_time_s / time)
     start = np.mean([log.position_rad[0] for log in logs], axis=0)
-    fed = robot.velocity_feedforward and all(x.velocity_ref_rad_s is not None for x in logs)
+    # Positions alone have rates too, but who follows these by gains alone need not have taken them.
+    known = robot.computed_torque or all(x.velocity_ref_rad_s is not None for x in logs)
+    fed = robot.velocity_feedforward and known
     at_start = robot.with_operating_point(start * robot.gear_ratio)
     machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
     begun = at_their_poses(machine, logs)
@@ -199,6 +201,8 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
         target = target[0] + (np.cumsum(rate, axis=0) - rate) * time
     fed = rate if robot.velocity_feedforward else 0.0
     torque = feedback(robot, fed - _speed(robot, position), target - position)
+    if robot.computed_torque:
+        torque = torque + _fed_dynamics(robot, position, rate)
     return replace(
         log,
         sample_time_s=time,
@@ -211,6 +215,19 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
         joint_position_rad=None,
         temperature_c=None,
     )
+
+
+def _fed_dynamics(robot: Robot, position: Array, rate: Array) -> Array:
+    """Return what a computed torque commands besides its feedback, from what holds it at first (n, n_axes)."""
+    motors = [position, _speed(robot, position), np.zeros_like(position)]
+    if robot.velocity_feedforward:
+        motors[2] = np.diff(rate, axis=0, prepend=rate[:1]) / robot.sample_time_s
+    joints = [np.zeros((len(position), robot.n_joints)) for _ in motors]
+    for joint, motor in zip(joints, motors, strict=True):
+        joint[:, robot.axis_joints] = motor * robot.gear_ratio
+    forces = robot.inverse_dynamics(*joints)[:, robot.axis_joints]
+    torque = forces * robot.gear_ratio + rotors(robot) * motors[2]
+    return np.asarray(torque - torque[0])
 
 
 def _every(log: Log, step: int) -> Log:

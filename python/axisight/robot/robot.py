@@ -179,7 +179,7 @@ class Robot:
         """Gains by name, shape (n_axes,) each, motor side.
 
         ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s]. ``pd_position`` has ``kp``
-        [Nm/rad] and ``kd`` [Nm s/rad].
+        [Nm/rad] and ``kd`` [Nm s/rad], [1/s^2] and [1/s] of a `computed_torque`.
         """
         return self.core.controller_gains
 
@@ -202,6 +202,14 @@ class Robot:
         have no references of speed.
         """
         return self.core.velocity_feedforward
+
+    @property
+    def computed_torque(self) -> bool:
+        """Whether the controller makes accelerations of errors, and torques of these by the robot's dynamics.
+
+        It knows the robot as its file states it: effects and parameters that are fitted are the machine's.
+        """
+        return self.core.computed_torque
 
     @property
     def stepped(self) -> tuple[float, Array] | None:

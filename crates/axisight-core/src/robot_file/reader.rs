@@ -10,7 +10,7 @@ use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
 use crate::robot::MOST_JOINTS;
 use crate::robot::description::{
-    Bound, Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, Stepped,
+    Bound, Compliance, Controller, Drive, Joint, Known, Link, Motion, RobotDescription, Stepped,
     check_unit, is_positive_definite,
 };
 use std::sync::Arc;
@@ -342,7 +342,12 @@ fn read_controller(
             Ok(Controller::Cascade { kv, kp, ki })
         }
         ControllerKind::PdPosition => {
-            let switches = ["velocity_feedforward", "gravity_compensation", "continuous"];
+            let switches = [
+                "velocity_feedforward",
+                "gravity_compensation",
+                "computed_torque",
+                "continuous",
+            ];
             let steps = ["step", "step_inertia"];
             section.only(&[&["kind", "kp", "kd"][..], &switches, &steps].concat())?;
             // One without the other says half of what a simulator does.
@@ -354,13 +359,29 @@ fn read_controller(
             } else {
                 None
             };
-            let known = section.flag(switches[1], false)?;
+            let held = section.flag(switches[1], false)?;
+            let moved = section.flag(switches[2], false)?;
+            if held && moved {
+                let both = "one of gravity_compensation and computed_torque, which has it";
+                return Err(entry.refuse(both.to_owned()));
+            }
+            let own = || Arc::new(robot.clone());
+            let known = match (held, moved) {
+                (_, true) => Some(Known::Dynamics(own())),
+                (true, _) => Some(Known::Gravity(own())),
+                _ => None,
+            };
+            let [of_angle, of_speed] = if moved {
+                ["1/s^2", "1/s"]
+            } else {
+                ["Nm/rad", "Nm s/rad"]
+            };
             Ok(Controller::PdPosition {
-                kp: gains("kp", "Nm/rad")?,
-                kd: gains("kd", "Nm s/rad")?,
+                kp: gains("kp", of_angle)?,
+                kd: gains("kd", of_speed)?,
                 feeds_speed: section.flag(switches[0], true)?,
-                continuous: section.flag(switches[2], false)?,
-                gravity: known.then(|| Arc::new(robot.clone())),
+                continuous: section.flag(switches[3], false)?,
+                known,
                 stepped,
             })
         }

@@ -103,14 +103,24 @@ pub enum Controller {
         /// Whether the law holds between samples, too: an actuator in a simulator, or a drive much faster
         /// than the sample time.
         continuous: bool,
-        /// The robot as the controller knows it, whose gravity torque at the measured pose `u_ff`
-        /// follows; constant without one. What is fitted of a machine changes nothing of it.
-        gravity: Option<Arc<RobotDescription>>,
+        /// The robot as the controller knows it; `u_ff` is constant without one. What is fitted of a
+        /// machine changes nothing of it.
+        known: Option<Known>,
         /// The simulator that holds the law; none where it is a machine.
         stepped: Option<Stepped>,
     },
     /// No controller: logs are torque-driven only.
     None,
+}
+
+/// What a controller does with a robot that it knows, joints rigid.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Known {
+    /// `u_ff` follows the gravity torque at the measured pose.
+    Gravity(Arc<RobotDescription>),
+    /// Computed torque: gains [1/s^2] and [1/s] make accelerations of errors, to which that of the
+    /// targets is added; `u` is what gives the robot these, with `c(q, q') + g(q)` as measured.
+    Dynamics(Arc<RobotDescription>),
 }
 
 /// What the steps of a simulator make of a law that it holds: forces act around the beginning of a step.
@@ -151,14 +161,14 @@ impl Controller {
                 kd,
                 feeds_speed,
                 continuous,
-                gravity,
+                known,
                 stepped,
             } => Self::PdPosition {
                 kp: scaled(kp, factor * factor),
                 kd: scaled(kd, factor),
                 feeds_speed: *feeds_speed,
                 continuous: *continuous,
-                gravity: gravity.clone(),
+                known: known.clone(),
                 stepped: stepped.clone(),
             },
             Self::None => Self::None,

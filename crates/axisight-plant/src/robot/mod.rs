@@ -14,7 +14,7 @@ mod vector;
 pub use along::{Along, Course};
 pub use chain::{Body, Chain, ChainJoint, Pose};
 pub use description::{
-    Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription, Stepped,
+    Compliance, Controller, Drive, Joint, Known, Link, Motion, RobotDescription, Stepped,
 };
 pub use dynamics::{Dynamics, DynamicsScratch, DynamicsState, MOST_JOINTS};
 pub use parameters::{Parameter, ParameterError};

@@ -1,9 +1,10 @@
 //! The sampled controllers of robot files.
 
+use super::known_robot::KnownRobot;
 use super::late_target::LateTarget;
 use crate::effect::Kernel;
 use crate::plant::{Axis, Plant, PlantError};
-use crate::robot::Controller;
+use crate::robot::{Controller, Known};
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
@@ -55,7 +56,7 @@ impl<S: Scalar> OwnLaw<S> {
 }
 
 /// A controller with its memory; commands are motor torques [Nm].
-pub struct ControlLoop<S> {
+pub struct ControlLoop<S: Scalar> {
     kind: Controller,
     sample_time: f64,
     feed_forward: Vec<S>,
@@ -67,8 +68,9 @@ pub struct ControlLoop<S> {
     filtered: Vec<S>,
     first_lag: Vec<S>,
     last_lag: Vec<S>,
-    gravity: Option<KnownGravity<S>>,
+    known: Option<KnownRobot<S>>,
     last_speed: Vec<S>,
+    last_target_speed: Vec<S>,
     /// Of axes whose targets take effect late.
     late: Vec<Option<LateTarget<S>>>,
 }
@@ -87,49 +89,6 @@ fn late_targets<S: Scalar>(
     own.iter().zip(angle).map(of).collect()
 }
 
-/// Gravity of the robot as a controller knows it.
-struct KnownGravity<S> {
-    model: Plant<S>,
-    /// Joint angles, elastic joints at rest; standstill; motor torques there.
-    angle: Vec<S>,
-    still: Vec<S>,
-    torque: Vec<S>,
-}
-
-impl<S: Scalar> KnownGravity<S> {
-    /// The robot that `kind` knows, at motor angles `angle`; `None` where it knows none.
-    fn of(kind: &Controller, angle: &[S]) -> Result<Option<Self>, PlantError> {
-        let Controller::PdPosition {
-            gravity: Some(robot),
-            ..
-        } = kind
-        else {
-            return Ok(None);
-        };
-        let model = Plant::with_kernels(robot, &[], Vec::new())?;
-        let still = vec![S::zero(); model.chain.len()];
-        let mut known = Self {
-            angle: still.clone(),
-            still,
-            torque: vec![S::zero(); angle.len()],
-            model,
-        };
-        known.look(angle);
-        Ok(Some(known))
-    }
-
-    /// Take the torques at motor angles `measured`.
-    fn look(&mut self, measured: &[S]) {
-        for (axis, measured) in self.model.axes.iter().zip(measured) {
-            self.angle[axis.joint] = *measured * axis.ratio;
-        }
-        let load = self.model.dynamics.evaluate(&self.angle, &self.still).bias;
-        for (axis, torque) in self.model.axes.iter().zip(&mut self.torque) {
-            *torque = load[axis.joint] * axis.ratio;
-        }
-    }
-}
-
 impl<S: Scalar> ControlLoop<S> {
     /// A controller settled at motor angles `angle` with static torques `feed_forward`; `own` says
     /// by axis what effects change of it, none where it is empty.
@@ -143,16 +102,19 @@ impl<S: Scalar> ControlLoop<S> {
         feed_forward: &[S],
         own: Vec<OwnLaw<S>>,
     ) -> Result<Self, PlantError> {
-        let gravity = KnownGravity::of(kind, angle)?;
+        let mut known = KnownRobot::of(kind, angle.len())?;
         let mut feed_forward = feed_forward.to_vec();
-        if let Some(known) = &gravity {
+        if let Some(known) = &mut known {
             // Where it settled it holds the arm, whatever it knows.
-            let known = feed_forward.iter_mut().zip(&known.torque);
-            known.for_each(|(u, g)| *u -= *g);
+            let still = vec![S::zero(); angle.len()];
+            let held = known.torque(angle, &still, &still);
+            let held = feed_forward.iter_mut().zip(held);
+            held.for_each(|(u, g)| *u -= *g);
         }
         Ok(Self {
-            gravity,
+            known,
             last_speed: vec![S::zero(); angle.len()],
+            last_target_speed: Vec::with_capacity(angle.len()),
             late: late_targets(kind, &own, angle),
             own,
             filtered: vec![S::zero(); angle.len()],
@@ -174,9 +136,6 @@ impl<S: Scalar> ControlLoop<S> {
         if self.previous_reference.is_empty() {
             self.previous_reference.extend_from_slice(reference);
         }
-        if let Some(known) = &mut self.gravity {
-            known.look(measured);
-        }
         for i in 0..measured.len() {
             let speed = match &self.previous {
                 Some(previous) => (measured[i] - previous[i]) * rate,
@@ -184,6 +143,7 @@ impl<S: Scalar> ControlLoop<S> {
             };
             let (angle, speed) = self.halfway(i, measured[i], speed);
             let speed = self.filter(i, speed);
+            self.filtered[i] = speed;
             let target = [self.reference_angle[i], reference[i]];
             let [target_angle, target_speed] = match self.late.get_mut(i) {
                 Some(Some(late)) => late.read(target),
@@ -192,12 +152,15 @@ impl<S: Scalar> ControlLoop<S> {
             let speed_error = self.speed_error(target_speed, speed);
             let angle_error = target_angle - angle;
             let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
-            let feedback = self.feedback(i, speed_error, angle_error, gains);
-            out[i] = self.feed_forward[i] + feedback + self.forward(i, reference[i]);
-            if let Some(known) = &self.gravity {
-                out[i] += known.torque[i];
-            }
+            let wanted = self.rate_of_target(i, target_speed);
+            out[i] = wanted + self.feedback(i, speed_error, angle_error, gains);
             self.reference_angle[i] += reference[i] * self.sample_time;
+        }
+        if let Some(known) = &mut self.known {
+            known.command(measured, &self.filtered, out);
+        }
+        for (i, reference) in reference.iter().enumerate() {
+            out[i] += self.feed_forward[i] + self.forward(i, *reference);
         }
         match &mut self.previous {
             Some(previous) => previous.copy_from_slice(measured),
@@ -223,6 +186,28 @@ impl<S: Scalar> ControlLoop<S> {
             self.last_lag[i] = lag;
             added[i] = self.feedback(i, -speed, -behind, [S::one(); 2]);
         }
+        if let Some(known) = &mut self.known {
+            known.weigh(measured, added);
+        }
+    }
+
+    /// Acceleration of the target of axis `i` where a law takes it; none at the first sample.
+    #[inline(always)]
+    fn rate_of_target(&mut self, i: usize, speed: S) -> S {
+        let Controller::PdPosition {
+            known: Some(Known::Dynamics(_)),
+            feeds_speed: true,
+            ..
+        } = self.kind
+        else {
+            return S::zero();
+        };
+        if self.last_target_speed.len() == i {
+            self.last_target_speed.push(speed);
+        }
+        let change = speed - self.last_target_speed[i];
+        self.last_target_speed[i] = speed;
+        change * (1.0 / self.sample_time)
     }
 
     /// Torque for the reference of axis `i` and its rate; none at the first sample.

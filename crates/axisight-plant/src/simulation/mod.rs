@@ -5,6 +5,7 @@ mod controller;
 mod current_loop;
 mod dormand_prince;
 mod implicit;
+mod known_robot;
 mod late_reading;
 mod late_target;
 mod method;

@@ -120,7 +120,7 @@ fn torque_paths<S: Scalar>(
 }
 
 /// Everything that changes during a run.
-struct LinearLoop<'a, S> {
+struct LinearLoop<'a, S: Scalar> {
     plant: &'a LinearPlant,
     propagator: Cow<'a, Propagator>,
     substeps: usize,
