@@ -1,6 +1,7 @@
 """The commands ``axisight columns``, and names of maps wherever a command takes a map."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,17 @@ def test_guess_writes_a_map_that_check_takes(log, tmp_path):
     assert "not used: some_flag: no word of its name is known" in text
     assert load_column_map(out).axis[5].position.name == "position_of_joint_6"
     assert "uniform at 250 Hz" in run("check", log, "--columns", out)
+
+
+def test_what_to_do_then_can_be_pasted(log, tmp_path):
+    spaced, arm = log.rename(tmp_path / "run 1.csv"), tmp_path / "my robot.toml"
+    arm.write_text(robot_toml(6))
+    text = run("columns", "guess", spaced, "--robot", arm, "-o", tmp_path / "c.toml")
+    command = re.search("then: (axisight .*)", text)
+    assert command is not None
+    said = shlex.split(command[1])
+    assert said[1:3] == ["check", str(spaced)]
+    assert "uniform at 250 Hz" in run(*said[1:])
 
 
 def test_guess_never_overwrites_unasked(log, tmp_path):

@@ -71,6 +71,7 @@ def test_branches_are_cut_by_the_tip(tmp_path: Path):
     beside = load_robot(path)
     assert beside.parameters()["elbow.motor_inertia"] == 0.1
     assert beside.joint_names == robot.joint_names
+    assert beside.toml.startswith(f"# imported from {path.name}, drives from arm.drives.toml\n")
 
 
 def test_the_base_may_be_a_link_on_the_way(tmp_path: Path):

@@ -345,6 +345,21 @@ def test_axes_of_the_robot(tmp_path):
     assert any("numbers have a gap (1, 2, 4, 5, 6)" in doubt for doubt in found.doubts)
 
 
+def test_one_joint_of_another_arm_is_no_axis_apart(tmp_path):
+    """Where not every joint of the robot is named, none is: all stay together, in the order of the file."""
+    columns = table("t", "position.{j}", "velocity.{j}", "effort.{j}")
+    found = guessed(tmp_path, columns, robot(6, [JOINTS[2], *"abcde"]))
+    assert [axis.position.name for axis in found.columns.axis] == [f"position.{j}" for j in JOINTS]
+    assert any(doubt.startswith("axes: in the order of the file") for doubt in found.doubts)
+
+
+def test_what_no_word_says_is_refused_with_the_words(tmp_path):
+    with pytest.raises(
+        LogError, match=r"say so \(q, .*pos, .*angle, .*a column map can name any other"
+    ):
+        guessed(tmp_path, table("t", "A{}_x"))
+
+
 def test_nan_is_no_obstacle_to_a_guess_but_to_reading(tmp_path):
     columns = table("t", "q{}", "dq{}", "tau{}")
     columns["q2"][17] = np.nan

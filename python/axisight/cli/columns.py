@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -62,10 +63,10 @@ def guess_command(
             typer.echo(found.text, nl=False)
             return
         write_whole(out, found.text)
-        _say_found(out, log, found)
+        _say_found(out, log, robot, found)
 
 
-def _say_found(out: Path, log: Path, found: Proposal) -> None:
+def _say_found(out: Path, log: Path, robot: str | None, found: Proposal) -> None:
     if found.named is None:
         say(f"{out}: a map of its own; look at the reasons in it before use")
     elif found.doubts:
@@ -76,4 +77,5 @@ def _say_found(out: Path, log: Path, found: Proposal) -> None:
         say(f"doubtful: {doubt}")
     for name, reason in found.unused.items():
         say(f"not used: {name}: {reason}")
-    say(f"then: axisight check {log} --columns {out}")
+    check = ["axisight", "check", str(log), "--columns", str(out)]
+    say(f"then: {shlex.join(check if robot is None else [*check, '--robot', robot])}")

@@ -148,7 +148,7 @@ def diagnose_command(
         bool,
         typer.Option(
             "--exit-code",
-            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable; else 0.",
+            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable. Without it 0.",
         ),
     ] = False,
     untrusted: Untrusted = False,

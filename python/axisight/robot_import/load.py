@@ -33,11 +33,16 @@ def drives_path(source: Path | str) -> Path:
 
 def drive_data(source: Path | str | Any, given: Path | str | None = None) -> DriveData:
     """Return the drive data of a model: those ``given``, else those beside its file, if there are any."""
+    file = drives_file(source, given)
+    return DriveData() if file is None else read_drives(file)
+
+
+def drives_file(source: Path | str | Any, given: Path | str | None) -> Path | None:
+    """Return the file of a model's drive data: that ``given``, else that beside it, None without."""
     if given is not None:
-        return read_drives(Path(given))
-    if isinstance(source, str | Path) and drives_path(source).is_file():
-        return read_drives(drives_path(source))
-    return DriveData()
+        return Path(given)
+    beside = isinstance(source, str | Path) and drives_path(source).is_file()
+    return drives_path(source) if beside else None
 
 
 def import_robot(
@@ -66,11 +71,12 @@ def import_robot(
     what cannot be one serial chain, MissingExtraError for MJCF without MuJoCo.
 
     """
-    is_file = isinstance(source, str | Path)
+    named = Path(source).name if isinstance(source, str | Path) else "a pinocchio.Model"
     if not isinstance(drives, DriveData):
+        if (file := drives_file(source, drives)) is not None:
+            named += f", drives from {file.name}"
         drives = drive_data(source, drives)
     tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
-    named = Path(source).name if is_file else "a pinocchio.Model"
 
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})

@@ -12,6 +12,7 @@ from axisight.logs.guessing.evidence import (
     largest,
 )
 from axisight.logs.guessing.families import Axis, Family, of_quantity
+from axisight.logs.guessing.names import WORDS
 from axisight.logs.units import PRISMATIC_UNITS, si_factor
 
 _POSITION_UNITS = ("rad", "deg", "rev")
@@ -24,7 +25,11 @@ def find_positions(draft: Draft) -> Family:
     if not found:
         wanted = of_quantity(draft.families, "position", wanted=True)
         got = f"only targets: {', '.join(f.label for f in wanted)}" if wanted else "none"
-        raise draft.refusal(f"position: expected columns whose names say so, got {got}")
+        words = ", ".join(WORDS["position"].split())
+        raise draft.refusal(
+            f"position: expected columns whose names say so ({words}), got {got}; "
+            f"a column map can name any other"
+        )
     if draft.robot is not None:
         n = draft.robot.n_axes
         enough = [f for f in found if len(f.signals) >= n]

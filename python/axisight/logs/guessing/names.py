@@ -18,8 +18,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-# Quantities in the order in which they win where a name has words of several.
-_WORDS = {
+WORDS = {
     "error": "error err deviation",
     "acceleration": "acc accel acceleration accelerations ddq qdd qddot",
     "temperature": "temp temps temperature temperatures",
@@ -30,7 +29,8 @@ _WORDS = {
     "position": "q qm qpos pos position positions angle angles theta phi enc encoder",
     "time": "time timestamp timestamps stamp t ts tm clock ipoc sec secs seconds ms msec us usec ns nsec",
 }
-_QUANTITIES = {word: quantity for quantity, words in _WORDS.items() for word in words.split()}
+"""Words for each quantity, in the order in which quantities win where a name has words of several."""
+_QUANTITIES = {word: quantity for quantity, words in WORDS.items() for word in words.split()}
 # Words that alone are a position, where nothing else is one; LeRobot has states and actions.
 _PLACES = {"joint", "joints", "axis", "state", "action"}
 _MEASURED = _words("actual act measured meas feedback fb present real ist")
@@ -119,13 +119,17 @@ def _bracket_unit(text: str) -> str | None:
     return text.strip() if foreign else _UNITS.get(key) or _LETTERS.get(key)
 
 
+def joint_in(name: str, joint: str) -> re.Match[str] | None:
+    """Return where the name of a joint stands in that of a signal, as words; None where it does not."""
+    return re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+
+
 def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str, str]:
     """Return number or joint of the axis, and the name without it."""
     if row is not None:
         return row, name
     for joint in sorted(joints, key=len, reverse=True):
-        match = re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
-        if match:
+        if match := joint_in(name, joint):
             return joint, f"{name[: match.start()]}#{name[match.end() :]}"
     numbers = list(re.finditer(r"\d+", name))
     if not numbers:
@@ -137,7 +141,7 @@ def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str,
 def _quantity(words: Sequence[str]) -> tuple[str, set[str]]:
     """Return the quantity of the words, and those that say it."""
     named = {word: _QUANTITIES[word] for word in words if word in _QUANTITIES}
-    for quantity in _WORDS:
+    for quantity in WORDS:
         if quantity in named.values():
             return quantity, {word for word, own in named.items() if own == quantity}
     places = set(words) & _PLACES

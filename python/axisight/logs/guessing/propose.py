@@ -12,6 +12,7 @@ from axisight.logs.guessing.clock import take_time
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, families_of
 from axisight.logs.guessing.named import Fit, named_map
+from axisight.logs.guessing.names import joint_in
 from axisight.logs.guessing.others import (
     take_joint_positions,
     take_targets,
@@ -78,6 +79,9 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     series, unused = series_of(arrays)
     unused |= unread
     joints = [] if robot is None else list(robot.axis_names)
+    if not all(any(joint_in(one.name, joint) for one in series) for joint in joints):
+        # Names of another arm: one that both have would be an axis apart.
+        joints = []
     families = families_of(series, joints)
     draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
     family = find_positions(draft)
