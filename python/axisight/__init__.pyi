@@ -64,6 +64,9 @@ from .logs import (
     read_case,
     read_log,
 )
+from .report.forest import (
+    plot_parameters,
+)
 from .report.plots import (
     plot_gap_map,
     plot_log,
@@ -125,6 +128,7 @@ __all__ = [
     "plot_gap_map",
     "plot_log",
     "plot_overlay",
+    "plot_parameters",
     "plot_ranking",
     "plot_response_matrix",
     "plot_simulation",

@@ -10,7 +10,8 @@ import pytest
 from axisight.blind import judged_cases, markdown
 from axisight.blind.calibration import calibration_bins, carried_over
 from axisight.blind.page import render_score
-from axisight.blind.score import Judged
+from axisight.blind.plots import plot_calibration, plot_confusion
+from axisight.blind.score import Judged, Share
 from axisight.blind.summary import summary
 from axisight.errors import InputError
 from pages import assert_strict
@@ -196,3 +197,25 @@ def test_a_verdict_without_its_truth_or_seal_is_named(tmp_path):
     (tmp_path / "truths" / "one.json").write_text("{}")
     with pytest.raises(InputError, match="expected the seal of a case"):
         judged_cases(*folders)
+
+
+def test_what_is_right_stands_on_the_diagonal_of_the_confusion():
+    axes = plot_confusion(summary(CASES)).axes[0]
+    rows = [label.get_text() for label in axes.get_yticklabels()]
+    columns = [label.get_text() for label in axes.get_xticklabels()]
+    assert columns[: len(rows)] == rows
+    cells = {t.get_position(): t.get_text() for t in axes.texts}
+    assert cells[columns.index("backlash") + 0.5, rows.index("backlash") + 0.5] == "1"
+    assert cells[columns.index("nonlinear stiffness") + 0.5, rows.index("backlash") + 0.5] == "1"
+    assert cells[columns.index("none") + 0.5, rows.index("nothing") + 0.5] == "1"
+
+
+def test_probabilities_are_drawn_over_how_often_they_were_right():
+    score = summary(CASES)
+    axes = plot_calibration(score).axes[0]
+    dots = [tuple(c.get_offsets()[0]) for c in axes.collections]
+    assert dots == [(b["probability"], b["right"]) for b in score["calibration"]["bins"]]
+    # With Wilson's interval, as all shares have it.
+    last = score["calibration"]["bins"][-1]
+    share = Share(round(last["right"] * last["count"]), last["count"])
+    assert tuple(axes.lines[-1].get_ydata()) == share.interval()

@@ -1,5 +1,6 @@
 """Figures: what they show, and what they refuse."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,34 @@ def test_overlay_shows_the_arrays_it_was_given():
     item = next(o for o in diagnosis.overlays if o.axis == 2)
     np.testing.assert_array_equal(shown[0].get_ydata(), item.measured_nm)
     np.testing.assert_array_equal(shown[2].get_ydata(), item.after_nm)
+
+
+def test_every_number_of_a_cause_stands_over_itself_with_its_interval(tmp_path):
+    diagnosis = explained()
+    figure = axisight.plot_parameters(diagnosis)
+    figure.savefig(tmp_path / "figure.png")
+    axes = figure.axes[0]
+    cause = diagnosis.causes[0]
+    name, found = next((k, x) for k, x in cause.parameters.items() if x.low < x.high)
+    assert axes.get_yticklabels()[0].get_text().startswith("Coulomb friction, axis 2: ")
+    assert f"{found.value:.4g} [{found.low:.4g}, {found.high:.4g}] Nm" in axes.texts[0].get_text()
+    drawn = axes.lines[1].get_xdata()
+    np.testing.assert_allclose(drawn, [found.low / found.value, found.high / found.value])
+    assert name.endswith("_nm")
+
+
+def test_an_interval_that_holds_zero_has_no_end(tmp_path):
+    diagnosis = explained()
+    cause = diagnosis.causes[0]
+    open_ = replace(cause, parameters={"sine_1_nm": axisight.gap.Interval(0.1, -0.4, 0.6)})
+    axes = axisight.plot_parameters(replace(diagnosis, causes=(open_,))).axes[0]
+    assert list(axes.lines[1].get_xdata()) == [0.0, 2.0]
+    assert [line.get_marker() for line in axes.lines[3:]] == ["<", ">"]
+
+
+def test_without_causes_there_are_no_parameters():
+    with pytest.raises(InputError, match="expected causes with intervals, got none"):
+        axisight.plot_parameters(of("none"))
 
 
 def test_unknown_log_or_axis_is_refused():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
+from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from json import dumps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,7 +19,7 @@ from axisight.cli.common import Force, bars, complain, errors, say, write_each, 
 from axisight.cli.screen import OUT, is_output
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
-from axisight.storage import check_folder, check_targets
+from axisight.storage import check_folder, check_targets, write_bytes
 
 blind_app = typer.Typer(
     add_completion=False,
@@ -93,6 +96,9 @@ def score_command(
         Path | None, typer.Option(help="Write all of it here; - is standard output.")
     ] = None,
     html: Annotated[Path | None, typer.Option(help="Write it here as a page.")] = None,
+    plots: Annotated[
+        Path | None, typer.Option(help="Write confusion.svg and calibration.svg into this folder.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Open the truths: how often a cause was named, missed or invented, and how sure it was."""
@@ -102,6 +108,9 @@ def score_command(
         if piped:
             OUT.leave_output()
         targets = {"--out": out, "--json": None if piped else json, "--html": html}
+        drawn = {} if plots is None else {name: plots / f"{name}.svg" for name in _PLOTS}
+        targets |= {f"--plots ({name})": path for name, path in drawn.items()}
+        results |= {f"--plots ({name})": (".svg",) for name in drawn}
         check_targets(targets, replaces=results, force=force)
         judged = judged_cases(cases, truth, verdicts)
         score = summary(judged)
@@ -110,4 +119,20 @@ def score_command(
         files = {out: text, json: dumps(score, indent=1) + "\n"}
         if html is not None:
             files[html] = render_score(cases.resolve().name, score)
-        write_each([partial(write_text, path, made) for path, made in files.items() if path])
+        writes: list[Callable[[], object]] = [
+            partial(write_text, path, made) for path, made in files.items() if path
+        ]
+        writes += [partial(_draw, name, score, path) for name, path in drawn.items()]
+        write_each(writes)
+
+
+# Functions of `axisight.blind.plots` by what they draw.
+_PLOTS = {"confusion": "plot_confusion", "calibration": "plot_calibration"}
+
+
+def _draw(name: str, score: dict[str, Any], path: Path) -> None:
+    """Write a figure of a score as SVG."""
+    figure = getattr(import_module("axisight.blind.plots"), _PLOTS[name])(score)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None})
+    write_bytes(path, drawn.getvalue())
