@@ -7,7 +7,7 @@
 #   make lint    formatting, clippy, ruff, mypy
 #   make format  rewrite the sources in the format that lint asks for
 #   make docs    regenerate the generated pages and build the site into site/
-#   make gallery draw the effects anew for their page
+#   make gallery draw the effects and all plots anew for their pages
 #   make wheel-smoke   the wheel in an empty environment: installed, asked, its demo run, timed
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
 #   make crash   studies and fleets killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
@@ -83,10 +83,12 @@ docs: $(STAMPS)/docs-tools
 	$(BIN)/python docs/make_verdict.py
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/make_gallery.py --page-only
+	$(BIN)/python docs/make_plots.py --page-only
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 gallery: $(STAMPS)/installed
 	$(BIN)/python docs/make_gallery.py
+	$(BIN)/python docs/make_plots.py
 
 wheel-smoke: $(WHEELS)/.built
 	$(PYTHON) tests/wheel_smoke.py $(WHEELS)

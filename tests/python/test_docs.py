@@ -106,6 +106,16 @@ def test_gallery_is_up_to_date(repository: Path) -> None:
     assert sum(sizes) < 2_000_000
 
 
+def test_every_plotting_function_is_on_its_page(repository: Path) -> None:
+    script = load_script(repository / "docs" / "make_plots.py")
+    page = (repository / "docs" / "plots.md").read_text(encoding="utf-8")
+    assert page == script.render(), "run `make docs`"
+    shown = {path.rpartition(".")[2] for path in script.SHOWN}
+    assert shown == {path.stem for path in script.PICTURES.glob("*.png")}, "run `make gallery`"
+    assert {name for name in dir(axisight) if name.startswith("plot_")} <= shown
+    assert sum(path.stat().st_size for path in script.PICTURES.glob("*.png")) < 1_000_000
+
+
 def test_gallery_draws_what_the_effect_does(repository: Path) -> None:
     script = load_script(repository / "docs" / "make_gallery.py")
     named = [name for names in script.OVER.values() for name in names]
