@@ -49,7 +49,7 @@ def one_for_several(
     layout: Layout,
     settings: Settings,
 ) -> tuple[Ranked, Standing] | None:
-    """Return the first effect that does what several of its axis and family do; None without.
+    """Return the first effect that does what several of its axis do, of its family or parts of it; None without.
 
     ``options``: the candidates, which are tried in their place, as is each of the several; ``floor``
     (n_blocks,): loss of noise alone. It has fewer numbers (a load no more), and may leave a little more; of laws

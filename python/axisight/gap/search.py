@@ -526,7 +526,7 @@ def _simpler(standing: Standing, fitter: ModelFitter) -> Standing:
     part = _first_part(standing)
     if part is None:
         return standing
-    if part in standing.inseparable():
+    if any(r is part for r in standing.inseparable()):
         return standing.led_by(part)
     winner = standing.best
     effect = winner.trial.candidate.effect
