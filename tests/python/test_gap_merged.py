@@ -5,7 +5,7 @@ import pytest
 
 from axisight import Effect, Settings, load_robot
 from axisight.gap.closed_loop import ClosedLoopView
-from axisight.gap.decide import Ranked, Standing, Trial, likelier
+from axisight.gap.decide import Ranked, Standing, Trial, likelier, trial
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import layout_of
 from axisight.gap.merged import one_for_several, several_together
@@ -109,9 +109,11 @@ def test_a_number_more_costs_as_in_the_ranking():
     assert likelier(1.0, 2.0, than=(1.0, 3.0))
 
 
-def in_place_of(machine: list[Effect], free: list[FreeEffect]) -> tuple[Evidence, str | None, int]:
-    """A fit of the arm with effects of a machine that has others, what takes their place, and its axis from 0."""
-    robot = load_robot("irb6600_like")
+def in_place_of(
+    machine: list[Effect], free: list[FreeEffect], arm: str = "irb6600_like"
+) -> tuple[Evidence, str | None, int]:
+    """A fit of an arm with effects of a machine that has others, what takes their place, and its axis from 0."""
+    robot = load_robot(arm)
     n = int(3.0 / robot.sample_time_s)
     logs = []
     for run in range(2):
@@ -148,3 +150,12 @@ def test_a_load_at_the_centre_of_the_last_link_is_a_heavier_link(heavier: bool):
     free = [FreeEffect(LOAD, ("mass_kg", "x_m", "y_m", "z_m"))]
     _, label, axis = in_place_of([link if heavier else LOAD], free)
     assert (label, axis) == (("link_mass@3", 2) if heavier else (None, -1))
+
+
+def test_a_load_of_which_hardly_more_than_the_mass_shows_stays_one():
+    """A slide lifts it, and where it sits moves two axes a little: a heavier link leaves that, of next to nothing."""
+    load = Effect("payload", None, {"mass_kg": 0.5, "x_m": 0.08, "y_m": 0.02, "z_m": -0.13})
+    free = [FreeEffect(load, ("mass_kg", "x_m", "y_m", "z_m"))]
+    model, label, _ = in_place_of([load], free, arm="scara_like")
+    assert label is None
+    assert trial(model.free[-1], model).cost < 4

@@ -61,7 +61,7 @@ def one_for_several(
         groups = {**_beside_a_part(model), **groups}
     for (axis, family), several in groups.items():
         rest = [f for f in model.free if f not in several]
-        count = sum(numbers(f) for f in several)
+        count = _needed_numbers(several, model)
         others = _others(axis, family, several, options)
         try:
             without = fitter.fit(rest, model, lazy=True)
@@ -87,12 +87,21 @@ def one_for_several(
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
         for ranked in standing.ranked:
             alone = float(ranked.trial.held_out[here].sum())
-            mends = not fitter.adds_up and alone - both < _DIFFER.get(family, 0.0) * (none - both)
+            more = _DIFFER.get(family, 0.0) * (none - both)
+            # A lone load needs none of that: no other law has to be imitated.
+            mends = not fitter.adds_up and len(several) > 1 and alone - both < more
             if mends or likelier(alone, ranked.trial.cost, than=(both, count)):
                 return standing.best, standing
             # What leaves more than that is none in their place.
             standing = standing.without(ranked.trial.label)
     return None
+
+
+def _needed_numbers(several: Sequence[FreeEffect], model: Evidence) -> float:
+    """Return how many numbers effects of a model have; of a lone load only those that the logs show."""
+    if len(several) == 1 and model.free[-1] is several[0]:
+        return trial(several[0], model).cost
+    return sum(numbers(f) for f in several)
 
 
 def _others(
