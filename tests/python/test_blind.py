@@ -451,10 +451,13 @@ def test_from_machine_to_score(tmp_path: Path):
         "references": "logged",
     }
     table = tmp_path / "score.md"
+    drawn = tmp_path / "plots"
     arguments = ["--truth", str(truth), "--verdicts", str(out), "--out", str(table)]
+    arguments += ["--plots", str(drawn)]
     scored = shell.invoke(app, ["blind", "score", str(cases), *arguments])
     assert scored.exit_code == 0, scored.output
     assert "| false alarms on nothing withheld | 0/1 = 0 %" in table.read_text("utf-8")
+    assert {p.name for p in drawn.iterdir()} == {"confusion.svg", "calibration.svg"}
     # What cannot be diagnosed counts, and stops nothing else.
     (case / "robot.toml").write_text("schema = 1", "utf-8")
     again = shell.invoke(app, ["blind", "run", str(cases), "--out", str(out), "--workers", "1"])
