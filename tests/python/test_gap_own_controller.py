@@ -129,3 +129,15 @@ def test_positions_read_late_are_no_filter():
         for x in logs
     ]
     assert other_controllers(bare_axis(), late) == ()
+
+
+def test_where_a_log_begins_commands_may_follow_from_what_it_does_not_hold():
+    """Gains 4 % off, and a first speed that the controller knew of: in the log there is none."""
+    off = {"relative_proportional": -0.04, "relative_integral": -0.04}
+    machine = scattered(bare_axis(), 4)
+    logs = logs_of(machine, [Effect("controller_gain", 1, off)], PLAN)
+    kick = 0.2 * np.ptp(logs[0].torque_nm) * np.exp(-np.arange(len(logs[0].time_s)) / 3)
+    begun = [replace(log, torque_nm=log.torque_nm + kick[:, None]) for log in logs]
+    (found,) = other_controllers(bare_axis(), begun)
+    assert found.values["relative_proportional"].value == pytest.approx(-0.04, abs=1e-3)
+    assert found.values["relative_integral"].value == pytest.approx(-0.04, abs=1e-3)

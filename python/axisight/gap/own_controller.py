@@ -31,6 +31,8 @@ _SHARE_OF_NYQUIST = 0.2
 _NOTHING = 1e-4
 # Share of what the stated controller misses that another one may leave, in every log.
 _LEFT = 0.02
+# Periods of the band's edge, over which the low-pass remembers where a log begins.
+_BEGUN = 5
 # Lags of a filter that are looked for [s], and how many before the search is refined.
 _LAGS_S = (1e-4, 0.05)
 _STEPS = 12
@@ -54,7 +56,10 @@ class _Piece:
         self._speed = np.diff(position, prepend=position[:1]) / time
         self._angle = before(self._reference) * time - position
         torque = np.ascontiguousarray(log.torque_nm[:, axis])
-        self._kept = free_of_limits(torque, int(1.0 / (self._band_hz * time)))
+        period = int(1.0 / (self._band_hz * time))
+        self._kept = free_of_limits(torque, period)
+        # What the controller took as the first speed no log knows.
+        self._kept[: _BEGUN * period] = False
         self.torque = self._seen(torque)
 
     def shares(self, lag_s: float = 0.0, late: int = 0) -> Array:
