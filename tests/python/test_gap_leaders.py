@@ -15,13 +15,15 @@ from axisight.gap.trials import Trials
 LOAD, MASS = Effect("payload", None), Effect("link_mass", 3)
 
 
-def ranked(effect: Effect, score: float, cost: float = 1.0, promise: float = 0.0):
+def ranked(effect: Effect, score: float, cost: float = 1.0, promise: float = 0.0, ended=()):
     """A candidate as it stands; ``promise``: share of its loss that a step would still gain."""
     trial = SimpleNamespace(
         label=effect.label,
         candidate=SimpleNamespace(effect=effect),
         cost=cost,
-        evidence=SimpleNamespace(total=100.0, promise=100.0 * promise),
+        evidence=SimpleNamespace(
+            total=100.0, promise=100.0 * promise, effects=(effect,), ended_at_bound=ended
+        ),
     )
     family = effect_info(effect.name).family
     return SimpleNamespace(trial=trial, score=score, gain=1.0, probability=0.98, family=family)
@@ -87,6 +89,11 @@ def test_what_is_more_usual_than_a_clear_leader_is_refined():
         field.standings = lambda _, led=led: [led]
         todo = Trials._worth_refining(field, [], set(), even_felt=True)
         assert [t.label for t in todo] == refined
+    # At its limits the mode is an inertia, whose own fit may have begun far off.
+    at_its_limit = ranked(mode, 0.995, cost=3, ended=((0, "frequency_hz"),))
+    field.standings = lambda _: [standing(0, at_its_limit, ranked(inertia, 0.02))]
+    todo = Trials._worth_refining(field, [], set(), even_felt=True)
+    assert [t.label for t in todo] == ["link_inertia@1"]
 
 
 def test_what_leads_on_its_own_axis_is_refined_beside_its_rivals_elsewhere():

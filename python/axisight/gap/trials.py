@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, effect_info
+from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import FORMULA_ERROR, Ranked, Standing, Trial, falls, stand, trial
 from axisight.gap.edge import BENT, bent
@@ -25,7 +25,7 @@ from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 from axisight.gap.tryout import Tryout
-from axisight.gap.usual import begun_where_it_ended
+from axisight.gap.usual import begun_where_it_ended, ended_at_bound, more_usual
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -452,7 +452,8 @@ class Trials:
             bends = standing.axis in crooked
             count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
             # What is more usual than the leader is it at its limits, until its own fit says no.
-            usual = self.usual | _more_usual(leader.trial)
+            special = more_usual(leader.trial) if ended_at_bound(leader.trial) else set()
+            usual = self.usual | more_usual(leader.trial)
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
                 rivals = ()
@@ -465,6 +466,8 @@ class Trials:
                 here = place in (None, standing.axis + 1) or label in leaders
                 share = _FAR if label in usual else close
                 near = r.score > max(0.5 * self.settings.smallest_score, share * leader.score)
+                # A law at its limits may be the usual one, however badly that was fitted.
+                near = near or label in special
                 if here and near and label not in self.done and r.trial not in out:
                     out.append(r.trial)
         return out
@@ -572,13 +575,6 @@ def _as_good_with_less(standing: Standing) -> list[Ranked]:
 def _are_lags(one: Ranked, other: Ranked) -> bool:
     """Whether both are held against one another by little."""
     return one.family == other.family == "timing"
-
-
-def _more_usual(leader: Trial) -> set[str]:
-    """Return the labels of what is more usual than a leader, on its axis or of the arm."""
-    effect = leader.candidate.effect
-    usual = map(effect_info, effect_info(effect.name).usual)
-    return {Effect(i.name, None if i.scope == "arm" else effect.axis).label for i in usual}
 
 
 def _may_catch_up(one: Ranked, leader: Ranked) -> bool:

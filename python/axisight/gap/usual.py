@@ -34,6 +34,19 @@ def begun_where_it_ended(
     return starts
 
 
+def more_usual(leader: Trial) -> set[str]:
+    """Return the labels of what is more usual than a leader, on its axis or of the arm."""
+    effect = leader.candidate.effect
+    usual = map(effect_info, effect_info(effect.name).usual)
+    return {Effect(i.name, None if i.scope == "arm" else effect.axis).label for i in usual}
+
+
+def ended_at_bound(one: Trial) -> bool:
+    """Whether a number of a candidate ended at its bound: at its limits a law may be the usual one."""
+    last = len(one.evidence.effects) - 1
+    return any(place == last for place, _ in one.evidence.ended_at_bound)
+
+
 def in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
     """Return the values of a fitted effect that another one takes, of the same quantity.
 
