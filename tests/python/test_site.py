@@ -31,8 +31,8 @@ def test_questions_of_a_reader_are_one_click_away(repository: Path) -> None:
     for question, place in (
         ("How do I diagnose my bag?", "models.md#recordings-of-ros"),
         ("What does *undecidable* mean?", "undecidable.md"),
-        ("Which keys has a robot file?", "robot_files.md#keys"),
-        ("How do I add an effect?", "../CONTRIBUTING.md#adding-an-effect"),
+        ("Which keys does a robot file have?", "robot_files.md#keys"),
+        ("How do I add an effect of my own?", "../CONTRIBUTING.md#adding-an-effect"),
     ):
         (row,) = (line for line in index.splitlines() if question in line)
         assert f"]({place})" in row
