@@ -165,7 +165,7 @@ def test_a_linear_step_does_not_lead_past_a_bound_that_is_no_tolerance():
 NO_EFFECT = linear_evidence(np.ones((800, 1)), np.zeros(800), np.zeros(800, int))
 
 
-def a_trial(name: str, n_free: int, held_out: np.ndarray, axis: int = 1) -> Trial:
+def a_trial(name: str, n_free: int, held_out: np.ndarray, axis: int | None = 1) -> Trial:
     names = {
         1: ("viscous_nm_s_rad",),
         2: ("coulomb_nm", "smoothing_rad_s"),
@@ -474,6 +474,20 @@ def test_lags_of_an_axis_are_held_against_one_another_by_less():
     p = {r.trial.candidate.effect.name: r.probability for r in standing(elsewhere).ranked}
     ratio = (1.05 + 0.2) / (1.02 + 0.2)
     assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**30)
+
+
+def test_loads_of_an_axis_and_of_the_arm_are_held_against_one_another_by_next_to_nothing():
+    """What changes rigid bodies has one formula: a load is exact, a heavier link leaves half of the noise more."""
+    mass = a_trial("link_mass", 1, np.full(40, 1.5))
+    load = a_trial("payload", 3, np.full(40, 1.0), axis=None)
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([mass, load]).ranked}
+    # A ten-thousandth of what there was to explain (10), less two numbers more.
+    ratio = (1.5 + 1e-3) / (1.0 + 1e-3)
+    assert p["payload"] / p["link_mass"] == pytest.approx(ratio**30 / 60)
+    elsewhere = a_trial("link_mass", 1, np.full(40, 1.5), axis=2)
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([elsewhere, load]).ranked}
+    ratio = (1.5 + 0.2) / (1.0 + 0.2)
+    assert p["payload"] / p["link_mass"] == pytest.approx(ratio**30 / 60)
 
 
 def test_what_one_log_tells_of_the_simulator_is_no_gain_of_an_effect_that_it_tells_of():

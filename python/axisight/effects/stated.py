@@ -118,6 +118,9 @@ FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad
 CLOCK = ("clock_drift", "relative_rate")
 """What a clock of its own is, and its parameter."""
 
+CABLE = "cable_stiffness"
+"""Cables and hoses: no two pull back by the same law."""
+
 LOOP_LIKE = ("current_loop", "input_delay")
 """A second-order lag, and what it is like where it is well damped."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import LOOP_LIKE, PLAY, SPRING_CHANGES
+from axisight.effects.stated import CABLE, LOOP_LIKE, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
@@ -264,7 +264,7 @@ def stand(
     cost = np.array([*_costs(mine), 0.0, _PARAMETER_COST * unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - cost
     fitted = np.array([_fitted_loss(t.evidence, here) for t in mine])
-    logp = _with_lags_apart(mine, axis, logp, np.maximum(losses, least), explainable)
+    logp = _with_exact_apart(mine, axis, logp, np.maximum(losses, least), explainable)
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
@@ -303,30 +303,34 @@ def _costs(trials: Sequence[Trial]) -> Array:
     return out
 
 
-# Share of the explained error that a delay or a lag leaves where it is the right one (one to two
-# thousandths, on simulated machines of other engines): there is one formula for each.
-_LAG_ERROR = 0.002
+# Share of the explained error that the right one of a family leaves of which each has one formula: a delay
+# or a lag one to two thousandths, on simulated machines of other engines; what changes rigid bodies or
+# their weight less than a ten-thousandth. Cables have many.
+_EXACT = {"timing": 0.002, "load": 1e-4}
 
 
-def _with_lags_apart(
+def _with_exact_apart(
     trials: Sequence[Trial], axis: int, logp: Array, losses: Array, explainable: float
 ) -> Array:
-    """Return log-probabilities with delays and lags of an axis held against one another by what they leave.
+    """Return log-probabilities with members of exact families held against one another by what they leave.
 
-    Together they are as probable as they were; ``losses``: as predicted, the floor at least. On other
-    axes they leave what the rest of the model does.
+    Those of an axis; of loads those of the arm, too. Together they are as probable as they were; ``losses``:
+    as predicted, the floor at least. On other axes they leave what the rest of the model does.
     """
-    lags = [
-        i
-        for i, t in enumerate(trials)
-        if t.candidate.effect.axis == axis + 1 and _family(t.candidate) == "timing"
-    ]
-    if len(lags) < 2:
-        return logp
-    left = losses[lags] + _LAG_ERROR * explainable
-    sharper = -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - _costs(trials)[lags]
     out = logp.copy()
-    out[lags] = logp[lags].max() + sharper - sharper.max()
+    for family, error in _EXACT.items():
+        places = (axis + 1, None) if family == "load" else (axis + 1,)
+        members = [
+            i
+            for i, t in enumerate(trials)
+            if t.candidate.effect.axis in places
+            and _family(t.candidate) == family
+            and t.candidate.effect.name != CABLE
+        ]
+        if len(members) > 1:
+            left = losses[members] + error * explainable
+            sharper = -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - _costs(trials)[members]
+            out[members] = logp[members].max() + sharper - sharper.max()
     return out
 
 

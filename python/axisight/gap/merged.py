@@ -73,8 +73,12 @@ def one_for_several(
         if family == "load":
             place, judged = 0, replace(layout, axis=np.zeros_like(layout.axis))
         here = judged.axis == place
+        settled_ones = _best_settled(fitter, trials)
+        if len(several) == 1 and model.free[-1] is several[0]:
+            # What it gives way to may be no likelier than it: it stays a rival.
+            settled_ones.append(trial(several[0], model))
         standing = stand(
-            _best_settled(fitter, trials),
+            settled_ones,
             held_out_loss(without),
             floor,
             judged,
@@ -86,6 +90,8 @@ def one_for_several(
         standing = replace(standing, axis=axis - 1)
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
         for ranked in standing.ranked:
+            if ranked.trial.label == several[0].effect.label and len(several) == 1:
+                break
             alone = float(ranked.trial.held_out[here].sum())
             more = _DIFFER.get(family, 0.0) * (none - both)
             # A lone load needs none of that: no other law has to be imitated.
