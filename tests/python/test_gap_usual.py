@@ -110,8 +110,9 @@ def test_it_stands_where_its_own_axis_has_no_other(home):
 
 # Falls of a cube of axis 3, a play of axis 1 that feels it, and friction of axis 2 that does not.
 NONE_USUAL = SimpleNamespace(effect=Effect("viscous_friction", 1))
+WITHIN = SimpleNamespace(effects=(NONE_USUAL.effect,), ended_at_bound=())
 TRIED = [
-    SimpleNamespace(label=label, candidate=NONE_USUAL, cost=2.0)
+    SimpleNamespace(label=label, candidate=NONE_USUAL, cost=2.0, evidence=WITHIN)
     for label in ("cube@3", "play@1", "friction@2")
 ]
 FALLS = np.array([[30.0, 1.0, 90.0], [60.0, 1.0, 5.0], [0.1, 9.0, 0.1]])
