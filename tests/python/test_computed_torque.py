@@ -79,7 +79,7 @@ def moves(n: int, sample: float = 5e-4, seed: int = 0) -> Array:
 
 def law(robot: Robot, reference: Array, position: Array) -> Array:
     """Return commands (n, 2) [Nm] by the rigid-body algorithms of Pinocchio."""
-    pinocchio = pytest.importorskip("pinocchio")
+    pinocchio = pytest.importorskip("pinocchio", reason="Pinocchio comes with the extra `blind`")
     model, time = to_pinocchio(robot), robot.sample_time_s
     data, ratio = model.createData(), np.array(RATIO)
     target = position[0] + np.vstack([np.zeros(2), np.cumsum(reference, axis=0)[:-1]]) * time

@@ -62,13 +62,13 @@ def plot_calibration(score: Mapping[str, Any]) -> Figure:
             [at[0]] * 2, Share(round(at[1] * b["count"]), b["count"]).interval(), color=AFTER, lw=1
         )
         axes.scatter(*at, s=12 + 90 * b["count"] / most, color=AFTER, zorder=3)
-        axes.annotate(str(b["count"]), at, (7, -9), textcoords="offset points", fontsize=7)
+        axes.annotate(str(b["count"]), at, (7, -3), textcoords="offset points", fontsize=7)
     error = score["calibration"]["error"]
     if error is not None:
         axes.set_title(f"expected calibration error {error:.3f}", fontsize=10)
     axes.set(
-        xlim=(0, 1.03),
-        ylim=(0, 1.03),
+        xlim=(-0.03, 1.04),
+        ylim=(-0.03, 1.04),
         xlabel="probability said [1]",
         ylabel="share that was right [1]",
     )
