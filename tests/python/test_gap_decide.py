@@ -490,6 +490,45 @@ def test_loads_of_an_axis_and_of_the_arm_are_held_against_one_another_by_next_to
     assert p["payload"] / p["link_mass"] == pytest.approx(ratio**30 / 60)
 
 
+def test_constant_errors_of_torque_are_held_against_loads_so_where_one_leaves_nothing():
+    constant = a_trial("torque_constant", 1, np.full(40, 1.5))
+    load = a_trial("link_mass", 1, np.full(40, 1.0))
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([constant, load]).ranked}
+    assert p["link_mass"] / p["torque_constant"] == pytest.approx((1.501 / 1.001) ** 30)
+    # Where the best of them leaves a hundredth of what there was, formulas or something else are missing.
+    constant = a_trial("torque_constant", 1, np.full(40, 1.6))
+    load = a_trial("link_mass", 1, np.full(40, 1.1))
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([constant, load]).ranked}
+    assert p["link_mass"] / p["torque_constant"] == pytest.approx((1.8 / 1.3) ** 30)
+
+
+def test_a_deadband_that_is_an_offset_everywhere_is_no_likelier_than_it():
+    offset = a_trial("torque_offset", 1, np.full(40, 1.5))
+    band = a_trial("torque_deadband", 1, np.full(40, 1.5))
+    other = a_trial("torque_saturation", 1, np.full(40, 1.501))
+    load = a_trial("link_mass", 1, np.full(40, 1.0))
+    found = standing([offset, band, other, load])
+    p = {r.trial.candidate.effect.name: r.probability for r in found.ranked}
+    assert p["torque_deadband"] == pytest.approx(p["torque_offset"]) == pytest.approx(0, abs=1e-4)
+    assert p["torque_saturation"] > 5 * p["torque_offset"]
+
+
+def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise():
+    plain = a_trial("coulomb_friction", 1, np.full(40, 1.1))
+    falling = a_trial("stribeck_friction", 1, np.full(40, 1.0))
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([plain, falling]).ranked}
+    # Half a thousandth of what there was to explain (10); numbers cost.
+    numbers = falling.cost - plain.cost
+    cost = 60.0 ** (0.5 * numbers)
+    assert p["stribeck_friction"] / p["coulomb_friction"] == pytest.approx(
+        (1.105 / 1.005) ** 30 / cost
+    )
+    # Where the best leaves four times the noise, formulas may differ by that.
+    plain, falling = (replace(t, held_out=t.held_out + 4.0) for t in (plain, falling))
+    p = {r.trial.candidate.effect.name: r.probability for r in standing([plain, falling]).ranked}
+    assert p["stribeck_friction"] / p["coulomb_friction"] == pytest.approx((5.3 / 5.2) ** 30 / cost)
+
+
 def test_what_one_log_tells_of_the_simulator_is_no_gain_of_an_effect_that_it_tells_of():
     """Of a log that alone tells of both: with an effect of no size it is left out in stretches."""
     rng = np.random.default_rng(3)

@@ -1,11 +1,16 @@
 """Where a step from nothing promises little, candidates begin where they may be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from axisight import Effect, Settings
+from axisight.effects import effect_info
 from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.orders import Turning
 from axisight.gap.screening import Bench, Screen
+from axisight.gap.starts import STARTS, Situation, Trial
 from gap_data import bare_axis, logs_of
 
 PLAN = {"multisine": ("multisine", 1)}
@@ -38,6 +43,23 @@ def test_a_cube_that_is_most_of_its_spring_is_found():
     assert (start.option.effect.parameters or {})["cubic_nm_rad3"] == pytest.approx(cubic, rel=0.2)
     (promise,) = screen.starts([option.at({"cubic_nm_rad3": 0.0})])
     assert promise.gain == pytest.approx(start.gain)
+
+
+def test_a_cube_is_looked_for_where_weight_bends_the_spring():
+    """Held by a torque three times as large as what moves it, a spring ten times softer does as much."""
+    robot = bare_axis()
+    log = logs_of(robot, [], PLAN)[0]
+    most = float(np.std(log.torque_nm))
+    raised = replace(log, torque_nm=log.torque_nm - log.torque_nm.mean() + 3.0 * most)
+    turn = Turning(np.ones(8), np.zeros(8), np.zeros(8), 1e-3)
+    at = Situation([[turn]], lambda *_: np.zeros(0), np.zeros(1))
+
+    def first(one):
+        trial = Trial(effect_info("nonlinear_stiffness"), 1, robot, [one], at)
+        return STARTS["nonlinear_stiffness"](trial).starts[0]["cubic_nm_rad3"]
+
+    level = replace(log, torque_nm=log.torque_nm - log.torque_nm.mean())
+    assert first(level) / first(raised) == pytest.approx(1 + 3.0**2, rel=1e-6)
 
 
 def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():

@@ -118,8 +118,23 @@ FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad
 CLOCK = ("clock_drift", "relative_rate")
 """What a clock of its own is, and its parameter."""
 
-CABLE = "cable_stiffness"
-"""Cables and hoses: no two pull back by the same law."""
+ONE_FORMULA = frozenset(
+    {
+        "payload",
+        "motor_inertia",
+        "gravity_compensation",
+        "link_mass",
+        "link_com",
+        "link_inertia",
+        "link_geometry",
+        "rotor_inertia",
+        "base_tilt",
+        "joint_zero_offset",
+        "torque_constant",
+        "torque_offset",
+    }
+)
+"""What weight, inertia and constant errors of torque are: whoever writes them, the formula is the same."""
 
 LOOP_LIKE = ("current_loop", "input_delay")
 """A second-order lag, and what it is like where it is well damped."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import CABLE, LOOP_LIKE, PLAY, SPRING_CHANGES
+from axisight.effects.stated import LOOP_LIKE, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
+from axisight.gap.apart import held_apart
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
@@ -170,6 +171,10 @@ class Standing:
             for i in usual
             for axis in axes
         }
+        return self.weighed(odds)
+
+    def weighed(self, odds: Mapping[str, float]) -> Standing:
+        """Return the same with some candidates, by label, counted for as many times as probable."""
         weighed = [
             replace(r, probability=odds.get(r.trial.label, 1.0) * r.probability)
             for r in self.ranked
@@ -264,7 +269,15 @@ def stand(
     cost = np.array([*_costs(mine), 0.0, _PARAMETER_COST * unknown])
     logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - cost
     fitted = np.array([_fitted_loss(t.evidence, here) for t in mine])
-    logp = _with_exact_apart(mine, axis, logp, np.maximum(losses, least), explainable)
+    logp = held_apart(
+        [t.candidate for t in mine],
+        axis,
+        logp,
+        losses,
+        explainable,
+        least,
+        lambda left, which: -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - cost[which],
+    )
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
@@ -301,41 +314,6 @@ def _costs(trials: Sequence[Trial]) -> Array:
         if name == loop and (like, axis) in places:
             out[i] = min(out[i], out[places[like, axis]] + _RARER)
     return out
-
-
-# Share of the explained error that the right one of a family leaves of which each has one formula: a delay
-# or a lag one to two thousandths, on simulated machines of other engines; what changes rigid bodies or
-# their weight less than a ten-thousandth. Cables have many.
-_EXACT = {"timing": 0.002, "load": 1e-4}
-
-
-def _with_exact_apart(
-    trials: Sequence[Trial], axis: int, logp: Array, losses: Array, explainable: float
-) -> Array:
-    """Return log-probabilities with members of exact families held against one another by what they leave.
-
-    Those of an axis; of loads those of the arm, too. Together they are as probable as they were; ``losses``:
-    as predicted, the floor at least. On other axes they leave what the rest of the model does.
-    """
-    out = logp.copy()
-    for family, error in _EXACT.items():
-        places = (axis + 1, None) if family == "load" else (axis + 1,)
-        members = [
-            i
-            for i, t in enumerate(trials)
-            if t.candidate.effect.axis in places
-            and _family(t.candidate) == family
-            and t.candidate.effect.name != CABLE
-        ]
-        if len(members) > 1:
-            left = losses[members] + error * explainable
-            sharper = -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - _costs(trials)[members]
-            out[members] = logp[members].max() + sharper - sharper.max()
-    return out
-
-
-def _family(candidate: FreeEffect) -> str:
-    return effect_info(candidate.effect.name).family
 
 
 # Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which

@@ -45,6 +45,7 @@ from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.straight import bent_for
 from axisight.gap.targets import Commanded, with_commands
+from axisight.gap.told import with_constants_told
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
@@ -117,6 +118,7 @@ def diagnose(
         view = inputs.view(chosen)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    found = with_constants_told(found, view.fitter, view.shown)
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)

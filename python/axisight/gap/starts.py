@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,13 +162,13 @@ def _stiffness(trial: Trial) -> float:
     return robot.parameters()[f"{robot.axis_names[trial.index]}.stiffness"]
 
 
-def _deflection_rad(trial: Trial) -> float:
-    """Return the deflection of the gear under the torque of the log that moves it most.
+def _deflection_rad(trial: Trial, size: Callable[[Array], Any] = np.std) -> float:
+    """Return the deflection of the gear under the torque of the log that moves it most, by ``size``.
 
     Not less than what shapes of gears are stated for.
     """
     ratio = abs(float(trial.robot.gear_ratio[trial.index]))
-    most = max(float(np.std(torque)) for torque in trial.torque())
+    most = max(float(size(torque)) for torque in trial.torque())
     return max(most / ratio / _stiffness(trial), _LEAST_DEFLECTION_RAD)
 
 
@@ -206,9 +207,13 @@ def _play(trial: Trial) -> FreeEffect:
     return replace(begin, starts=tuple({"half_width_rad": float(w)} for w in widths))
 
 
-# A cube as stiff at the largest deflection as so many linear springs: beyond one, a step from none of it
-# says little.
-_HARDER = (1.0, 3.0, 10.0, 30.0)
+# A cube as stiff at the deflection as so many linear springs: near one, a step from none of it says little.
+_HARDER = (0.3, 1.0, 3.0, 10.0, 30.0)
+
+
+def _with_weight(torque: Array) -> float:
+    """Return the size of a torque whose mean bends a spring as what varies does."""
+    return float(np.sqrt(np.mean(torque**2)))
 
 
 def _hardening(trial: Trial) -> FreeEffect:
@@ -216,7 +221,7 @@ def _hardening(trial: Trial) -> FreeEffect:
     begin = _of_a_gear(trial)
     if _axis_share(trial.at, trial.index) <= _SMALL_SHARE:
         return begin
-    unit = _stiffness(trial) / _deflection_rad(trial) ** 2
+    unit = _stiffness(trial) / _deflection_rad(trial, _with_weight) ** 2
     return replace(begin, starts=tuple({"cubic_nm_rad3": share * unit} for share in _HARDER))
 
 

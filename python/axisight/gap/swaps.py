@@ -44,7 +44,7 @@ def straightened(
     best: tuple[Evidence, Ranked, Found] | None = None
     for cause, standings in entered:
         for rival in _rivals(cause, standings):
-            other = _with(fitter, model, cause, rival[0])
+            other = in_its_place(fitter, model, cause, rival[0])
             least = model.total if best is None else best[0].total
             if other is not None and other.total < least and bent(fitter, other) < BENT:
                 best = other, cause, rival
@@ -81,7 +81,7 @@ def weighed_again(
     # A trial is of the last effect of its model.
     fits = {label: fitter.fit([*rest, mine], model, lazy=True)}
     for r in rivals:
-        other = _with(fitter, model, cause, r)
+        other = in_its_place(fitter, model, cause, r)
         if other is not None and len(other.free) == len(free):
             fits[r.trial.label] = other
     without = fitter.fit(rest, model, lazy=True)
@@ -117,7 +117,10 @@ def _rivals(cause: Ranked, standings: Sequence[Standing]) -> list[Found]:
     return ranked[:_RIVALS]
 
 
-def _with(fitter: ModelFitter, model: Evidence, cause: Ranked, rival: Ranked) -> Evidence | None:
+def in_its_place(
+    fitter: ModelFitter, model: Evidence, cause: Ranked, rival: Ranked
+) -> Evidence | None:
+    """Return a model with a rival in the place of one of its causes; None where it cannot be simulated."""
     new = rival.trial.evidence.free[-1]
     others = [f for f in model.free if f.effect.label != cause.trial.label]
     free = [*kept_beside(others, new), new]

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
 from axisight.gap.named import NamedCause
+from axisight.gap.shown import ShownCause
 
 # The gains agree to this share, and the torque constant with their inverse to that.
 _SAME_GAINS = 0.008
@@ -37,6 +38,14 @@ def with_torque_sensors(
         acting = [e for e in acting if (e.name, e.axis) not in gone]
         acting = [Effect(TORQUE_SENSOR[0], gains.axis, value), *acting]
     return tuple(kept), tuple(acting)
+
+
+def share_reported(cause: ShownCause) -> float | None:
+    """Return the share by which a torque is reported too large, where both gains are off by one; else None."""
+    if cause.name != OTHER_GAINS[0] or not cause.values.keys() >= set(OTHER_GAINS[1]):
+        return None
+    proportional, integral = (cause.values[name].value for name in OTHER_GAINS[1])
+    return proportional if abs(proportional - integral) < _SAME_GAINS else None
 
 
 def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str], ...]:
