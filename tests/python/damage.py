@@ -7,7 +7,7 @@ import numpy as np
 from reading_children import wrong
 
 # Of each format; `make fuzz` asks for more.
-TIMES = int(os.environ.get("AXISIGHT_FUZZ", "200"))
+TIMES = int(os.environ.get("AXISIGHT_FUZZ", "1000"))
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
