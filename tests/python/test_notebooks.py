@@ -21,6 +21,8 @@ from axisight.display import html
 from axisight.display.bars import terminal_bars
 from axisight.frequency_fit.result import FrequencyFit
 from axisight.graybox.axis_result import AxisFit
+from axisight.logs import Case, LogReport
+from axisight.logs.findings import Finding
 from axisight.rigid_body.from_logs import LogIdentification
 from axisight.rigid_body.result import RigidBodyEstimate
 from diagnosis_data import HOSTILE, VERDICTS, explained, hostile, of
@@ -145,6 +147,30 @@ def test_a_log_shows_what_it_has():
     assert "torque" not in text
 
 
+def case(name: str = "mine") -> Case:
+    logs = (log(name), log("held out"))
+    return Case(name, Path(), Path(name), logs, ("estimation", "validation"))
+
+
+def report(name: str = "torque_1") -> LogReport:
+    findings = (Finding("ok", "rate", "uniform"), Finding("error", name, f"{name}: NaN"))
+    return LogReport(Path(name), findings, 500.0, 40, 2)
+
+
+def test_a_case_shows_what_logs_are_for():
+    text = shown(case())
+    assert "mine log for duration rate axes mine estimation 1 s 100 Hz 2" in text
+    assert "held out validation" in text
+
+
+def test_a_report_on_a_log_shows_errors_first():
+    text = shown(report())
+    assert "torque_1: cannot be read, 40 samples, at 500 Hz, 2 axes" in text
+    assert text.index("error torque_1") < text.index("ok rate uniform")
+    sound = replace(report(), findings=(Finding("ok", "rate", "uniform"),), n_axes=None)
+    assert "can be read, 40 samples, at 500 Hz what" in shown(sound)
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_diagnosis_shows_verdict_causes_and_gap(verdict):
     found = of(verdict)
@@ -190,6 +216,8 @@ ATTACKED = {
     "axis fit": lambda: axis_fit(HOSTILE),
     "fit to logs": lambda: log_identification(HOSTILE),
     "study": lambda: study(HOSTILE),
+    "case": lambda: case(HOSTILE),
+    "report on a log": lambda: report(HOSTILE),
 }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import shown, usable_path
+from axisight.display import html
 from axisight.documents import parse_toml
 from axisight.errors import CaseError
 from axisight.logs.columns import describe_validation
@@ -54,6 +55,23 @@ class Case:
     robot_path: Path
     logs: tuple[Log, ...]
     roles: tuple[Role, ...]
+
+    def _repr_html_(self) -> str:
+        """What each log is for, for notebooks."""
+        rows = [
+            (
+                log.name,
+                role,
+                f"{log.duration_s:g} s",
+                f"{log.sample_rate_hz:.6g} Hz",
+                str(log.n_axes),
+            )
+            for log, role in zip(self.logs, self.roles, strict=True)
+        ]
+        head = ("log", "for", "duration", "rate", "axes")
+        return html.page(
+            self.name, html.table(head, rows), html.lines([f"robot {self.robot_path}"])
+        )
 
     @property
     def estimation(self) -> tuple[Log, ...]:

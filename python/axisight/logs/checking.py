@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from axisight.arguments import short
+from axisight.display import html
 from axisight.errors import LogError
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel, Gathered, gather
@@ -31,6 +32,9 @@ _UNITS = {
 }
 
 
+_GRAVEST = ("error", "warning", "ok")
+
+
 @dataclass(frozen=True)
 class LogReport:
     """What `check_log` found; rate, samples and axes are None where they could not be found out."""
@@ -40,6 +44,19 @@ class LogReport:
     sample_rate_hz: float | None = None
     n_samples: int | None = None
     n_axes: int | None = None
+
+    def _repr_html_(self) -> str:
+        """Every finding, errors first, for notebooks."""
+        worst_first = sorted(self.findings, key=lambda f: _GRAVEST.index(f.severity))
+        rows = [(f.severity, f.column, f.message) for f in worst_first]
+        known = [
+            "" if self.n_samples is None else f"{self.n_samples} samples",
+            "" if self.sample_rate_hz is None else f"at {self.sample_rate_hz:.6g} Hz",
+            "" if self.n_axes is None else f"{self.n_axes} axes",
+        ]
+        verdict = "can be read" if self.ok else "cannot be read"
+        title = ", ".join(filter(None, [f"{self.path}: {verdict}", *known]))
+        return html.page(title, html.table(("", "what", "finding"), rows))
 
     @property
     def ok(self) -> bool:
