@@ -121,7 +121,7 @@ def test_files_that_are_no_verdict_are_refused(tmp_path):
 
 def background(session, run):
     return Background(
-        "demo", session.robot, session.estimation, session.validation, Settings(), run
+        "demo", session.robot, session.estimation, session.validation, Settings(), run=run
     )
 
 

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from axisight import Effect, Log, Robot, diagnose, load_robot, simulate
 from axisight.cli import app
 from axisight.errors import InputError
+from axisight.explore.session import Session, Version
 from axisight.gap import verdict_schema
 from axisight.gap.own_simulator import differs, noted, paired
 from gap_data import log_of
@@ -76,6 +77,11 @@ def test_what_the_model_lacks_of_the_simulator_is_no_cause(
     gap = np.sqrt((error**2).mean(axis=0) / real[2].torque_nm.var(axis=0))
     # Noise is drawn twice, in theirs and in the logs.
     assert found.gap.before_per_axis == pytest.approx(gap, rel=0.05)
+    # The explorer shows the same gap, which what the machine has takes away.
+    seen = Session("beside", robot, real[:2], real[2:], simulated=theirs)
+    assert seen.held_gap() == pytest.approx(found.gap.before_per_axis)
+    left = seen.held_gap(Version.of([MACHINES]))
+    assert left[2] < 0.5 * seen.held_gap()[2]
 
 
 def test_a_model_that_is_the_simulator_changes_nothing(robot: Robot, real: list[Log]) -> None:

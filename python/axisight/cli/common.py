@@ -42,6 +42,15 @@ Model = Annotated[
 ]
 
 
+Simulated = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Log of your own simulator under the references of a log: one for each estimation log, "
+        "then each validation log (repeatable)."
+    ),
+]
+
+
 Validation = Annotated[
     list[Path] | None,
     typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),

@@ -21,6 +21,7 @@ from axisight.cli.common import (
     From,
     MaxBytes,
     Model,
+    Simulated,
     To,
     Untrusted,
     Validation,
@@ -116,13 +117,7 @@ def diagnose_command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
     effect: GivenEffects = None,
-    simulated: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Log of your own simulator under the references of a log: one for each estimation log, "
-            "then each validation log (repeatable)."
-        ),
-    ] = None,
+    simulated: Simulated = None,
     next_experiment: Annotated[
         Path | None,
         typer.Option(

@@ -15,8 +15,11 @@ from axisight.cli.common import (
     Columns,
     CutoffHz,
     Despite,
+    From,
     MaxBytes,
     Model,
+    Simulated,
+    To,
     Untrusted,
     Validation,
     bars,
@@ -45,6 +48,9 @@ def explore_command(
     cutoff_hz: CutoffHz = None,
     despite: Despite = None,
     effect: GivenEffects = None,
+    simulated: Simulated = None,
+    start_s: From = 0.0,
+    stop_s: To = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of the page. Default: a free one.")
     ] = 0,
@@ -69,6 +75,8 @@ def explore_command(
             validation or [],
             columns,
             load,
+            (start_s, stop_s),
+            simulated or [],
             untrusted=untrusted,
             max_bytes=max_bytes,
         )

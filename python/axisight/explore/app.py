@@ -31,14 +31,15 @@ def prepared(
     """
     said = None if verdict is None else read_said(verdict)
     progress("preparing the simulator", 0, 2)
-    session = Session(inputs.name, inputs.robot, inputs.estimation, inputs.validation, settings)
+    given = (inputs.name, inputs.robot, inputs.estimation, inputs.validation)
+    session = Session(*given, settings, inputs.simulated)
     progress("preparing the simulator", 1, 2)
     # The curve everything is compared with.
     session.see(0)
     progress("preparing the simulator", 2, 2)
     # One thread is left to the sliders; threads change no result.
     fewer = replace(settings, threads=max(1, settings.threads - 1))
-    work = Background(inputs.name, inputs.robot, inputs.estimation, inputs.validation, fewer)
+    work = Background(*given, fewer, inputs.simulated)
     return State(session, work, said)
 
 

@@ -30,10 +30,12 @@ class Background:
         estimation: Sequence[Log],
         validation: Sequence[Log],
         settings: Settings,
+        simulated: Sequence[Log] = (),
         run: Callable[..., Any] = diagnose,
     ) -> None:
         self._work = {"name": name, "robot": robot, "settings": settings}
         self._work |= {"estimation": list(estimation), "validation": list(validation)}
+        self._work |= {"simulated": list(simulated)}
         self._run, self._stop = run, threading.Event()
         self._thread: threading.Thread | None = None
         self.state, self.says, self.share = "idle", "", 0.0

@@ -87,13 +87,20 @@ class Session:
         estimation: Sequence[Log],
         validation: Sequence[Log],
         settings: Settings | None = None,
+        simulated: Sequence[Log] = (),
     ) -> None:
-        """Prepare what does not change; raises as `axisight.diagnose` for logs and robots it refuses."""
+        """Prepare what does not change; raises as `axisight.diagnose` for logs and robots it refuses.
+
+        ``simulated``: logs of the user's own simulator, as there: what is compared is theirs then.
+        """
         self.name, self.given = name, robot
         self.estimation, self.validation = tuple(estimation), tuple(validation)
         self.settings = settings or Settings()
-        inputs = behind_gate(robot, estimation, validation, self.settings.despite)
+        inputs = behind_gate(robot, estimation, validation, self.settings.despite, simulated)
         self.view: View = inputs.view(self.settings)
+        if inputs.beside:
+            inputs = inputs.against(self.view, inputs.beside, self.settings)
+            self.view = inputs.view(self.settings)
         self.robot = inputs.robot
         self.logs: tuple[Log, ...] = (*inputs.estimation, *inputs.validation)
         self.roles = ("estimation",) * len(estimation) + ("validation",) * len(validation)
