@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from axisight.effects import Effect
-from axisight.gap.decide import Standing, Trial, clearly_worse, stand, trial
+from axisight.gap.decide import Standing, Trial, clearly_worse, of_one_formula, stand, trial
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout, layout_of
 from axisight.gap.score import held_out_loss, linear_gain
@@ -511,6 +511,14 @@ def test_a_deadband_that_is_an_offset_everywhere_is_no_likelier_than_it():
     p = {r.trial.candidate.effect.name: r.probability for r in found.ranked}
     assert p["torque_deadband"] == pytest.approx(p["torque_offset"]) == pytest.approx(0, abs=1e-4)
     assert p["torque_saturation"] > 5 * p["torque_offset"]
+
+
+def test_what_is_held_apart_by_next_to_nothing_is_near_enough_for_it():
+    losses = {"link_mass": 1.0, "torque_constant": 1.008, "payload": 1.02, "backlash": 1.001}
+    found = standing([a_trial(n, 1, np.full(40, loss)) for n, loss in losses.items()])
+    assert [r.trial.candidate.effect.name for r in of_one_formula(found)] == ["torque_constant"]
+    other = found.led_by(next(r for r in found.ranked if r.trial.label == "backlash@1"))
+    assert of_one_formula(other) == []
 
 
 def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise():

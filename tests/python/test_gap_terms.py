@@ -104,25 +104,32 @@ def test_coordinates_that_nothing_shows_are_idle():
     assert cost((2.0, 1.0, 1.0, 0.0), alike=20.0) == 2.0
 
 
+def cost_of_two(name: str, axis: int | None, values: dict[str, float]) -> float:
+    found = load((0.0, 0.0, *values.values()))
+    effect = Effect(name, axis, values)
+    free = FreeEffect(effect, tuple(values))
+    names = ((None, "p"), (None, "q"), *((0, n) for n in values))
+    return trial(free, replace(found, effects=(effect,), free=(free,), parameters=names)).cost
+
+
 def test_a_balancer_that_stands_upright_has_one_number():
     """One that does not, but where its torque is largest, has two: else every constant would be one."""
-    names = ("sine_nm", "cosine_nm")
 
     def cost(sine: float, cosine: float) -> float:
-        found = load((0.0, 0.0, sine, cosine))
-        effect = Effect("gravity_compensation", 1, {"sine_nm": sine, "cosine_nm": cosine})
-        return trial(
-            FreeEffect(effect, names),
-            replace(
-                found,
-                effects=(effect,),
-                free=(FreeEffect(effect, names),),
-                parameters=((None, "p"), (None, "q"), *((0, n) for n in names)),
-            ),
-        ).cost
+        return cost_of_two("gravity_compensation", 1, {"sine_nm": sine, "cosine_nm": cosine})
 
     assert cost(1.0, 1e-3) == 1.0
     assert cost(1e-3, 1.0) == cost(1.0, 1.0) == 2.0
+
+
+def test_a_base_that_is_tilted_one_way_has_one_number():
+    """Of a single axis there is no other way."""
+
+    def cost(x: float, y: float) -> float:
+        return cost_of_two("base_tilt", None, {"about_x_rad": x, "about_y_rad": y})
+
+    assert cost(1.0, 1e-3) == cost(0.0, 1.0) == 1.0
+    assert cost(1.0, 1.0) == 2.0
 
 
 def test_of_a_centre_of_mass_one_coordinate_stays():

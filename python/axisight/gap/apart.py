@@ -25,7 +25,7 @@ Members = NDArray[np.int64]
 _LAGS, _LAWS, _EXACT = 0.002, 5e-4, 1e-4
 # Next to nothing, as a share of that: real machines leave more of any law. And hardly more than noise: of a
 # law of friction that leaves more, it is not known what of it the law leaves.
-_NEXT_TO_NOTHING = 1e-3
+NEXT_TO_NOTHING = 1e-3
 _HARDLY_MORE = 4.0
 # Sums of the same residuals in another order.
 _ROUNDING = 1e-9
@@ -72,7 +72,7 @@ def _kinds(
     friction = here & (families == "friction")
     if leave(friction, _HARDLY_MORE * least):
         yield np.flatnonzero(friction), _LAWS
-    nothing = leave(one, least + _NEXT_TO_NOTHING * explainable)
+    nothing = leave(one, least + NEXT_TO_NOTHING * explainable)
     yield np.flatnonzero(one if nothing else one & (families == "load")), _EXACT
 
 

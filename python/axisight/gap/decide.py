@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import LOOP_LIKE, PLAY, SPRING_CHANGES
+from axisight.effects.stated import LOOP_LIKE, ONE_FORMULA, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
-from axisight.gap.apart import held_apart
+from axisight.gap.apart import NEXT_TO_NOTHING, held_apart
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
@@ -388,6 +388,34 @@ def log_ratio(left: Array, explained: Array, samples: Array) -> Array:
 def clearly_worse(loss: float, than: float) -> bool:
     """Whether a held-out loss is worse by more than a likelihood ratio of e^2."""
     return bool(0.5 * _INDEPENDENT_BLOCKS * np.log(loss / than) > 2.0)
+
+
+def as_good_with_less(standing: Standing) -> list[Ranked]:
+    """Return the rivals that need fewer numbers than the leader, and explain nearly as much.
+
+    What they leave more may be the error of sensitivities that are not their own.
+    """
+    leader = standing.best
+    return [
+        r
+        for r in standing.ranked[1:]
+        if r.trial.cost < leader.trial.cost and r.score > leader.score - FORMULA_ERROR
+    ]
+
+
+def of_one_formula(standing: Standing) -> list[Ranked]:
+    """Return the rivals that are held against the winner by next to nothing, and near enough for that.
+
+    Fits that ended early are no ground for it.
+    """
+    first = standing.best
+    least = first.score - NEXT_TO_NOTHING
+    return [
+        r
+        for r in standing.ranked[1:]
+        if {r.trial.candidate.effect.name, first.trial.candidate.effect.name} <= ONE_FORMULA
+        and r.score > least
+    ]
 
 
 def without_composite(standing: Standing, part: Ranked) -> Standing:

@@ -501,11 +501,24 @@ def _merge(
         fitter, state.model, options, state.floor, state.layout, settings
     ):
         evidence = found[0].trial.evidence
-        gone |= {f.effect.label for f in state.model.free} - {e.label for e in evidence.effects}
-        left = state.left()
+        left, now = {f.effect.label for f in state.model.free}, {e.label for e in evidence.effects}
+        gone |= left - now
+        taken = _as_it_stood(found, left - now, state)
+        before = state.left()
         state.model = settled(fitter, evidence.free, evidence)
-        state.rounds.append(Round((found[1],), (found,), left))
+        state.rounds.append(Round((taken[1],), (taken,), before))
     return gone
+
+
+def _as_it_stood(
+    found: tuple[Ranked, Standing], gone: set[str], state: Search
+) -> tuple[Ranked, Standing]:
+    """Return what takes the place of one cause as it stood beside that; there it had all its rivals."""
+    for cause, standing in state.accepted if len(gone) == 1 else ():
+        if cause.trial.label in gone:
+            same = [r for r in standing.inseparable() if r.trial.label == found[0].trial.label]
+            return (same[0], standing.led_by(same[0])) if same else found
+    return found
 
 
 def _first_part(standing: Standing) -> Ranked | None:

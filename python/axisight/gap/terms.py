@@ -2,8 +2,8 @@
 
 Orders of a ripple are taken from the residual of the simulator; beside the right one, what is left of it
 at neighbouring orders is taken in too. Of a load or a centre of mass one coordinate may be all that a
-motion shows; a balancer mostly stands upright where its axis is at zero. An effect is not to pay for what says
-nothing for it.
+motion shows, of a tilted base one direction; a balancer mostly stands upright where its axis is at zero.
+An effect is not to pay for what says nothing for it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Term = tuple[tuple[str, ...], float]
 
 # Fitted values of a term of a series: cosine, sine and order.
 _OF_A_WAVE = 3.0
-_COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm")
+_COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm", "about_x_rad", "about_y_rad")
 
 
 def idle_numbers(evidence: Evidence, pays: Callable[[float, float, float], bool]) -> float:

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.errors import InputError
-from axisight.gap.decide import FORMULA_ERROR, Ranked, Standing, Trial, falls, stand, trial
+from axisight.gap.decide import (
+    Ranked,
+    Standing,
+    Trial,
+    as_good_with_less,
+    falls,
+    of_one_formula,
+    stand,
+    trial,
+)
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.gear_laws import begun_on_curves
@@ -457,7 +466,8 @@ class Trials:
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
                 rivals = ()
-            usual |= {r.trial.label for r in _as_good_with_less(standing)}
+            usual |= {r.trial.label for r in as_good_with_less(standing)}
+            usual |= {r.trial.label for r in of_one_formula(standing)}
             rivals += tuple(
                 r for r in standing.ranked if r.trial.label in usual and r not in rivals
             )
@@ -557,19 +567,6 @@ def _clear(standing: Standing) -> bool:
         return False
     alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
-
-
-def _as_good_with_less(standing: Standing) -> list[Ranked]:
-    """Return the rivals that need fewer numbers than the leader, and explain nearly as much.
-
-    What they leave more may be the error of sensitivities that are not their own.
-    """
-    leader = standing.best
-    return [
-        r
-        for r in standing.ranked[1:]
-        if r.trial.cost < leader.trial.cost and r.score > leader.score - FORMULA_ERROR
-    ]
 
 
 def _are_lags(one: Ranked, other: Ranked) -> bool:
