@@ -173,6 +173,82 @@ def test_an_mjcf_has_gains_springs_and_rotors(tmp_path: Path):
     assert 'gainprm="1.02"/>' in other.path.read_text()
 
 
+DRIVE = [
+    several("torque_saturation", 1, limit_nm=3.0),
+    several("input_delay", 1, delay_s=0.007),
+    several("actuator_bandwidth", 1, time_constant_s=0.004),
+    GAIN,
+]
+
+
+def test_a_motor_of_an_mjcf_has_limits_delays_and_lags(tmp_path: Path):
+    """MuJoCo makes of a command what the torque path of the effects does, and it is read again as such."""
+    mujoco = pytest.importorskip("mujoco", minversion="4.0")
+    source = written(tmp_path, MJCF, "arm.xml")
+    made = write_model(source, load_robot(source), DRIVE, tmp_path / "new.xml")
+    assert made.left_out == ()
+    again = {e.name: e.values()[0] for e in load_robot(made.path).effects if e.axis == 1}
+    for cause in DRIVE:
+        (value,) = cause.parameters.values()
+        assert again[cause.effect] == pytest.approx(value.value)
+    model = mujoco.MjModel.from_xml_path(str(made.path))
+    data = mujoco.MjData(model)
+    step_s = model.opt.timestep
+    # From rest: before a model begins, its history holds the first command.
+    commands = np.repeat(np.r_[0.0, np.random.default_rng(3).normal(size=40) * 3.0], 5)
+    forces = []
+    for command in commands:
+        data.ctrl[0] = command
+        mujoco.mj_step(model, data)
+        forces.append(data.actuator_force[0])
+    # Late by three steps and a half; limited, which could as well be before; a lag from step to step; 1.07
+    # times as much.
+    before = np.concatenate([np.zeros(4), commands])
+    late = np.clip(0.5 * (before[1:-3] + before[:-4]), -3.0, 3.0)
+    keep, state, expected = np.exp(-step_s / 0.004), 0.0, []
+    for value in late:
+        expected.append(1.07 * state)
+        state = keep * state + (1 - keep) * value
+    np.testing.assert_allclose(forces, expected, atol=1e-9)
+    # One at a time, a limit or a delay leaves a motor one.
+    for cause, attributes in (
+        (DRIVE[0], 'gear="50" ctrllimited="true" ctrlrange="-3 3"/>'),
+        (DRIVE[1], 'gear="50" delay="0.007" nsample="5" interp="linear"/>'),
+    ):
+        alone = write_model(
+            source, load_robot(source), [cause], tmp_path / "one.xml", overwrite=True
+        )
+        assert f'<motor joint="shoulder" {attributes}' in alone.path.read_text()
+
+
+def test_a_lag_does_not_take_gains_of_defaults(tmp_path: Path):
+    pytest.importorskip("mujoco")
+    servos = '<default><general biastype="affine" gainprm="400" biasprm="0 -400 -20"/></default>'
+    text = changed(MJCF, "  <worldbody>", f"  {servos}\n  <worldbody>")
+    source = written(tmp_path, text, "arm.xml")
+    made = write_model(source, load_robot(source), [DRIVE[2]], tmp_path / "new.xml")
+    robot = load_robot(made.path)
+    assert [e.name for e in robot.effects if e.axis == 1 and "torque" in e.name] == []
+    assert [e.values()[0] for e in robot.effects if e.name == "actuator_bandwidth"] == [0.004]
+    # Again, with another one.
+    other = several("actuator_bandwidth", 1, time_constant_s=0.002)
+    more = write_model(made.path, robot, [other], tmp_path / "more.xml")
+    assert more.left_out == ()
+    again = load_robot(more.path).effects
+    assert [e.values()[0] for e in again if e.name == "actuator_bandwidth"] == [0.002]
+
+
+def test_limits_that_are_no_torque_are_told(tmp_path: Path):
+    pytest.importorskip("mujoco")
+    one_way = changed(
+        MJCF, 'gear="50"', 'gear="50" ctrllimited="true" ctrlrange="-1 3" forcerange="-9 9"'
+    )
+    robot = load_robot(written(tmp_path, one_way, "arm.xml"))
+    assert [e.name for e in robot.effects if e.name == "torque_saturation"] == []
+    for words in ("limits of its command left out", "limits of its force left out"):
+        assert words in robot.toml
+
+
 def test_a_motor_with_an_end_tag_becomes_general(tmp_path: Path):
     text = changed(
         MJCF, '<motor joint="shoulder" gear="50"/>', '<motor joint="shoulder" gear="50"> </motor>'

@@ -103,6 +103,12 @@ Parameters: the relative change; the shift in the frame of the link; mass [kg] a
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
 """What a spring that pulls a joint to zero is, and its parameter."""
 
+LAG = ("actuator_bandwidth", "time_constant_s")
+"""What a drive that follows its command with a first-order lag is, and its parameter."""
+
+TRANSPORT_DELAY = ("input_delay", "delay_s")
+"""What a drive that acts late is, and its parameter."""
+
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 """What flat tops of a logged torque are, and its parameter."""
 

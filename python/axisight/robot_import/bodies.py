@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -77,7 +78,8 @@ class Drive:
     ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
     ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero; ``servo``
     of an actuator that is told positions, its gains of position [Nm/rad] and speed [Nm s/rad], motor side;
-    ``gain`` is a motor's torque per command; ``effort`` [Nm] the limit of the joint, 0 where none is said.
+    ``gain`` is a motor's torque per command, ``limit_nm`` the largest, ``delay_s`` and ``lag_s`` by which torque
+    is late; ``effort`` [Nm] the limit of the joint, 0 where none is said.
     """
 
     gear_ratio: float = 1.0
@@ -87,6 +89,9 @@ class Drive:
     spring: float = 0.0
     servo: tuple[float, float] | None = None
     gain: float = 1.0
+    limit_nm: float = math.inf
+    delay_s: float = 0.0
+    lag_s: float = 0.0
     effort: float = 0.0
 
 

@@ -8,9 +8,16 @@ import numpy as np
 import tomlkit
 
 from axisight.arguments import shown
-from axisight.effects.stated import DRY_FRICTION, JOINT_SPRING, TORQUE_CONSTANT
+from axisight.effects.stated import (
+    DRY_FRICTION,
+    JOINT_SPRING,
+    LAG,
+    TORQUE_CONSTANT,
+    TORQUE_LIMIT,
+    TRANSPORT_DELAY,
+)
 from axisight.errors import RobotError
-from axisight.robot_import.bodies import Mass, Pose, joined
+from axisight.robot_import.bodies import Drive, Mass, Pose, joined
 from axisight.robot_import.chain import Chain, ChainJoint
 from axisight.robot_import.classes import with_rotors
 from axisight.robot_import.drives import DriveData, JointDrive, Payload
@@ -51,10 +58,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
                     JOINT_SPRING[1]: joint.body.drive.spring,
                 }
             )
-        if joint.body.drive.gain != 1:
-            constant, share = TORQUE_CONSTANT
-            gain = joint.body.drive.gain - 1
-            effects.append({"name": constant, "axis": number, share: gain})
+        effects += _torque_path(joint.body.drive, number)
         if dry > 0:
             effects.append(
                 {
@@ -181,6 +185,21 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
         "viscous_friction": float(viscous),
     }
     return table, ratio
+
+
+def _torque_path(drive: Drive, axis: int) -> list[dict[str, Any]]:
+    """Return what a motor makes of its command: a limit, a delay, a lag, a gain other than one."""
+    values = {
+        TORQUE_LIMIT: drive.limit_nm if np.isfinite(drive.limit_nm) else 0.0,
+        TRANSPORT_DELAY: drive.delay_s,
+        LAG: drive.lag_s,
+        TORQUE_CONSTANT: drive.gain - 1,
+    }
+    return [
+        {"name": name, "axis": axis, parameter: value}
+        for (name, parameter), value in values.items()
+        if value != 0
+    ]
 
 
 def _dry_friction(joint: ChainJoint, drive: JointDrive, ratio: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
@@ -148,7 +149,7 @@ class _Compiled:
                 float(model.dof_frictionloss[dof]),
                 float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
                 self.servos.get(j),
-                self._gains().get(j, 1.0),
+                *self._torque_path(j),
             )
         else:
             drive = Drive()
@@ -186,10 +187,22 @@ class _Compiled:
         found = self._of_one(self.model.actuator_gear[:, 0])
         return {j: 1.0 / g for j, g in found.items() if g != 0}
 
-    def _gains(self) -> dict[int, float]:
-        """Return the torque per command of joints that one motor drives."""
-        found = self._of_one(self.model.actuator_gainprm[:, 0])
-        return {j: gain for j, gain in found.items() if j not in self.servos}
+    def _torque_path(self, j: int) -> tuple[float, float, float, float]:
+        """Return gain, limit [Nm], delay [s] and lag [s] of a joint that one motor drives, else none of them."""
+        model, plain = self.model, (1.0, math.inf, 0.0, 0.0)
+        if j in self.servos:
+            return plain
+        every = (
+            model.actuator_gainprm[:, 0],
+            np.where(_is_limited(model), model.actuator_ctrlrange[:, 1], math.inf),
+            _delays(model),
+            _lags(model),
+        )
+        found = (
+            self._of_one(values).get(j, usual) for values, usual in zip(every, plain, strict=True)
+        )
+        gain, limit, delay, lag = found
+        return gain, limit, delay, lag
 
     def _of_one(self, values: Array) -> dict[int, float]:
         """Return values of actuators by joint, of joints that one motor or servo drives."""
@@ -225,6 +238,15 @@ class _Compiled:
                     f"actuator {self._name('actuator', i)!r} is no plain motor: its gain and bias are the "
                     f"controller's, to be said in the drive data"
                 )
+            if model.actuator_ctrllimited[i] and (is_servo or not _is_limited(model)[i]):
+                out.append(
+                    f"actuator {self._name('actuator', i)!r}: limits of its command left out: expected those of a "
+                    f"torque, the same both ways"
+                )
+            if model.actuator_forcelimited[i]:
+                out.append(f"actuator {self._name('actuator', i)!r}: limits of its force left out")
+            if is_servo and _delays(model)[i] > 0:
+                out.append(f"actuator {self._name('actuator', i)!r}: delay left out")
         for j in range(model.njnt):
             if model.jnt_stiffness[j] != 0 and not self._springs_to_zero(j):
                 out.append(
@@ -267,10 +289,31 @@ def is_gain(value: float) -> bool:
 
 
 def _is_motor(model: Any, i: int) -> bool:
-    """Whether an actuator is a source of torque: a gain about one, no bias, no state of its own."""
+    """Whether an actuator is a source of torque: a gain about one, no bias, no state but that of a lag."""
     plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
     torque = is_gain(float(model.actuator_gainprm[i, 0]))
-    return bool(plain and torque and model.actuator_dyntype[i] == 0)
+    return bool(plain and torque and model.actuator_dyntype[i] in (0, *_FILTERS))
+
+
+# Kinds of dynamics of actuators that are lags of first order, by MuJoCo's numbers.
+_FILTERS = (2, 3)
+
+
+def _lags(model: Any) -> Array:
+    """Return the lag of every actuator [s]."""
+    filters = np.isin(model.actuator_dyntype, _FILTERS)
+    return np.where(filters, model.actuator_dynprm[:, 0], 0.0)
+
+
+def _delays(model: Any) -> Array:
+    """Return the delay of every actuator [s]; MuJoCo knew none for long."""
+    return np.asarray(getattr(model, "actuator_delay", np.zeros(model.nu)), dtype=np.float64)
+
+
+def _is_limited(model: Any) -> NDArray[np.bool_]:
+    """Return which commands are limited, as much one way as the other."""
+    low, high = model.actuator_ctrlrange.T
+    return np.asarray((model.actuator_ctrllimited == 1) & (high > 0) & (low == -high))
 
 
 def _is_servo(model: Any, i: int) -> bool:

@@ -1,28 +1,61 @@
-"""Motors of an MJCF that give more or less torque than they are told."""
+"""Motors of an MJCF that give more or less torque than they are told, later, or no more than so much."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from axisight.effects.stated import TORQUE_CONSTANT
+from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
 from axisight.robot_import.mjcf import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.xml_edits import Edits
+from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
     from axisight.gap.result import Cause
 
-GAIN_EFFECTS = (TORQUE_CONSTANT[0],)
 # What makes a <general> what a <motor> is, with a gain.
 _MOTOR = {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}
+# What a lag makes of it.
+_LAGS = {"dyntype": ("filter", "filterexact")}
+# Of a file that states none.
+_STEP_S = 0.002
 
 
-def write_gain(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]) -> Placed:
-    """Write what causes of one joint make of its actuator: its gain, as ``gear`` is the gear's.
+def _limit(value: float, _step_s: float) -> Mapping[str, Numbers]:
+    return {"ctrllimited": "true", "ctrlrange": (-value, value)}
 
-    A <motor> has no gain: it becomes the <general> that it is short for, whatever defaults a file has for those.
+
+def _gain(value: float, _step_s: float) -> Mapping[str, Numbers]:
+    return {"gainprm": 1 + value}
+
+
+def _lag(value: float, _step_s: float) -> Mapping[str, Numbers]:
+    return {"dyntype": "filterexact", "dynprm": value}
+
+
+def _delay(value: float, step_s: float) -> Mapping[str, Numbers]:
+    # As many commands are kept as lie within the delay; between two of them it acts for a part of a step.
+    kept = math.ceil(value / step_s - 1e-9) + 1
+    return {"delay": value, "nsample": str(kept), "interp": "linear"}
+
+
+_ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbers]]]] = {
+    TORQUE_CONSTANT[0]: (TORQUE_CONSTANT[1], _gain),
+    TORQUE_LIMIT[0]: (TORQUE_LIMIT[1], _limit),
+    LAG[0]: (LAG[1], _lag),
+    TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], _delay),
+}
+DRIVE_EFFECTS = tuple(_ATTRIBUTES)
+
+
+def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]) -> Placed:
+    """Write what causes of one joint make of its actuator; ``gear`` stays, which is the gear's.
+
+    MuJoCo delays a command, limits it, lets it lag and takes the gain, as a torque path does.
+    A <motor> has no gain and no lag: it becomes the <general> that it is short for, whatever defaults a file
+    has for those.
     """
     placed = Placed()
     holders = [e for e in root.walk() if e.tag == "actuator"]
@@ -32,12 +65,25 @@ def write_gain(edits: Edits, root: Element, joint: str, causes: Sequence[Cause])
         got = "none" if not mine else ", ".join(f"<{e.tag}>" for e in mine)
         placed.refuse(causes, f"expected one motor of the joint that has a gain, got {got}")
         return placed
-    # It has taken the place of what the simulator had.
-    gain = 1 + causes[-1].parameters[TORQUE_CONSTANT[1]].value
-    more = _MOTOR if defaults else {}
-    edits.set(mine[0], {"gainprm": gain, **more}, said(causes), tag="general")
+    made: dict[str, Numbers] = {}
+    # The last of one kind has taken the place of what the simulator had.
+    for cause in causes:
+        name, attributes = _ATTRIBUTES[cause.effect]
+        made |= attributes(cause.parameters[name].value, _step_s(root))
+    kind = ""
+    if made.keys() & {"gainprm", "dyntype"}:
+        kind = "general"
+        usual = {"gainprm": "1", **_MOTOR} if defaults and mine[0].tag == "motor" else {}
+        made |= {key: value for key, value in usual.items() if key not in made}
+    edits.set(mine[0], made, said(causes), tag=kind)
     placed.take(causes)
     return placed
+
+
+def _step_s(root: Element) -> float:
+    """Return the time step that a model states."""
+    steps = [e.attributes["timestep"] for e in root.all("option") if "timestep" in e.attributes]
+    return float(steps[-1]) if steps else _STEP_S
 
 
 def _is_motor(element: Element, defaults: bool) -> bool:
@@ -45,8 +91,8 @@ def _is_motor(element: Element, defaults: bool) -> bool:
     if element.tag == "motor":
         return True
     said_so = {key: element.attributes.get(key) for key in _MOTOR}
-    usual = all(said_so[key] in (None, value) for key, value in _MOTOR.items())
-    sure = not defaults or said_so == _MOTOR
+    usual = all(value in (None, _MOTOR[key], *_LAGS.get(key, ())) for key, value in said_so.items())
+    sure = not defaults or None not in said_so.values()
     gain = element.attributes.get("gainprm", "1").split()
     return (
         element.tag == "general" and usual and sure and len(gain) == 1 and is_gain(float(gain[0]))

@@ -14,7 +14,7 @@ from axisight.mujoco.torques import is_torque
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
 from axisight.robot_import.xml_tree import Element, parse_xml
-from axisight.write_back.actuators import GAIN_EFFECTS, write_gain
+from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
 from axisight.write_back.links import LINK_EFFECTS, body_changes
@@ -58,8 +58,8 @@ def write_model(
     target
         File to write. Of a URDF or MJCF all bytes stay but the numbers that change, each with a comment that says
         cause, value, interval and probability: dry and viscous friction of joints; masses, centres of mass and
-        inertias of links, and a load on the last one; of an MJCF also rotors (armature), springs of joints and
-        gains of motors. What was re-fitted within its tolerance stays as it is.
+        inertias of links, and a load on the last one; of an MJCF also rotors (armature), springs of joints, and
+        gains, limits, delays and lags of motors. What was re-fitted within its tolerance stays as it is.
     overwrite
         Replace a file that exists.
 
@@ -134,9 +134,9 @@ def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause])
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
             out.append(write_joint(edits, root.tag, joints[name], robot, axis, numbers))
-        gains = [cause for cause in mine if cause.effect in GAIN_EFFECTS]
-        if gains and root.tag == "mujoco":
-            out.append(write_gain(edits, root, name, gains))
+        drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
+        if drives and root.tag == "mujoco":
+            out.append(write_drive(edits, root, name, drives))
     return out
 
 
