@@ -38,6 +38,7 @@ SAID: dict[str, tuple[type[Exception], dict[str, str]]] = {
             "checksum.npz": "position_1: .*CRC",
             "cut.mat": "byte 512: .*truncated",
             "footer.parquet": "footer",
+            "heap.h5": "heap signature",
             "levels.parquet": "histogram",
             "longer.csv": "as many values in every row as names",
             "nested.npz": UNREADABLE,

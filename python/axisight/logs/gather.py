@@ -237,7 +237,9 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget
 
 def _numbers(vector: NDArray[Any]) -> Floats:
     if vector.dtype.kind in "biuf":
-        return vector.astype(np.float64)
+        # Damaged numbers may be signals, of which NumPy warns; what is no number is found later.
+        with np.errstate(invalid="ignore"):
+            return vector.astype(np.float64)
     if vector.dtype.kind == "c":
         raise LogError("expected real numbers, got complex ones")
     if vector.dtype.kind in "mM":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -23,15 +24,57 @@ def load_hdf5(path: Path, budget: Budget, *, matlab: bool = False) -> dict[str, 
     With `matlab`, arrays are transposed back to MATLAB's order, singleton dimensions dropped, and
     cells followed into object arrays. Raises whatever h5py raises on a damaged file.
     """
-    names: list[str] = []
     with h5py.File(path, "r") as file:
-
-        def visit(name: str, item: object) -> None:
-            if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-                names.append(name)
-
-        file.visititems(visit)
+        names = [name for name in _datasets(file) if not name.startswith("#")]
     return {name.replace("/", "."): _reader(path, name, budget, matlab) for name in names}
+
+
+def _datasets(file: h5py.File) -> list[str]:
+    """Return the paths of all datasets that hard links lead to, each once."""
+    items = ((path, item) for path, _, item in walk(file))
+    return sorted(path for path, item in items if isinstance(item, h5py.Dataset))
+
+
+def walk(file: h5py.File) -> Iterator[tuple[str, Any, Any]]:
+    """Yield path, link and object of every link below the root; None as the object of links that are not hard.
+
+    An object comes once. By links alone, in the order of the file: the library's own visit asks a damaged group
+    for its size and its links for their order, and may never end. Raises what h5py raises on a damaged
+    file, LogError where links of a group repeat.
+    """
+    seen: set[int] = set()
+    groups = [("", file["/"])]
+    while groups:
+        path, group = groups.pop()
+        for name in _links(group):
+            whole = path + name.decode("utf-8", "replace")
+            info = group.id.links.get_info(name)
+            if info.type != h5py.h5l.TYPE_HARD:
+                yield whole, group.get(name, getlink=True), None
+                continue
+            if info.u in seen:
+                continue
+            seen.add(info.u)
+            item = group[name]
+            yield whole, h5py.HardLink(), item
+            if isinstance(item, h5py.Group):
+                groups.append((f"{whole}/", item))
+
+
+def _links(group: h5py.Group) -> list[bytes]:
+    """Return the names of the links of a group; raises LogError where they repeat, as those of a ring do."""
+    names: set[bytes] = set()
+
+    def more(name: bytes) -> bool | None:
+        again = name in names
+        names.add(name)
+        return again or None
+
+    native = h5py.h5.ITER_NATIVE
+    in_a_ring, _ = group.id.links.iterate(more, idx_type=h5py.h5.INDEX_NAME, order=native)
+    if in_a_ring:
+        raise LogError("expected each name once, got some again")
+    return sorted(names)
 
 
 def _reader(path: Path, name: str, budget: Budget, matlab: bool) -> Reader:

@@ -11,6 +11,7 @@ import h5py
 
 from axisight.errors import CaseError, LogError
 from axisight.logs.sources import files_of, is_folder_log
+from axisight.logs.sources_hdf5 import walk
 
 
 def check_folder(folder: Path) -> None:
@@ -57,26 +58,25 @@ def check_log_inside(path: Path) -> None:
 
 def _check_hdf5(path: Path) -> None:
     """Raise LogError for a file with data in others; none of those is opened."""
-
-    def elsewhere(name: str, link: object) -> str | None:
-        if isinstance(link, h5py.ExternalLink):
-            return f"{name}: expected data in this file, got a link to {link.filename}"
-        item = file[name] if isinstance(link, h5py.HardLink) else None
-        if not isinstance(item, h5py.Dataset):
-            return None
-        others = [entry[0] for entry in item.external or ()]
-        if item.is_virtual:
-            others += [s.file_name for s in item.virtual_sources() if s.file_name != "."]
-        return f"{name}: expected data in this file, got data of {others[0]}" if others else None
-
     try:
         with h5py.File(path, "r") as file:
-            # Not to be left by an error: its caller is no Python.
-            found = file.visititems_links(elsewhere)
-    except (OSError, RuntimeError, KeyError) as error:
+            found = next(filter(None, (_elsewhere(*one) for one in walk(file))), None)
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise LogError(f"{path}: cannot be read as HDF5: {error}") from None
     if found is not None:
         raise LogError(f"{path}: {found}")
+
+
+def _elsewhere(name: str, link: object, item: object) -> str | None:
+    """Return what is wrong with a link or object whose data is in another file."""
+    if isinstance(link, h5py.ExternalLink):
+        return f"{name}: expected data in this file, got a link to {link.filename}"
+    if not isinstance(item, h5py.Dataset):
+        return None
+    others = [entry[0] for entry in item.external or ()]
+    if item.is_virtual:
+        others += [s.file_name for s in item.virtual_sources() if s.file_name != "."]
+    return f"{name}: expected data in this file, got data of {others[0]}" if others else None
 
 
 def _below(folder: Path) -> Iterator[Path]:
