@@ -50,8 +50,9 @@ def searched(error: float, share: float = 0.4) -> Search:
         Ranked(Trial(f, evidence(f), np.zeros(1)), 0.999, 1.0, 10.0, p)
         for f, p in ((mass, 1 - share), (constant, share))
     )
+    ranked = tuple(sorted(ranked, key=lambda r: -r.probability))
     standing = Standing(0, ranked, 0.0, 0.0)
-    model = evidence(mass)
+    model = evidence(ranked[0].trial.candidate)
     taken = Round((standing,), ((ranked[0], standing),), np.zeros(1))
     layout = None
     return Search(model, model, np.zeros(len(model.loss)), layout, [taken])
@@ -79,6 +80,13 @@ def test_the_constant_that_the_share_asks_for_takes_the_place_of_a_heavier_link(
     # It is held where the share has it.
     assert found.model.free[-1].priors == {ERROR: (pytest.approx(INVERSE), 5e-4)}
     assert found.model.free[-1].effect.values()[0] == pytest.approx(INVERSE)
+
+
+def test_a_constant_that_leads_is_surer():
+    found = with_constants_told(searched(INVERSE, share=0.6), Fitter(), [shown()])
+    ((cause, _),) = found.accepted
+    assert cause.trial.label == "torque_constant@1"
+    assert cause.probability == pytest.approx(6.0 / 6.4)
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def with_constants_told(found: Search, fitter: ModelFitter, shown: Sequence[Show
     """Return a search with the torque constant that reported shares ask for in the place of its rivals.
 
     ``shown``: what logs say of the controller by themselves. Where a cause of the axis, or of the arm,
-    leaves such a constant as likely as itself, and a fit leaves no more with it.
+    leaves such a constant as likely as itself, and a fit leaves no more with it; one that leads is surer.
     """
     told = {
         Effect(TORQUE_CONSTANT[0], cause.axis).label: share
@@ -41,7 +41,7 @@ def with_constants_told(found: Search, fitter: ModelFitter, shown: Sequence[Show
         if (share := share_reported(cause)) is not None
     }
     for cause, standing in found.accepted if told else ():
-        rival = _told(standing, cause, told)
+        rival = _told(standing, told)
         if rival is None:
             continue
         model = in_its_place(fitter, found.model, cause, rival)
@@ -57,15 +57,15 @@ def with_constants_told(found: Search, fitter: ModelFitter, shown: Sequence[Show
     return found
 
 
-def _told(standing: Standing, cause: Ranked, told: Mapping[str, float]) -> Ranked | None:
-    """Return the rival of a cause that is a torque constant the controller's share asks for."""
-    for rival in standing.inseparable():
-        share = told.get(rival.trial.label)
-        if share is None or rival.trial.label == cause.trial.label:
+def _told(standing: Standing, told: Mapping[str, float]) -> Ranked | None:
+    """Return the cause, or its rival, that is a torque constant the controller's share asks for."""
+    for one in standing.inseparable():
+        share = told.get(one.trial.label)
+        if share is None:
             continue
-        (error,) = rival.trial.evidence.effects[-1].values()
+        (error,) = one.trial.evidence.effects[-1].values()
         if abs((1 + error) * (1 + share) - 1) < _OFF:
-            return rival
+            return one
     return None
 
 
