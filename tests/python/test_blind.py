@@ -369,6 +369,9 @@ def test_figures_count_what_they_say():
         judged(("backlash@1", "payload"), ("payload", "torque_offset@1")),
     ]
     shares = {name: (s.hits, s.of) for name, s in figures(cases).items()}
+    # A tilted base of an arm of one axis is on that.
+    lever = [judged(("link_com@1",), ("base_tilt",), n_axes=n) for n in (1, 2)]
+    assert [figures([j])["axis"].hits for j in lever] == [1, 0]
     assert shares["effect first, severity 3 and more"] == (1, 3)
     assert shares["axis"] == (3, 4)
     assert shares["false alarms on nothing withheld"] == (1, 2)

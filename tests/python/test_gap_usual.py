@@ -108,11 +108,14 @@ def test_it_stands_where_its_own_axis_has_no_other(home):
     assert not _beaten_at_home(whole, {0: home, 2: whole})
 
 
-# Falls of a cube of axis 3, a play of axis 1 that feels it, and friction of axis 2 that does not.
-NONE_USUAL = SimpleNamespace(effect=Effect("viscous_friction", 1))
-WITHIN = SimpleNamespace(effects=(NONE_USUAL.effect,), ended_at_bound=())
+def none_usual(axis: int):
+    return SimpleNamespace(effect=Effect("viscous_friction", axis))
+
+
+WITHIN = SimpleNamespace(effects=(none_usual(1).effect,), ended_at_bound=())
+# A cube of axis 3, a play of axis 1 that feels it, and friction of axis 2 that does not.
 TRIED = [
-    SimpleNamespace(label=label, candidate=NONE_USUAL, cost=2.0, evidence=WITHIN)
+    SimpleNamespace(label=label, candidate=none_usual(int(label[-1])), cost=2.0, evidence=WITHIN)
     for label in ("cube@3", "play@1", "friction@2")
 ]
 FALLS = np.array([[30.0, 1.0, 90.0], [60.0, 1.0, 5.0], [0.1, 9.0, 0.1]])
@@ -133,6 +136,17 @@ def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     assert field.first([led(0), led(1), led(2)], TRIED) == "cube@3"
     kept = Trials._not_felt(field, [led(0), led(1), led(2)], TRIED)
     assert [s.axis for s in kept] == [1, 2]
+    # One of axis 1 that gains most, on axis 3: its rival at home is judged now.
+    monkeypatch.setitem(vars(TRIED[0].candidate), "effect", Effect("viscous_friction", 1))
+    kept = Trials._not_felt(field, [led(0), led(1), led(2)], TRIED)
+    assert [s.axis for s in kept] == [0, 1, 2]
+
+
+def test_a_clear_leader_is_refined_where_one_of_its_axis_leads_elsewhere(monkeypatch):
+    elsewhere = led(2)
+    monkeypatch.setitem(vars(TRIED[0].candidate), "effect", Effect("viscous_friction", 1))
+    assert refined_next(monkeypatch, rival_of(0.5, 2.0)) == []
+    assert "play@1" in refined_next(monkeypatch, rival_of(0.5, 2.0), others=(elsewhere,))
 
 
 def rival_of(score: float, cost: float):
@@ -142,11 +156,13 @@ def rival_of(score: float, cost: float):
     return SimpleNamespace(score=score, trial=trial)
 
 
-def refined_next(monkeypatch, rival, begun: set | None = None, *, mends: bool = False) -> list[str]:
+def refined_next(
+    monkeypatch, rival, begun: set | None = None, *, mends: bool = False, others: tuple = ()
+) -> list[str]:
     standing = led(0, rivals=(rival,))
     monkeypatch.setattr(trials, "_clear", lambda _: True)
     field = SimpleNamespace(
-        standings=lambda _: [standing],
+        standings=lambda _: [standing, *others],
         layout=SimpleNamespace(samples=lambda: np.ones(3)),
         least=np.zeros(3),
         mends=lambda _: mends,

@@ -10,7 +10,7 @@ from axisight import Settings
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.howfar import Stages, gap_figures, gap_reduction, stage
 from axisight.gap.remainder import refit_worse, remainder_of
-from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.gap.where import ErrorLog, band_map, findings, led_by_weight, regime_maps
 from axisight.logs import Log
 
 T = 1e-3
@@ -51,6 +51,36 @@ def test_a_tone_is_found_on_its_axis_and_in_its_band(base):
     places = findings(bands, regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0), 3.0)
     assert [p.axis for p in places] == [2]
     assert places[0].band_hz == (6.0, 15.0)
+
+
+def test_the_axis_leads_whose_residual_is_far_above_noise(base):
+    """A slow drift holds most of the plain error; what stands out of the noise is elsewhere."""
+    log, error, noise = base
+    error[:, 0] += 0.2 * np.sin(2 * np.pi * 0.2 * log.time_s)
+    error[:, 1] += 0.03 * np.sin(2 * np.pi * 9.0 * log.time_s)
+    bands = band_map([ErrorLog(log, error, noise)], 1.0)
+    maps = (bands, regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0), 3.0)
+    places = findings(*maps)
+    assert places[0].axis == 1
+    assert led_by_weight(places, *maps, np.array([10.0, 25.0])) == places
+    led = led_by_weight(places, *maps, np.array([10.0, 90.0]))
+    assert [p.axis for p in led] == [2, 1]
+    assert led[0].band_hz == (6.0, 15.0)
+    assert "90 times the floor" in led[0].evidence
+    assert sum(p.share for p in led) == pytest.approx(1.0)
+
+
+def test_an_unknown_gap_has_its_axis_where_no_band_shows_it_steadily(base):
+    log, error, noise = base
+    error[:, 1] += np.where(log.time_s < 2.0, 1.0, 0.0)
+    maps = (
+        band_map([ErrorLog(log, error, noise)], 1.0),
+        regime_maps([ErrorLog(log, error, noise)], 100.0, 1.0),
+        30.0,
+    )
+    assert findings(*maps) == ()
+    (place,) = led_by_weight((), *maps, np.array([0.0, 50.0]))
+    assert (place.axis, place.band_hz, place.share) == (2, None, 1.0)
 
 
 @pytest.mark.filterwarnings("error")

@@ -34,7 +34,8 @@ class Judged:
     """One verdict beside its truth.
 
     Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
-    ``where``: the axis on which the gap mainly lies. ``ratios``: named value over true value of the
+    ``where``: the axis on which the gap mainly lies; ``n_axes``: how many the arm has, 0
+    where that is not known. ``ratios``: named value over true value of the
     parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
     names of engine, arm and motions, and whether references were logged. ``missed``: by label of
     effects of the library that are not named, their size over the detection limit that the verdict
@@ -57,6 +58,7 @@ class Judged:
     setting: Mapping[str, str]
     missed: Mapping[str, float] = field(default_factory=dict)
     reduction: float = float("nan")
+    n_axes: int = 0
 
     @property
     def kind(self) -> str:
@@ -273,6 +275,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         probabilities=tuple(_said(c, n_axes) for c in causes),
         allowed=frozenset(allowed),
         where=frozenset(w["axis"] for w in verdict["where"][:1]),
+        n_axes=n_axes,
         ratios=tuple(ratios),
         covered=tuple(covered),
     )
@@ -329,6 +332,8 @@ def _with_a_limit(judged: Judged) -> int:
 
 def _axis_named(judged: Judged) -> bool:
     axis = int(judged.truth[0].partition("@")[2])
-    if judged.named:
-        return judged.named[0].partition("@")[2] == str(axis)
-    return axis in judged.where
+    if not judged.named:
+        return axis in judged.where
+    # What concerns an arm of one axis concerns that.
+    said = judged.named[0].partition("@")[2] or ("1" if judged.n_axes == 1 else "")
+    return said == str(axis)

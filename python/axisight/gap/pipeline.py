@@ -51,7 +51,7 @@ from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
 from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
-from axisight.gap.where import ErrorLog, band_map, findings, regime_maps
+from axisight.gap.where import ErrorLog, band_map, findings, led_by_weight, regime_maps
 from axisight.logs import Case, Log, read_case
 from axisight.robot import Robot, load_robot
 
@@ -442,7 +442,11 @@ def _assemble(
         lambda errors: stage(held_logs, errors, settings.block_s, measured),
     )
     causes = _causes(conclusion, [*reach.reductions, *of_steps])
-    places = findings(bands, regimes, settings.significance) if conclusion.verdict != "none" else ()
+    maps = (bands, regimes, settings.significance)
+    places = findings(*maps) if conclusion.verdict != "none" else ()
+    excess = np.array([axis.excess for axis in conclusion.axes])
+    if conclusion.verdict == "unknown" and excess.max() > settings.largest_scatter:
+        places = led_by_weight(places, *maps, excess)
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
     return Diagnosis(

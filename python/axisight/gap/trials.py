@@ -449,6 +449,8 @@ class Trials:
         out = []
         standings = self.standings(trials)
         leaders = {s.best.trial.label for s in standings}
+        homes = {(s.axis + 1, s.best.trial.candidate.effect.axis) for s in standings}
+        away = {home for axis, home in homes if home != axis}
         # Where candidates wait, what leads has had no rivals.
         wait = {start.option.effect.axis for start in self.waiting}
         for standing in standings if even_felt else self._not_felt(standings, trials):
@@ -465,7 +467,8 @@ class Trials:
             usual = self.usual | more_usual(leader.trial)
             rivals = standing.ranked[:count]
             if _clear(standing) and not bends:
-                rivals = ()
+                # What leads elsewhere, and is fitted there, is held against one that is fitted as well.
+                rivals = rivals[:1] if standing.axis + 1 in away else ()
             usual |= {r.trial.label for r in as_good_with_less(standing)}
             usual |= {r.trial.label for r in of_one_formula(standing)}
             rivals += tuple(
@@ -487,16 +490,17 @@ class Trials:
     ) -> Sequence[Standing]:
         """Return the standings but those whose leaders the one that gains most of all is felt by.
 
-        They are judged in the next round, on top of it.
+        They are judged in the next round, on top of it; but for its own axis, where it has to lead.
         """
         fall = falls(trials, self.current, self.layout)
         place = {t.label: i for i, t in enumerate(trials)}
         leaders = [place[s.best.trial.label] for s in standings]
         first = place.get(self.first(standings, trials), 0)
+        home = trials[first].candidate.effect.axis
         return [
             s
             for i, s in zip(leaders, standings, strict=True)
-            if i == first or not interact(first, i, s.axis, fall)
+            if i == first or s.axis + 1 == home or not interact(first, i, s.axis, fall)
         ]
 
     def first(self, standings: Sequence[Standing], trials: Sequence[Trial]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -227,6 +227,42 @@ def findings(
         if share >= _SMALLEST_SHARE:
             out.append(placed(bands, regimes, i, share, significance))
     return tuple(sorted(out, key=lambda w: -w.share))
+
+
+# By so much the weighted residual of an axis has to stand higher than that of the axis whose plain error does.
+_BY_FAR = 3.0
+
+
+def led_by_weight(
+    places: Sequence[Where],
+    bands: xr.Dataset,
+    regimes: dict[str, xr.Dataset],
+    significance: float,
+    excess: Array,
+) -> tuple[Where, ...]:
+    """Return places led by the axis whose weighted residual stands highest above noise, where it does by far.
+
+    ``excess`` (n_axes,): mean square of it above the floor, in noise. Plain errors of torque are told by slow
+    drifts, and hide what is small beside the torque but far above its noise.
+    """
+    i = int(np.argmax(excess))
+    axis = int(bands["axis"].values[i])
+    first = places[0].axis if places else None
+    if first == axis or (first is not None and excess[i] < _BY_FAR * excess[first - 1]):
+        return tuple(places)
+    held = _held(bands, significance).sum(axis=1)
+    if held[i] == 0:
+        # In no band steadily, but there.
+        held[i] = np.maximum(bands["square"].values[i], 0.0).sum()
+    shares = held / max(held.sum(), 1e-300)
+    others = [k for k in np.argsort(-shares) if k != i and shares[k] >= _SMALLEST_SHARE]
+    leader, *rest = (
+        placed(bands, regimes, int(k), float(shares[k]), significance) for k in (i, *others)
+    )
+    told = (
+        f"; against noise the residual of this axis is the largest, {excess[i]:.3g} times the floor"
+    )
+    return (replace(leader, evidence=leader.evidence + told), *rest)
 
 
 def placed(
