@@ -92,10 +92,18 @@ def claimed(found: Diagnosis, effect: Effect, n_axes: int) -> bool:
     return any(c.label in alike for c in found.causes)
 
 
+def allowed(found: Diagnosis, effect: Effect, n_axes: int) -> bool:
+    """Whether a verdict leaves an effect or a twin of it open: told apart from no cause, or likely beside it."""
+    alike = {effect.label, *(replace(effect, name=n).label for n in twins_of(effect.name, n_axes))}
+    beside = {a.label for a in found.alternatives if a.probability >= 0.05}
+    return bool(alike & (beside | {label for group in found.equivalent for label in group}))
+
+
 def main(machines: int, seed: int) -> None:
     """Print a line for every effect, and both shares."""
     rng = np.random.default_rng(seed)
     right: dict[str, list[bool]] = {name: [] for name in SIZES}
+    left_open: dict[str, list[bool]] = {name: [] for name in SIZES}
     seen: dict[str, list[bool]] = {name: [] for name in SIZES}
     wrong = 0
     for number in range(machines):
@@ -113,11 +121,14 @@ def main(machines: int, seed: int) -> None:
                 others = [] if hit else [c.label for c in found.causes]
                 wrong += found.verdict == "explained" and bool(others)
                 right[name].append(hit)
+                left_open[name].append(hit or allowed(found, effect, machine.simulator.n_axes))
                 seen[name].append(found.verdict != "none")
                 line.append(f"{name}: {'named' if hit else ', '.join(others) or found.verdict}")
             print("   ".join(line), flush=True)
     for name, hits in right.items():
         print(f"at {name} of the limit named: {Share(sum(hits), len(hits))}")
+        open_ = left_open[name]
+        print(f"  or left open beside what was named: {Share(sum(open_), len(open_))}")
         print(f"  and anything seen: {Share(sum(seen[name]), len(hits))}")
     print(f"another cause explained: {wrong}")
 

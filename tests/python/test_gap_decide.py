@@ -10,7 +10,7 @@ from axisight.effects import Effect
 from axisight.gap.decide import Standing, Trial, clearly_worse, of_one_formula, stand, trial
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout, layout_of
-from axisight.gap.score import held_out_loss, linear_gain
+from axisight.gap.score import held_out_loss, linear_gain, step_without
 from gap_data import linear_evidence
 
 
@@ -535,6 +535,25 @@ def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise
     plain, falling = (replace(t, held_out=t.held_out + 4.0) for t in (plain, falling))
     p = {r.trial.candidate.effect.name: r.probability for r in standing([plain, falling]).ranked}
     assert p["stribeck_friction"] / p["coulomb_friction"] == pytest.approx((5.3 / 5.2) ** 30 / cost)
+
+
+def test_a_number_next_to_its_bound_does_not_step_away_from_it():
+    """The second log alone tells of it: without that log a step would go seven times as far as it is large."""
+    rng = np.random.default_rng(5)
+    log = np.repeat([0, 1], 400)
+    x = np.column_stack([rng.standard_normal(800), rng.standard_normal(800) * (1e-2 + log)])
+    found = linear_evidence(x, x @ [1.0, 0.01] + 0.1 * rng.standard_normal(800), log)
+    effect = Effect("coulomb_friction", 1, {"coulomb_nm": 1.0, "smoothing_rad_s": 0.01})
+    names = ((0, "coulomb_nm"), (0, "smoothing_rad_s"))
+
+    def step(down: float) -> np.ndarray:
+        room = {names[0]: (-1.0, 9.0), names[1]: (-down, 1.0)}
+        one = replace(found, effects=(effect,), parameters=names, room=room)
+        return step_without(one, one.log == 1)
+
+    assert abs(step(down=5e-3)[1]) > 0.01
+    assert step(down=5e-6)[1] == 0.0
+    assert step(down=5e-6)[0] != 0.0
 
 
 def test_what_one_log_tells_of_the_simulator_is_no_gain_of_an_effect_that_it_tells_of():

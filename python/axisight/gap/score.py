@@ -85,11 +85,27 @@ def _prior_lengths(evidence: Evidence, step: Array) -> float:
     return float(np.abs(step * np.sqrt(np.diag(evidence.prior_matrix))).max(initial=0.0))
 
 
+# Of its value: a number this near to a bound is at it.
+_AT = 1e-3
+
+
 def _pinned(evidence: Evidence) -> NDArray[np.bool_]:
-    """Return which parameters sit on a bound or have no influence (n_parameters,)."""
+    """Return which parameters sit on a bound, or next to one, or have no influence (n_parameters,).
+
+    A step from there has one way to go, and where a law is steep it goes far.
+    """
     influence = np.einsum("bii->i", evidence.matrix)
-    bound = np.array([name in evidence.at_bound for name in evidence.parameters])
+    bound = np.array([n in evidence.at_bound or _next_to(evidence, n) for n in evidence.parameters])
     return np.asarray(bound | (influence <= 0))
+
+
+def _next_to(evidence: Evidence, key: tuple[int | None, str]) -> bool:
+    """Whether an effect's number is within a thousandth of itself from a bound."""
+    place, name = key
+    if place is None or key not in evidence.room:
+        return False
+    down, up = evidence.room[key]
+    return min(-down, up) < _AT * abs((evidence.effects[place].parameters or {})[name])
 
 
 def predictable(evidence: Evidence) -> NDArray[np.bool_]:
