@@ -208,7 +208,7 @@ def _play(trial: Trial) -> FreeEffect:
 
 
 # A cube as stiff at the deflection as so many linear springs: near one, a step from none of it says little.
-_HARDER = (0.3, 1.0, 3.0, 10.0, 30.0)
+_HARDER = (1.0, 3.0, 10.0, 30.0)
 
 
 def _with_weight(torque: Array) -> float:

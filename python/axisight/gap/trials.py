@@ -449,8 +449,10 @@ class Trials:
         out = []
         standings = self.standings(trials)
         leaders = {s.best.trial.label for s in standings}
-        homes = {(s.axis + 1, s.best.trial.candidate.effect.axis) for s in standings}
-        away = {home for axis, home in homes if home != axis}
+        led: dict[int | None, str] = {s.axis + 1: s.best.trial.label for s in standings}
+        homes = {s.best.trial.label: s.best.trial.candidate.effect.axis for s in standings}
+        # Axes that another law of theirs leads, on another axis.
+        away = {home for label, home in homes.items() if led.get(home, label) != label}
         # Where candidates wait, what leads has had no rivals.
         wait = {start.option.effect.axis for start in self.waiting}
         for standing in standings if even_felt else self._not_felt(standings, trials):
