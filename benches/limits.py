@@ -84,19 +84,21 @@ def at(limit: DetectionLimit, factor: float) -> Effect:
     return Effect(limit.effect, axis, {**values, limit.parameter: size}, limit.axes)
 
 
+def alike(effect: Effect, n_axes: int) -> set[str]:
+    """Return the labels of an effect and its twins."""
+    return {effect.label, *(replace(effect, name=n).label for n in twins_of(effect.name, n_axes))}
+
+
 def claimed(found: Diagnosis, effect: Effect, n_axes: int) -> bool:
     """Whether a verdict names an effect or a twin of it."""
-    alike = {effect.label} | {
-        replace(effect, name=name).label for name in twins_of(effect.name, n_axes)
-    }
-    return any(c.label in alike for c in found.causes)
+    return any(c.label in alike(effect, n_axes) for c in found.causes)
 
 
 def allowed(found: Diagnosis, effect: Effect, n_axes: int) -> bool:
-    """Whether a verdict leaves an effect or a twin of it open: told apart from no cause, or likely beside it."""
-    alike = {effect.label, *(replace(effect, name=n).label for n in twins_of(effect.name, n_axes))}
+    """Whether a verdict says of an effect or a twin of it that it may be instead, or is likely beside it."""
     beside = {a.label for a in found.alternatives if a.probability >= 0.05}
-    return bool(alike & (beside | {label for group in found.equivalent for label in group}))
+    open_ = {label for group in found.equivalent for label in group}
+    return bool(alike(effect, n_axes) & (beside | open_))
 
 
 def main(machines: int, seed: int) -> None:

@@ -97,10 +97,8 @@ class Session:
         self.estimation, self.validation = tuple(estimation), tuple(validation)
         self.settings = settings or Settings()
         inputs = behind_gate(robot, estimation, validation, self.settings.despite, simulated)
-        self.view: View = inputs.view(self.settings)
-        if inputs.beside:
-            inputs = inputs.against(self.view, inputs.beside, self.settings)
-            self.view = inputs.view(self.settings)
+        self.view: View
+        inputs, self.view = inputs.compared(self.settings)
         self.robot = inputs.robot
         self.logs: tuple[Log, ...] = (*inputs.estimation, *inputs.validation)
         self.roles = ("estimation",) * len(estimation) + ("validation",) * len(validation)

@@ -112,10 +112,7 @@ def diagnose(
     progress("looking at the logs", 0, 1)
     inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, simulated)
     progress("looking at the logs", 1, 1)
-    view = inputs.view(chosen)
-    if inputs.beside:
-        inputs = inputs.against(view, inputs.beside, chosen)
-        view = inputs.view(chosen)
+    inputs, view = inputs.compared(chosen)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     found = with_constants_told(found, view.fitter, view.shown)
@@ -167,6 +164,14 @@ class _Inputs:
     def view(self, settings: Settings) -> View:
         """Return how simulator and logs are compared."""
         return view_of(self.robot, self.estimation, self.validation, settings, self.commanded)
+
+    def compared(self, settings: Settings) -> tuple[_Inputs, View]:
+        """Return how simulator and logs are compared: against the user's own simulator, where it has logs."""
+        view = self.view(settings)
+        if not self.beside:
+            return self, view
+        inputs = self.against(view, self.beside, settings)
+        return inputs, inputs.view(settings)
 
     def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> _Inputs:
         """Return the same against the user's own simulator, by its logs."""
