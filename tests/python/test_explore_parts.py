@@ -1,5 +1,6 @@
 """Parts of the explorer: what is read of verdicts, work beside the page, regards, exports, words."""
 
+import asyncio
 import json
 import threading
 
@@ -12,6 +13,7 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.explore.answers import answer, rest
 from axisight.explore.background import Background
+from axisight.explore.beside import Beside
 from axisight.explore.exports import figure_png, robot_text
 from axisight.explore.regard import in_bins, order_spectrum, quantity
 from axisight.explore.said import read_said, said
@@ -241,3 +243,46 @@ def test_names_are_escaped():
     for page in pages:
         assert "<script" not in page
     assert "&lt;script&gt;" in of_verdict(found)
+
+
+class Turns:
+    """A document that notes in which thread it is asked for a turn, and gives it at once."""
+
+    def __init__(self):
+        self.threads = []
+
+    def add_next_tick_callback(self, callback):
+        self.threads.append(threading.get_ident())
+        callback()
+
+
+def test_results_of_work_beside_come_through_the_loop():
+    """A document is touched by the loop's thread alone: what another adds while it holds back is lost."""
+    document, got = Turns(), []
+
+    async def scene():
+        work, done, started = Beside(document), asyncio.Event(), threading.Event()
+
+        def take(result):
+            got.append(result)
+            done.set()
+
+        def wrong():
+            raise InputError("gain: expected a number")
+
+        work.submit(threading.get_ident, take)
+        await asyncio.wait_for(done.wait(), 30)
+        done.clear()
+        work.submit(wrong, take)
+        await asyncio.wait_for(done.wait(), 30)
+        # One that ends after the visit has.
+        work.submit(lambda: started.set() or 1, take)
+        started.wait(30)
+        work.close()
+        await asyncio.sleep(0.05)
+
+    asyncio.run(scene())
+    assert document.threads == [threading.get_ident()] * 2
+    assert got[0] != threading.get_ident()
+    assert str(got[1]) == "gain: expected a number"
+    assert len(got) == 2

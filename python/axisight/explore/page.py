@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from axisight.errors import AxisightError
 from axisight.explore import words
 from axisight.explore.answers import Answer, Rest, answer, rest
+from axisight.explore.beside import Beside
 from axisight.explore.controls import Controls
 from axisight.explore.exports import figure_png, robot_text, verdict_text
 from axisight.explore.plots import Orders, Regard, Responses, time_figures
@@ -52,11 +52,11 @@ class Page:
         session = state.session
         kind = session.robot.axis_is_prismatic
         self._units = [("N", "m") if prismatic else ("Nm", "rad") for prismatic in kind]
-        self._pool = ThreadPoolExecutor(1)
         self._busy = self._wanted = False
         self._resting: Any = None
         self._last: Answer | None = None
         self._doc: Any = pn.state.curdoc
+        self._beside = Beside(self._doc)
         self._time = Range1d(*_whole(session.logs[state.log].duration_s))
         self._curves = time_figures(self._time)
         self._curves["torque"].figure.on_event(RangesUpdate, lambda _event: self._zoomed())
@@ -70,7 +70,7 @@ class Page:
         self._build_diagnosis()
         self._tabs = self._build_tabs()
         self._first()
-        pn.state.on_session_destroyed(lambda _context: self._pool.shutdown(wait=False))
+        pn.state.on_session_destroyed(lambda _context: self._beside.close())
 
     def _first(self) -> None:
         """Draw everything once, so that no figure is ever without its ranges."""
@@ -252,16 +252,7 @@ class Page:
         task = partial(
             answer, state.session, state.log, state.version(), dict(sorted(state.pins.items()))
         )
-        self._pool.submit(self._hand_over, task, self._answered)
-
-    def _hand_over(self, task: Callable[[], Any], then: Callable[[Any], None]) -> None:
-        """Do a task in the thread of this page, and hand the result to the server's loop."""
-        try:
-            found = task()
-        except Exception as error:
-            # Whatever it is: a page that waits for an answer that never comes looks alive.
-            found = error
-        self._doc.add_next_tick_callback(partial(then, found))
+        self._beside.submit(task, self._answered)
 
     def _answered(self, found: Answer | Exception) -> None:
         self._busy = False
@@ -286,7 +277,7 @@ class Page:
             return
         state, tab = self.state, _TABS[self._tabs.active]
         task = partial(rest, state.session, self._last, state.axis, tab, self._against.value)
-        self._pool.submit(self._hand_over, task, self._rested)
+        self._beside.submit(task, self._rested)
 
     # Drawing
 
