@@ -137,6 +137,7 @@ def test_figures_hold_what_was_simulated(running):
         seen.click("pin as A")
         page.wait_for_selector("#gaps th:has-text('pin A')")
         seen.click("take it out")
+        expect(page.get_by_role("button", name="take it out")).to_have_count(0)
         page.wait_for_function(f"() => {MEAN}('residual-now') == {MEAN}('residual-given')")
         pinned, now, given = (
             np.mean(page.evaluate(DATA, f"residual-{key}")[1]) for key in ("A", "now", "given")

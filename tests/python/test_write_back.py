@@ -114,6 +114,9 @@ HEAVIER = several("link_mass", 1, relative_change=0.2)
 ASIDE = several("link_com", 2, x_m=0.02, y_m=-0.01, z_m=0.03)
 LOAD = several("payload", None, mass_kg=1.5, x_m=0.1, y_m=0.05, z_m=-0.2)
 BULKIER = several("link_inertia", 2, relative_change=0.4)
+LONGER = several("link_geometry", 1, x_m=0.03, y_m=-0.02, z_m=0.01)
+ZEROS = [several("joint_zero_offset", axis, offset_rad=0.1 * axis) for axis in (1, 2)]
+TILTED = several("base_tilt", None, about_x_rad=0.12, about_y_rad=-0.2)
 GAIN = several("torque_constant", 1, relative_error=0.07)
 SPRING = several("cable_stiffness", 2, stiffness_nm_rad=4.0)
 ROTORS = (
@@ -131,8 +134,18 @@ def torque_of(robot: Robot, effects: Sequence[Effect] = ()) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "causes",
-    [[HEAVIER], [ASIDE], [LOAD], [BULKIER], [HEAVIER, ASIDE, LOAD, BULKIER, VISCOUS]],
-    ids=lambda causes: causes[0].effect if len(causes) == 1 else "all",
+    [
+        [HEAVIER],
+        [ASIDE],
+        [LOAD],
+        [BULKIER],
+        [LONGER],
+        ZEROS[:1],
+        ZEROS[1:],
+        [TILTED],
+        [HEAVIER, ASIDE, LOAD, BULKIER, VISCOUS, LONGER, *ZEROS, TILTED],
+    ],
+    ids=lambda causes: causes[0].label if len(causes) == 1 else "all",
 )
 @pytest.mark.parametrize("kind", ["urdf", "xml"])
 def test_links_become_what_the_simulator_has(tmp_path: Path, causes: list[Cause], kind: str):

@@ -100,6 +100,16 @@ LINK_MASS, LINK_COM, LINK_INERTIA, LOAD = "link_mass", "link_com", "link_inertia
 Parameters: the relative change; the shift in the frame of the link; mass [kg] and place.
 """
 
+LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
+    "link_geometry",
+    ("joint_zero_offset", "offset_rad"),
+    "base_tilt",
+)
+"""What an axis is that lies elsewhere in the link before it, an encoder with another zero, a tilted base.
+
+Parameters: the shift in the frame of the link; its own; angles about x and y.
+"""
+
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
 """What a spring that pulls a joint to zero is, and its parameter."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 
 from axisight.effects.stated import LINK_COM, LINK_INERTIA, LINK_MASS, LOAD
 from axisight.robot import Robot
-from axisight.robot_import.bodies import Mass, Pose
-from axisight.robot_import.chain import ChainJoint
-from axisight.robot_import.load import bodies_and_chain, drive_data
+from axisight.robot_import.bodies import Mass, Pose, Tree
+from axisight.robot_import.chain import Chain, ChainJoint
 from axisight.write_back.placed import Placed
 
 if TYPE_CHECKING:
@@ -40,20 +38,17 @@ class BodyChange:
 
 
 def body_changes(
-    source: Path, robot: Robot, causes: Sequence[Cause]
+    tree: Tree, chain: Chain, robot: Robot, causes: Sequence[Cause]
 ) -> tuple[list[BodyChange], Placed]:
-    """Return what causes on links, and loads, make of bodies, and those that none can have."""
+    """Return what causes on links, and loads, make of bodies, and those that none can have.
+
+    ``tree`` and ``chain``: what the model file has.
+    """
     placed = Placed()
     by_joint: dict[int, list[Cause]] = {}
     for cause in causes:
         at = robot.n_joints - 1 if cause.axis is None else robot.axis_joints[cause.axis - 1]
         by_joint.setdefault(at, []).append(cause)
-    if not by_joint:
-        return [], placed
-    tree, chain = bodies_and_chain(source, drive_data(source))
-    if [joint.body.joint for joint in chain.joints] != robot.joint_names:
-        placed.refuse(causes, "the robot is not the chain that the file says")
-        return [], placed
     out = []
     for at, mine in by_joint.items():
         joint = chain.joints[at]

@@ -13,8 +13,10 @@ from axisight.errors import InputError
 from axisight.mujoco.torques import is_torque
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
+from axisight.robot_import.load import bodies_and_chain, drive_data
 from axisight.robot_import.xml_tree import Element, parse_xml
 from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
+from axisight.write_back.frames import FRAME_EFFECTS, write_frames
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
 from axisight.write_back.links import LINK_EFFECTS, body_changes
@@ -58,8 +60,9 @@ def write_model(
     target
         File to write. Of a URDF or MJCF all bytes stay but the numbers that change, each with a comment that says
         cause, value, interval and probability: dry and viscous friction of joints; masses, centres of mass and
-        inertias of links, and a load on the last one; of an MJCF also rotors (armature), springs of joints, and
-        gains, limits, delays and lags of motors. What was re-fitted within its tolerance stays as it is.
+        inertias of links, and a load on the last one; where an axis lies in its link, where the zero of a joint
+        is, how the base is tilted; of an MJCF also rotors (armature), springs of joints, and gains, limits, delays
+        and lags of motors. What was re-fitted within its tolerance stays as it is.
     overwrite
         Replace a file that exists.
 
@@ -104,9 +107,7 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     if root.tag not in JOINT_NUMBERS:
         raise InputError(f"{source}: expected a URDF or MJCF to write back to, got <{root.tag}>")
     edits = Edits(text, str(source))
-    links = [cause for cause in causes if cause.effect in LINK_EFFECTS]
-    changes, impossible = body_changes(source, robot, links)
-    done = [*_on_axes(edits, root, robot, causes), impossible, write_bodies(edits, root, changes)]
+    done = [*_on_axes(edits, root, robot, causes), *_on_chain(edits, root, source, robot, causes)]
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
     try:
@@ -138,6 +139,24 @@ def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause])
         if drives and root.tag == "mujoco":
             out.append(write_drive(edits, root, name, drives))
     return out
+
+
+def _on_chain(
+    edits: Edits, root: Element, source: Path, robot: Robot, causes: Sequence[Cause]
+) -> list[Placed]:
+    """Write what belongs to links, and to where axes lie."""
+    links = [cause for cause in causes if cause.effect in LINK_EFFECTS]
+    frames = [cause for cause in causes if cause.effect in FRAME_EFFECTS]
+    if not links and not frames:
+        return []
+    tree, chain = bodies_and_chain(source, drive_data(source))
+    if [joint.body.joint for joint in chain.joints] != robot.joint_names:
+        placed = Placed()
+        placed.refuse([*links, *frames], "the robot is not the chain that the file says")
+        return [placed]
+    changes, impossible = body_changes(tree, chain, robot, links)
+    moved = write_frames(edits, root, (tree, chain), robot, frames)
+    return [impossible, write_bodies(edits, root, changes), moved]
 
 
 def _no_number(root: Element, effect: Effect) -> str:

@@ -16,12 +16,24 @@ _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/
 
 
 @dataclass
+class _Tag:
+    """What becomes of the start tag of one element: attributes, comments above it, its name."""
+
+    element: Element
+    attributes: dict[str, Numbers] = field(default_factory=dict)
+    comments: list[str] = field(default_factory=list)
+    without: set[str] = field(default_factory=set)
+    name: str = ""
+
+
+@dataclass
 class Edits:
     """Changes of one text, made together: places are those of the text as it was read."""
 
     text: bytes
     name: str
     _changes: list[tuple[int, int, bytes]] = field(default_factory=list)
+    _tags: dict[int, _Tag] = field(default_factory=dict)
 
     def set(
         self,
@@ -32,24 +44,16 @@ class Edits:
         without: Collection[str] = (),
         tag: str = "",
     ) -> None:
-        """Set attributes of an element, with a comment on a line above it.
+        """Set attributes of an element, with a comment on a line above it; more than once adds up.
 
         ``without``: attributes that go; ``tag``: another name of an element without content.
         """
-        start, old = self._tag(element)
-        made = old
-        for name in without:
-            made = _attribute(name).sub(b"", made, count=1)
-        for name, value in attributes.items():
-            made = _with(made, name, value)
-        end = start + len(old)
-        if tag:
-            made = b"<" + tag.encode() + made[1 + len(element.tag.encode()) :]
-            if not old.endswith(b"/>"):
-                blanks, end = self._closed(element, end)
-                made += blanks + b"</" + tag.encode() + b">"
-        lead = _comment(comment) + self._indent(start) if comment else b""
-        self._replace(start, end, lead + made)
+        self._tag(element)
+        new = self._tags.setdefault(element.offset, _Tag(element))
+        new.attributes |= attributes
+        new.without |= set(without)
+        new.comments += [comment] if comment else []
+        new.name = tag or new.name
 
     def add(
         self, element: Element, child: str, attributes: Mapping[str, Numbers], comment: str = ""
@@ -71,12 +75,29 @@ class Edits:
     def result(self) -> bytes:
         """Return the text with all changes."""
         out, at = [], 0
-        for start, end, new in sorted(self._changes):
+        for start, end, new in sorted([*self._changes, *map(self._made, self._tags.values())]):
             if start < at:
                 raise RobotError(f"{self.name}: expected one change of each element, got two")
             out += [self.text[at:start], new]
             at = end
         return b"".join([*out, self.text[at:]])
+
+    def _made(self, new: _Tag) -> tuple[int, int, bytes]:
+        """Return where the start tag of an element stands, and what stands there instead."""
+        start, old = self._tag(new.element)
+        made = old
+        for name in sorted(new.without):
+            made = _attribute(name).sub(b"", made, count=1)
+        for name, value in new.attributes.items():
+            made = _with(made, name, value)
+        end = start + len(old)
+        if new.name:
+            made = b"<" + new.name.encode() + made[1 + len(new.element.tag.encode()) :]
+            if not old.endswith(b"/>"):
+                blanks, end = self._closed(new.element, end)
+                made += blanks + b"</" + new.name.encode() + b">"
+        lead = b"".join(_comment(comment) + self._indent(start) for comment in new.comments)
+        return start, end, lead + made
 
     def _replace(self, start: int, end: int, new: bytes) -> None:
         self._changes.append((start, end, new))

@@ -1,0 +1,205 @@
+"""Where axes lie in the text of a URDF or MJCF: lengths of links, zeros of joints, the tilt of the base.
+
+Frames of links are parallel to the base's at zero angle, those of the file may be turned: what is parallel to
+the base is turned into the frame of the body that an element stands in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from axisight.effects.stated import BASE_TILT, JOINT_ZERO, LINK_GEOMETRY
+from axisight.robot import Robot
+from axisight.robot_import.bodies import Tree
+from axisight.robot_import.chain import Chain
+from axisight.robot_import.xml_tree import Element
+from axisight.write_back.placed import Placed, said
+from axisight.write_back.xml_edits import Edits
+
+if TYPE_CHECKING:
+    from axisight.gap.result import Cause
+
+Array = NDArray[np.float64]
+
+FRAME_EFFECTS = (LINK_GEOMETRY, JOINT_ZERO[0], BASE_TILT)
+
+
+@dataclass
+class _Move:
+    """What becomes of a joint of the chain: its place shifted [m] and all turned, both in the base's frame.
+
+    ``turned``: of what the joint stands on; ``zero_rad``: of its own angle.
+    """
+
+    shift_m: Array = field(default_factory=lambda: np.zeros(3))
+    turned: Rotation = field(default_factory=Rotation.identity)
+    zero_rad: float = 0.0
+    causes: list[Cause] = field(default_factory=list)
+
+
+def write_frames(
+    edits: Edits,
+    root: Element,
+    model: tuple[Tree, Chain],
+    robot: Robot,
+    causes: Sequence[Cause],
+) -> Placed:
+    """Write causes that are frames, and say which the file has no place for; ``model``: what it has."""
+    placed = Placed()
+    moves: dict[int, _Move] = {}
+    urdf = root.tag == "robot"
+    for cause in causes:
+        if cause.effect == BASE_TILT and not urdf:
+            _done(placed, [cause], _gravity(edits, root, model[1], cause))
+            continue
+        at = _at(robot, cause)
+        if at >= robot.n_joints:
+            placed.refuse([cause], "behind the last axis there is none that could lie elsewhere")
+            continue
+        move = moves.setdefault(at, _Move())
+        move.causes.append(cause)
+        if cause.effect == LINK_GEOMETRY:
+            move.shift_m = move.shift_m + _vector(cause)
+        elif cause.effect == BASE_TILT:
+            move.turned = _level(cause).inv()
+        else:
+            move.zero_rad += cause.parameters[JOINT_ZERO[1]].value
+    for at, move in moves.items():
+        write = _urdf if urdf else _mjcf
+        _done(placed, move.causes, write(edits, root, model, at, move))
+    return placed
+
+
+def _done(placed: Placed, causes: Sequence[Cause], why: str) -> None:
+    if why:
+        placed.refuse(causes, why)
+    else:
+        placed.take(causes)
+
+
+def _at(robot: Robot, cause: Cause) -> int:
+    """Return the joint, from 0, whose place says a cause."""
+    if cause.axis is None:
+        return 0
+    joint = int(robot.axis_joints[cause.axis - 1])
+    return joint + 1 if cause.effect == LINK_GEOMETRY else joint
+
+
+def _vector(cause: Cause) -> Array:
+    return np.array([cause.parameters[name].value for name in ("x_m", "y_m", "z_m")])
+
+
+def _level(cause: Cause) -> Rotation:
+    """Return how gravity turns in the frame of a tilted base: R_y(-b) R_x(-a)."""
+    angles = [-cause.parameters[name].value for name in ("about_x_rad", "about_y_rad")]
+    return Rotation.from_euler("xy", angles)
+
+
+def _below(tree: Tree, chain: Chain, at: int) -> Rotation:
+    """Return how the body that carries a joint is turned in the base, all angles at zero."""
+    carrier = chain.joints[at].body.parent
+    turned = np.eye(3)
+    for body in tree.path(carrier) if carrier is not None else ():
+        turned = turned @ body.pose.rotation
+    return Rotation.from_matrix(turned)
+
+
+def _urdf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
+    """Set or add the <origin> of a joint; return why not, nothing where it was done."""
+    tree, chain = model
+    body = chain.joints[at].body
+    joint = next(e for e in root.all("joint") if e.attributes.get("name") == body.joint)
+    below = _below(tree, chain, at)
+    tilt = below.inv() * move.turned * below
+    place = tilt.apply(body.pose.origin) + below.inv().apply(move.shift_m)
+    turned = tilt * Rotation.from_matrix(body.pose.rotation) * _about(body.axis, move.zero_rad)
+    numbers = {"xyz": place.tolist(), "rpy": turned.as_euler("xyz").tolist()}
+    if move.zero_rad == 0 and tilt.magnitude() == 0:
+        del numbers["rpy"]
+    if np.allclose(place, body.pose.origin, rtol=0, atol=1e-12):
+        del numbers["xyz"]
+    origin = joint.find("origin")
+    if origin is None:
+        edits.add(joint, "origin", numbers, said(move.causes))
+    else:
+        edits.set(origin, numbers, said(move.causes))
+    return ""
+
+
+def _about(axis: Array, angle_rad: float) -> Rotation:
+    return Rotation.from_rotvec(angle_rad * axis / np.linalg.norm(axis))
+
+
+def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
+    """Set the place of a body and the reference of its joint; return why not, nothing where it was done."""
+    tree, chain = model
+    joint = chain.joints[at].body
+    named = {(e.tag, e.attributes.get("name")): e for e in root.walk()}
+    body, own = named.get(("body", joint.of)), named.get(("joint", joint.joint))
+    why = _why_not(root, body, own, move)
+    if why:
+        return why
+    assert body is not None
+    assert own is not None
+    if np.any(move.shift_m):
+        if chain.joints[at - 1].body.of == joint.of:
+            return f"both axes are joints of one body, {joint.of!r}"
+        shift = _below(tree, chain, at).inv().apply(move.shift_m)
+        place = np.array(body.numbers("pos", 3, (0.0, 0.0, 0.0))) + shift
+        edits.set(body, {"pos": place.tolist()}, said(_of(move, LINK_GEOMETRY)))
+    if move.zero_rad:
+        # A larger angle than is read is a smaller one that the model counts from.
+        reference = own.number("ref", 0.0) - move.zero_rad * _per_radian(root)
+        edits.set(own, {"ref": reference}, said(_of(move, JOINT_ZERO[0])))
+    return ""
+
+
+def _why_not(root: Element, body: Element | None, own: Element | None, move: _Move) -> str:
+    """Return why what an MJCF says of a joint and its body cannot be changed in place."""
+    if body is None or own is None:
+        return "its body or joint stands in another file or has no name"
+    if np.any(move.shift_m) and any(body in frame.walk() for frame in _all(root, "frame")):
+        return f"{body.attributes['name']!r} stands in a <frame>"
+    if not move.zero_rad:
+        return ""
+    defaults = [e for default in _all(root, "default") for e in _all(default, "joint")]
+    if "ref" not in own.attributes and any("ref" in e.attributes for e in defaults):
+        return "defaults say where the zero of joints is"
+    if any(e.attributes.get("joint1") == own.attributes["name"] for e in root.walk()):
+        return "a constraint counts from the zero of the joint"
+    return ""
+
+
+def _all(root: Element, tag: str) -> Iterator[Element]:
+    return (e for e in root.walk() if e.tag == tag)
+
+
+def _of(move: _Move, effect: str) -> list[Cause]:
+    return [cause for cause in move.causes if cause.effect == effect]
+
+
+def _per_radian(root: Element) -> float:
+    """Return how much of the unit of angles, which an MJCF chooses, is one radian."""
+    said_so = [e.attributes["angle"] for e in _all(root, "compiler") if "angle" in e.attributes]
+    return 1.0 if said_so[-1:] == ["radian"] else math.degrees(1.0)
+
+
+def _gravity(edits: Edits, root: Element, chain: Chain, cause: Cause) -> str:
+    """Turn the gravity of an MJCF; return why not, nothing where it was done."""
+    gravity = {"gravity": _level(cause).apply(chain.gravity_m_s2).tolist()}
+    options = root.all("option")
+    own = [e for e in options if "gravity" in e.attributes]
+    if not own and any(_all(root, "include")):
+        return "gravity may stand in another file"
+    if options:
+        edits.set((own or options)[-1], gravity, said([cause]))
+    else:
+        edits.add(root, "option", gravity, said([cause]))
+    return ""
