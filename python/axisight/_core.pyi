@@ -106,7 +106,6 @@ class EffectInfo(TypedDict):
     stands_for: tuple[str, str] | None
     linear: str
     inverse_dynamics: bool
-    stiff: bool
     absorbed_by: list[str]
     shown_by: list[str]
     parameters: list[ParameterInfo]

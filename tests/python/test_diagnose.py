@@ -52,6 +52,28 @@ def test_scatter_alone_is_none():
         ),
         # As many simulators have it: torque passes the gear at the nominal ratio.
         Effect("transmission_error", 1, {"cosine_rad": 3e-4, "sine_rad": 1e-4, "returned": 0.0}),
+        # Two waves, neither twice the other.
+        Effect(
+            "transmission_error",
+            1,
+            {"order": 1.0, "cosine_rad": 3e-4, "second_sine_rad": 1e-4, "second_ratio": 3.0},
+        ),
+        Effect(
+            "presliding_friction",
+            1,
+            {"coulomb_nm": 0.5, "presliding_rad": 0.1, "bristle_time_s": 0.02},
+        ),
+        # Warm as modelled, cold where every log begins.
+        Effect(
+            "friction_warmup",
+            1,
+            {"viscous_nm_s_rad": -0.02, "time_constant_s": 2.0, "cold_nm_s_rad": 0.02},
+        ),
+        Effect(
+            "position_dependent_friction",
+            1,
+            {"mean_nm": 0.4, "cosine_nm": 0.2, "sine_nm": 0.3, "order": 0.05},
+        ),
         Effect("gear_hysteresis", 1, {"share": 0.3, "deflection_rad": 3e-4}),
         Effect("torque_deadband", 1, {"width_nm": 0.4}),
         Effect("piecewise_stiffness", 1, {"step": 0.8, "knee_rad": 3e-4}),
@@ -60,7 +82,7 @@ def test_scatter_alone_is_none():
         Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
         Effect("torque_sensor_gain", 1, {"relative_error": 0.08}),
     ],
-    ids=lambda e: e.name,
+    ids=lambda e: f"{e.name}-{next(iter(e.parameters))}",
 )
 def test_a_withheld_effect_is_named(effect):
     found = run([effect])

@@ -51,5 +51,5 @@ def test_a_cause_that_is_put_in_takes_its_gap_away(tmp_path: Path, targets: bool
     twice = replace(MISSING, parameters={"viscous_nm_s_rad": 0.04})
     off = session.see(0, Version.of([twice])).gap[0]
     assert off == pytest.approx(found.given.gap[0], rel=0.25 if targets else 0.05)
-    for tab in ("against", "orders", "response"):
+    for tab in ("against", "orders", "responses"):
         assert rest(session, found, 0, tab, "speed").problem == ""

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from axisight.explore.answers import answer, rest
 from axisight.explore.background import Background
 from axisight.explore.beside import Beside
 from axisight.explore.exports import figure_png, robot_text
-from axisight.explore.regard import in_bins, order_spectrum, quantity
+from axisight.explore.measured import measured_gains
+from axisight.explore.regard import in_bins, order_spectrum, quantity, responses
 from axisight.explore.said import read_said, said
 from axisight.explore.session import AS_GIVEN, Session, Version
 from axisight.explore.state import State
@@ -84,6 +86,8 @@ def test_every_tab_has_its_answer(session):
     assert mean["given"] < -0.4 and abs(mean["now"]) < 0.2, off
     assert set(at["orders"].orders) == {"given", "now"}
     assert at["responses"].responses["now"][1].shape == (300, 3)
+    frequency_hz, gain = at["responses"].responses["measured"]
+    assert gain.shape == (len(frequency_hz), 3)
     assert at["responses"].problem == ""
 
 
@@ -286,3 +290,29 @@ def test_results_of_work_beside_come_through_the_loop():
     assert got[0] != threading.get_ident()
     assert str(got[1]) == "gain: expected a number"
     assert len(got) == 2
+
+
+def test_measured_responses_are_those_of_the_machine_in_its_loop(session):
+    """Axes without friction: within their standard errors, of up to three tenths, of the model's."""
+    frequency_hz, gains = session.measured_gains
+    model = np.abs(responses(session.robot, (), frequency_hz))
+    for axis in (0, 2):
+        shown = np.isfinite(gains[:, axis, axis])
+        assert shown.sum() > 20
+        off = np.log(gains[shown, axis, axis] / model[shown, axis, axis])
+        # Half of all lie within 0.67 standard errors; windows flatten resonances and notches beside that.
+        assert np.median(np.abs(off)) < 0.1
+    # Noise alone goes through the controller: no gain there, which straight division would show.
+    assert not np.isfinite(gains[frequency_hz > 400]).any()
+
+
+def test_responses_are_not_measured_without_references(session):
+    bare = [replace(log, velocity_ref_rad_s=None) for log in session.logs]
+    assert measured_gains(bare) is None
+    # Too few lines to tell three axes apart.
+    first = session.logs[0]
+    cut = {
+        key: getattr(first, key)[:8]
+        for key in ("time_s", "torque_nm", "position_rad", "velocity_ref_rad_s")
+    }
+    assert measured_gains([replace(first, **cut)]) is None

@@ -71,7 +71,6 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     };
     out.set_item("linear", linear)?;
     out.set_item("inverse_dynamics", info.inverse_dynamics)?;
-    out.set_item("stiff", info.stiff)?;
     out.set_item("absorbed_by", words(info.absorbed_by))?;
     out.set_item("shown_by", words(info.shown_by))?;
     let mut parameters = Vec::new();

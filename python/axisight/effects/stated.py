@@ -85,6 +85,12 @@ RIGID_BODY_QUANTITIES = {
 DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
 """What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
 
+BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
+"""What dry friction is that yields before it slips, over which way, and how fast it may slip in fits.
+
+In torque that is predicted from motion it slips all the time, and is dry friction.
+"""
+
 VISCOUS_FRICTION = "viscous_friction"
 """What friction in proportion to speed is, beyond the simulator's."""
 

@@ -41,9 +41,9 @@ class EffectInfo:
     which a machine gives the very same logs of commands and motor angles.
     ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first
     parameter is the change itself or a share. ``linear``: how a linear model holds it.
-    ``inverse_dynamics``: whether torque predicted from measured motion can hold it. ``stiff``:
-    explicit integration, as in fits, is no use. ``absorbed_by``: identified quantities that it is
-    part of. ``shown_by``: experiments that tell it from others, the best first.
+    ``inverse_dynamics``: whether torque predicted from measured motion can hold it.
+    ``absorbed_by``: identified quantities that it is part of. ``shown_by``: experiments that tell it from
+    others, the best first.
     """
 
     name: str
@@ -72,7 +72,6 @@ class EffectInfo:
     stands_for: tuple[str, Literal["absolute", "relative"]] | None
     linear: Literal["parameters", "slope", "path", "waves", "no"]
     inverse_dynamics: bool
-    stiff: bool
     absorbed_by: tuple[str, ...]
     shown_by: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]

@@ -46,8 +46,8 @@ class Rest:
     """What may come later: the gap of all validation logs (n_axes,), and what the open tab shows.
 
     ``held_given`` and ``held_floor``: the same of the simulator as given, and of noise alone.
-    ``against``: dots and means by version; ``orders`` and ``responses`` by version; ``problem``: why one of
-    them cannot be.
+    ``against``: dots and means by version; ``orders`` and ``responses`` by version, and of the latter what is
+    measured; ``problem``: why one of them cannot be.
     """
 
     axis: int
@@ -92,4 +92,7 @@ def _with_responses(session: Session, last: Answer, out: Rest) -> Rest:
             curves[key] = (frequency_hz, np.abs(found[:, :, out.axis]))
     except AxisightError as error:
         problem = f"no linear response: {error}"
+    seen = session.measured_gains
+    if seen is not None:
+        curves["measured"] = (seen[0], seen[1][:, :, out.axis])
     return replace(out, responses=curves, problem=problem)

@@ -187,7 +187,7 @@ class Responses:
 
     def __init__(self, n_axes: int) -> None:
         self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB]", "log")
-        self.sources: dict[str, list[ColumnDataSource]] = {"given": [], "now": []}
+        self.sources: dict[str, list[ColumnDataSource]] = {"given": [], "now": [], "measured": []}
         items = []
         for i in range(n_axes):
             color = palette.SERIES[i % len(palette.SERIES)]
@@ -198,6 +198,12 @@ class Responses:
                 )
                 self.sources[key].append(source)
                 items.append(LegendItem(label=f"axis {i + 1}, {CURVES[key][0]}", renderers=[line]))
+            dots = ColumnDataSource({"x": [], "y": []}, name=f"response-measured-{i + 1}")
+            seen = self.figure.scatter(
+                "x", "y", source=dots, size=4, color=color, alpha=0.6, line_color=None
+            )
+            self.sources["measured"].append(dots)
+            items.append(LegendItem(label=f"axis {i + 1}, measured", renderers=[seen]))
         legend = Legend(items=items, click_policy="hide", label_text_font_size="9pt")
         self.figure.add_layout(legend, "right")
 
@@ -206,7 +212,7 @@ class Responses:
         self.figure.title.text = f"motor angles per torque of motor {axis + 1}"
 
     def show(self, key: str, frequency_hz: Array, gain: Array) -> None:
-        """Show gains (n_freq, n_outputs) [rad/Nm]."""
+        """Show gains (n_freq, n_outputs) [rad/Nm], those that are known."""
         with np.errstate(divide="ignore"):
             level = 20 * np.log10(gain)
         for source, column in zip(self.sources[key], level.T, strict=True):

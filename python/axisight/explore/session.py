@@ -14,6 +14,7 @@ from scipy.fft import dct
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.explore.choices import in_bounds
+from axisight.explore.measured import measured_gains
 from axisight.fitting import robot_parameters
 from axisight.gap.howfar import stage
 from axisight.gap.pipeline import behind_gate
@@ -166,6 +167,11 @@ class Session:
     def held_given(self) -> Array:
         """`held_gap` of the simulator as given (n_axes,) [1]."""
         return self.held_gap()
+
+    @cached_property
+    def measured_gains(self) -> tuple[Array, Array] | None:
+        """Frequencies and gains from motor torques to motor angles that all logs together show, if they do."""
+        return measured_gains(self.logs)
 
     def _held_measured(self) -> list[Array]:
         first = len(self.logs) - len(self._held)

@@ -11,11 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import Weighting
 from axisight.gap.closed_loop import ClosedLoopFitter, Record
-from axisight.gap.feedback import controller_response, inertia_of_motors, loop_responses
+from axisight.gap.feedback import (
+    controller_response,
+    inertia_of_motors,
+    loop_responses,
+    periodic_response,
+)
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
@@ -120,9 +124,7 @@ class TargetsView(View):
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the answer of the loop's position to an effect (n_freq,)."""
         f = np.maximum(frequency_hz, frequency_hz[1])
-        from_angle, from_torque = loop_responses(self.robot, f)
-        on_sensor = effect_info(effect).acts == "sensor"
-        found = (from_angle if on_sensor else from_torque)[:, axis, axis]
+        found = periodic_response(self.robot, effect, axis, loop_responses(self.robot, f), f)
         return np.asarray(found / controller_response(self.robot, f)[:, axis, axis])
 
     def measured(self, log: Log) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
+from axisight.effects.stated import BRISTLES
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
 from axisight.gap.starts import STARTS, TARGET_STARTS, Place, Response, Situation, Trial
@@ -65,7 +66,7 @@ def all_candidates(
     trials = [
         Trial(info, place, robot, logs, at)
         for info in effect_table().values()
-        if not info.stiff and (not inverse_dynamics or _in_torque(info))
+        if not inverse_dynamics or _in_torque(info)
         for place in _places(robot, info)
         if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
     ]
@@ -80,9 +81,10 @@ def all_candidates(
 def _in_torque(info: EffectInfo) -> bool:
     """Whether an effect is looked for in predicted torque.
 
-    Not between axes: of these the turn of an elastic gear is looked for, and gears are rigid there.
+    Not between axes: of these the turn of an elastic gear is looked for, and gears are rigid there; nor what
+    is another effect there.
     """
-    return info.inverse_dynamics and info.scope != "axes"
+    return info.inverse_dynamics and info.scope != "axes" and info.name != BRISTLES[0]
 
 
 def _places(robot: Robot, info: EffectInfo) -> list[Place]:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, EffectTuple, core_effects, effect_info
+from axisight.effects import Effect, EffectTuple, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.encoder_steps import encoder_steps
-from axisight.gap.feedback import loop_responses
+from axisight.gap.feedback import loop_responses, periodic_response
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
@@ -87,11 +87,10 @@ class ClosedLoopView(View):
         """Return the response of the feedback that keeps the simulator on the log.
 
         An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``; a torque
-        on the motor passes the machine before.
+        on the motor passes the machine before, and an error of the gear becomes one.
         """
-        from_angle, from_torque = self._loop(frequency_hz)
-        on_sensor = effect_info(effect).acts == "sensor"
-        return (from_angle if on_sensor else from_torque)[:, axis, axis]
+        loops = self._loop(frequency_hz)
+        return periodic_response(self.tracking, effect, axis, loops, frequency_hz)
 
     def _loop(self, frequency_hz: Array) -> tuple[Complex, Complex]:
         """Return the responses to errors of sensors and to torques (n_freq, n_axes, n_axes)."""

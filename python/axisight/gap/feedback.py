@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.frf.errors import reference_to_input
 from axisight.logs.frozen import runs
 from axisight.robot import Robot
@@ -97,6 +98,31 @@ def loop_responses(robot: Robot, frequency_hz: Array) -> tuple[Complex, Complex]
     machine = robot.zoh_response(f).values
     from_angle = reference_to_input(machine, controller_response(robot, f))
     return from_angle, from_angle @ machine
+
+
+def periodic_response(
+    robot: Robot, effect: str, axis: int, loops: tuple[Complex, Complex], frequency_hz: Array
+) -> Complex:
+    """Return how an effect that repeats with the motor angle shows in the torque of its axis (n_freq,).
+
+    From an error of the sensor [rad], a torque on the motor, or an error of the gear [rad, joint side];
+    ``loops``: as `loop_responses` gives them; ``axis`` from 0. An error of the gear acts as a turn of all
+    motors would that they do not make themselves: by the torque that they take, but for that of the rotors.
+    """
+    from_angle, from_torque = loops
+    acts = effect_info(effect).acts
+    if acts == "sensor":
+        return np.asarray(from_angle[:, axis, axis])
+    if acts != "transmission":
+        return np.asarray(from_torque[:, axis, axis])
+    values = robot.parameters()
+    s = 2j * np.pi * frequency_hz
+    rotor = values[f"{robot.axis_names[axis]}.motor_inertia"] * s**2
+    friction = values[f"{robot.axis_names[axis]}.viscous_friction"] * s
+    # Held commands come half a sample late, these torques do not: near the resonance both terms cancel.
+    at_once = from_torque[:, axis, axis] * np.exp(0.5 * s * robot.sample_time_s)
+    gear = (rotor + friction) * at_once - from_angle[:, axis, axis]
+    return np.asarray(gear / robot.gear_ratio[axis])
 
 
 def free_of_limits(torque: Array, width: int) -> Mask:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo
+from axisight.effects.stated import BRISTLES
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.orders import Complex, Turning, passed, strongest_orders
 from axisight.logs import Log
@@ -117,19 +118,33 @@ def _stribeck(trial: Trial) -> FreeEffect:
     return replace(begin, bounds=bounds, starts=starts)
 
 
+# Ways over which bristles yield, of the travel of the motor: less is dry friction, more a spring.
+_YIELDING = (3e-4, 1.5e-3, 6e-3)
+
+
+def _presliding(trial: Trial) -> FreeEffect:
+    """Begin with several ways before it slips, as a law without a break-away; no step skips its slipping."""
+    _, way, relaxation = BRISTLES
+    travel = max(float(np.ptp(x[trial.index].angle_rad)) for x in trial.at.turning)
+    starts = tuple({way: share * max(travel, 1e-3)} for share in _YIELDING)
+    values = {p.name: p.neutral for p in trial.info.parameters} | starts[1]
+    values[relaxation] = trial.robot.sample_time_s
+    return FreeEffect(
+        trial.effect(values),
+        ("coulomb_nm", way, "bristle_time_s"),
+        bounds={way: (0.5 * starts[0][way], 5 * starts[-1][way]), "bristle_time_s": (0.0, 0.1)},
+        starts=(starts[0], starts[2]),
+    )
+
+
 # Of the longest wave on a slide.
 _SLIDE_TURNS = 2.0
 
 
 def _waves(trial: Trial) -> FreeEffect | None:
     """Begin with the strongest orders of the residual over the motor angle."""
-    logs = [axes[trial.index] for axes in trial.at.turning]
-    found = trial.at.response
-    responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
     terms = trial.info.terms().values()
-    # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
-    least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
-    orders = strongest_orders(logs, responses, count=len(terms), least_turns=least)
+    orders = _orders(trial, len(terms))
     if not orders:
         return None
     # Terms without an order are switched off.
@@ -141,10 +156,26 @@ def _waves(trial: Trial) -> FreeEffect | None:
     return FreeEffect(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free))
 
 
+def _orders(trial: Trial, count: int) -> list[int]:
+    """Return the strongest orders of the residual over the motor angle, as the effect shows in it."""
+    logs = [axes[trial.index] for axes in trial.at.turning]
+    found = trial.at.response
+    responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
+    # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
+    least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
+    return strongest_orders(logs, responses, count=count, least_turns=least)
+
+
+# As harmonic drives have it.
+_TWICE = 2
+
+
 def _gear_waves(trial: Trial) -> FreeEffect:
-    """Begin twice a motor turn, as harmonic drives have it."""
+    """Begin with the two strongest orders of the residual over the motor angle, else twice a motor turn."""
     waves = tuple(p.name for p in trial.info.parameters if p.role == "amplitude")
-    values = {"order": 2.0, "returned": 0.5, **dict.fromkeys(waves, 0.0)}
+    first, *others = sorted(_orders(trial, 2)) or [_TWICE]
+    values = {"order": float(first), "returned": 0.5, **dict.fromkeys(waves, 0.0)}
+    values["second_ratio"] = others[0] / first if others else float(_TWICE)
     # Gears conserve power or pass torque at the nominal ratio: either is as good a guess.
     return FreeEffect(trial.effect(values), (*waves, "returned"), {"returned": (0.5, 0.5)})
 
@@ -372,21 +403,21 @@ def _balancer(trial: Trial) -> FreeEffect | None:
     return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
 
 
-# Over less of a turn of the joint a wave is as good as a constant and a slope.
+# Over less of a wave it is as good as a constant and a slope; how many more waves there may be.
 _LEAST_TURN_RAD = 1.5
+_MORE_WAVES = 6.0
 
 
 def _uneven(trial: Trial) -> FreeEffect | None:
-    """Begin as a law, once a turn of the joint, where it turns far enough to tell."""
-    order = abs(float(trial.robot.gear_ratio[trial.index]))
-    positions = np.concatenate([log.position_rad[:, trial.index] for log in trial.logs])
-    turns = not trial.robot.axis_is_prismatic[trial.index]
-    if not turns or order * np.ptp(positions) < _LEAST_TURN_RAD:
+    """Begin as a law, once a turn of the joint, or a quarter of a wave over as far as it turns."""
+    ratio = abs(float(trial.robot.gear_ratio[trial.index]))
+    travel = max(float(np.ptp(log.position_rad[:, trial.index])) for log in trial.logs)
+    if trial.robot.axis_is_prismatic[trial.index] or travel == 0:
         return None
+    order = max(ratio, _LEAST_TURN_RAD / travel)
     begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
-    values = {**(begin.effect.parameters or {}), "order": order}
-    free = tuple(name for name in begin.free if name != "order")
-    return replace(begin, effect=trial.effect(values), free=free)
+    begin = begin.at({"order": order})
+    return replace(begin, bounds={**begin.bounds, "order": (0.3 * order, _MORE_WAVES * order)})
 
 
 # From the slowest swing that ten seconds show to those that gears have themselves; a swing is found
@@ -490,7 +521,7 @@ STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
     "asymmetric_friction": _law(smoothing_rad_s=_SMOOTHING),
     "stribeck_friction": _stribeck,
-    "presliding_friction": _law(stribeck_speed_rad_s=_STRIBECK),
+    "presliding_friction": _presliding,
     "backlash": _play,
     "nonlinear_stiffness": _hardening,
     "joint_stiffness": _of_a_gear,
@@ -553,6 +584,8 @@ TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "coulomb_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "asymmetric_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "load_dependent_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
+    # Nor whether it yields before it slips.
+    "presliding_friction": lambda _trial: None,
     # No logged torque tells a controller: a fit has to.
     "controller_gain": _gain_of_position,
 }

@@ -39,7 +39,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::ViscousFriction, Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[

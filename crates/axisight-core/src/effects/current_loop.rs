@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[

@@ -6,19 +6,18 @@ use axisight_scalar::Scalar;
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "friction_warmup",
     summary: "viscous friction changes with the time since the log began, as grease warms up",
-    equation: "tau_f = F_w (1 - e^(-t / T_w)) phi'",
+    equation: "tau_f = (F_0 + F_w (1 - e^(-t / T_w))) phi'",
     source: "Bittencourt and Gunnarsson (2012), Journal of Dynamic Systems, Measurement, and Control 134(5) (viscous friction falls with temperature)",
     scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
+    contains: &["viscous_friction"],
     parts: &[],
     usual: &[],
     twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -40,18 +39,30 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1e5,
             typical: 0.5,
         },
+        // F_0: a machine that is warm as modelled begins with more.
+        ParameterInfo {
+            name: "cold_nm_s_rad",
+            unit: "Nm s/rad",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e4,
+            upper: 1e4,
+            typical: 0.05,
+        },
     ],
 };
 
 struct Warmup<S> {
     viscous: S,
     time_constant: S,
+    cold: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
     Box::new(Warmup {
         viscous: p[0],
         time_constant: p[1],
+        cold: p[2],
     })
 }
 
@@ -63,7 +74,7 @@ impl<S: Scalar> Kernel<S> for Warmup<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         // How far it has come: 1 - e^(-t / T), a state of its own.
         let done = motor.internal.first().map_or_else(S::zero, |z| *z);
-        -(self.viscous * done * motor.speed)
+        -(self.viscous.fma(done, self.cold) * motor.speed)
     }
 
     fn motor_rates(&self, motor: &Motor<'_, S>, rates: &mut [S]) {

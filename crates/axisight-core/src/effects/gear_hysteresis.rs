@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[Absorber::Stiffness, Absorber::Damping],
     shown_by: &[Experiment::Amplitudes],
     parameters: &[

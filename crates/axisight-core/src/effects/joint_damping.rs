@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: Some(StandsFor { quantity: "damping", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[Absorber::Damping],
     shown_by: &[Experiment::Amplitudes],
     parameters: &[ParameterInfo {

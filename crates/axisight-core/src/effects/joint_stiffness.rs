@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: Some(StandsFor { quantity: "stiffness", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
     parameters: &[ParameterInfo {

@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Parameters,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],

@@ -19,7 +19,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[

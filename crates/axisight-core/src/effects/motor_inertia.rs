@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::MotorInertia],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {

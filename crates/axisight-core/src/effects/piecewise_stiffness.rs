@@ -19,7 +19,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
     parameters: &[

@@ -18,19 +18,18 @@ const fn wave(name: &'static str) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "position_dependent_friction",
     summary: "dry friction that is larger in some places of the turn than in others",
-    equation: "tau_f = (c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint",
+    equation: "tau_f = (m + c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint",
     source: "Armstrong-Helouvry (1991), Control of Machines with Friction (joints of a PUMA 560 over their position); tanh form as coulomb_friction",
     scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
+    contains: &["coulomb_friction"],
     parts: &[],
     usual: &["coulomb_friction"],
     twins: &[],
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Poses],
     parameters: &[
@@ -46,6 +45,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.01,
         },
         SMOOTHING,
+        wave("mean_nm"),
     ],
 };
 
@@ -54,6 +54,7 @@ struct Uneven<S> {
     sine: S,
     order: S,
     smoothing: S,
+    mean: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
@@ -62,12 +63,14 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
         sine: p[1],
         order: p[2],
         smoothing: p[3],
+        mean: p[4],
     })
 }
 
 impl<S: Scalar> Kernel<S> for Uneven<S> {
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
         let (sine, cosine) = (self.order * motor.angle).sin_cos();
-        -((self.cosine * cosine + self.sine * sine) * (motor.speed / self.smoothing).tanh())
+        let level = self.cosine.fma(cosine, self.sine.fma(sine, self.mean));
+        -(level * (motor.speed / self.smoothing).tanh())
     }
 }

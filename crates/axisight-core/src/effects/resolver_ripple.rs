@@ -19,7 +19,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Waves { constant: 0, proportional: 0, reading: 12 },
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.

@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {

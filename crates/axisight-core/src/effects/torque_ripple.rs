@@ -19,7 +19,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Waves { constant: 9, proportional: 3, reading: 0 },
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.

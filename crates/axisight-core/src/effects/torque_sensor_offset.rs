@@ -17,7 +17,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: torque_offset::INFO.parameters,

@@ -19,7 +19,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "transmission_error",
     summary: "the gear runs ahead and behind periodically over the motor angle",
-    equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi) + a_2 cos(2 n phi) + b_2 sin(2 n phi); tau_motor = (r + c de/dphi) tau_gear",
+    equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi) + a_2 cos(m n phi) + b_2 sin(m n phi); tau_motor = (r + c de/dphi) tau_gear",
     source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
@@ -31,7 +31,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: None,
     linear: Linear::No,
     inverse_dynamics: false,
-    stiff: false,
     absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns, Experiment::Amplitudes],
     parameters: &[
@@ -59,6 +58,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         wave("second_cosine_rad"),
         wave("second_sine_rad"),
+        // m: a wave at twice the first is a shape of its own.
+        ParameterInfo {
+            name: "second_ratio",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 2.0,
+            lower: 0.0,
+            upper: 500.0,
+            typical: 1.0,
+        },
     ],
 };
 
@@ -68,6 +77,7 @@ struct TransmissionError<S> {
     sine: S,
     returned: S,
     second: [S; 2],
+    ratio: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
@@ -77,6 +87,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
         sine: p[2],
         returned: p[3],
         second: [p[4], p[5]],
+        ratio: p[6],
     })
 }
 
@@ -84,8 +95,8 @@ impl<S: Scalar> Kernel<S> for TransmissionError<S> {
     fn transmission_error(&self, angle: S) -> Option<GearError<S>> {
         let at = self.order * angle;
         let (first, slope) = harmonic_slope(at, self.cosine, self.sine);
-        let (second, steeper) = harmonic_slope(at * 2.0, self.second[0], self.second[1]);
-        let slope = self.order * (slope + steeper * 2.0);
+        let (second, steeper) = harmonic_slope(at * self.ratio, self.second[0], self.second[1]);
+        let slope = self.order * (slope + steeper * self.ratio);
         Some(GearError {
             ahead: first + second,
             slope,

@@ -18,7 +18,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     stands_for: Some(StandsFor { quantity: "viscous_friction", change: Change::Absolute }),
     linear: Linear::Slope,
     inverse_dynamics: true,
-    stiff: false,
     absorbed_by: &[Absorber::ViscousFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[ParameterInfo {

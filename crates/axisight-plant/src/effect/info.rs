@@ -205,9 +205,6 @@ pub struct EffectInfo {
     /// Whether torque predicted from measured motion can hold it; false for effects in the
     /// transmission and of the sensor, whose place a rigid gear takes there.
     pub inverse_dynamics: bool,
-    /// Whether it is stiff at usual sizes: explicit integration, as in fits, is no use. True
-    /// excludes it from the candidates of a diagnosis.
-    pub stiff: bool,
     /// What it is part of once identified.
     pub absorbed_by: &'static [Absorber],
     /// Experiments that show it, the best first.
