@@ -64,6 +64,12 @@ class Scene:
         """Return the largest speed of a motor that its references ask for [rad/s]."""
         return max(float(np.abs(x[:, axis - 1]).max()) for x in self.references)
 
+    def travel(self, axis: int) -> float:
+        """Return how far a joint moves along the references that move it most [rad, m]."""
+        step_s = self.robot.sample_time_s
+        ways = (np.ptp(np.cumsum(x[:, axis - 1])) * step_s for x in self.references)
+        return float(max(ways)) * abs(float(self.robot.gear_ratio[axis - 1]))
+
     def holds(self, axis: int) -> float:
         """Return the torque that holds an axis at rest, over the rated one of its motor."""
         return float(np.abs(self._at_rest[axis - 1])) / (_RATED_NM * self.torque(axis))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from axisight.blind import joint_laws, laws
+from axisight.blind import friction_laws, joint_laws, laws
 from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE
 from axisight.blind.machine import Ends, Native
 from axisight.blind.scene import (
@@ -41,6 +41,45 @@ def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     values = {"coulomb_nm": dry, "exponential_excess_nm": excess, "decay_speed_rad_s": speed}
     law = laws.ExponentialStribeck(dry, dry + excess, speed, 0.05)
     return Drawn("stribeck_friction", axis, values, laws=[law])
+
+
+def _bristles(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size = between(rng, 0.2, 0.7) * scene.torque(axis)
+    way = yielding(rng, scene, axis)
+    # The way is another law's.
+    values = {"coulomb_nm": size, "elastoplastic_rad": way}
+    law = friction_laws.ElastoPlastic(size, way)
+    return Drawn("presliding_friction", axis, values, laws=[law])
+
+
+def yielding(rng: Rng, scene: Scene, axis: int) -> float:
+    """Draw the way of a motor [rad, m] before friction slips: of a gear's play, as the motor turns it."""
+    ratio = abs(float(scene.robot.gear_ratio[axis - 1]))
+    return between(rng, 1.5e-4, 6e-4) * scene.play(axis) / ratio
+
+
+def _uneven(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    values = uneven(rng, scene, axis)
+    law = friction_laws.UnevenFriction(**on_joint(scene, axis, values), corner_rad_s=1e-3)
+    return Drawn("position_dependent_friction", axis, values, laws=[law])
+
+
+def uneven(rng: Rng, scene: Scene, axis: int) -> dict[str, float]:
+    """Draw dry friction on a motor [Nm], by how much of it it changes, and over which angle of the joint [rad]."""
+    size, travel = between(rng, 0.3, 0.8) * scene.torque(axis), scene.travel(axis)
+    return {
+        "mean_nm": size,
+        "changes_by": float(rng.uniform(0.5, 0.9)),
+        "waves_1_rad": float(rng.uniform(0.4, 1.2)) * 2 * np.pi / travel,
+        "phase_rad": float(rng.uniform(0, 2 * np.pi)),
+    }
+
+
+def on_joint(scene: Scene, axis: int, values: Mapping[str, float]) -> dict[str, float]:
+    """Return what laws of uneven friction take."""
+    ratio = abs(float(scene.robot.gear_ratio[axis - 1]))
+    size, share, waves, phase = values.values()
+    return {"dry_nm": size / ratio, "share": share, "waves": waves, "phase": phase}
 
 
 def _viscous(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -189,8 +228,10 @@ def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
     size = between(rng, 0.7e-4, 2e-4) * scene.play(axis)
     phase = float(rng.uniform(0, 2 * np.pi))
     conserves = bool(rng.integers(2))
-    law = laws.GearWave(scene.stiffness(axis), 2.0, size, phase, conserves)
-    return Drawn("transmission_error", axis, {"order": 2.0, "amplitude_rad": size}, laws=[law])
+    # Twice a turn of the motor in strain wave gears; others have other teeth.
+    order = float(rng.choice([1.0, 2.0, 2.0, 3.0]))
+    law = laws.GearWave(scene.stiffness(axis), order, size, phase, conserves)
+    return Drawn("transmission_error", axis, {"order": order, "amplitude_rad": size}, laws=[law])
 
 
 def _waves(rng: Rng, low: float, high: float) -> tuple[list[float], list[float], list[float]]:
@@ -384,6 +425,8 @@ def _cubic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
 KINDS: Mapping[str, Kind] = {
     "coulomb_friction": Kind(_coulomb),
     "stribeck_friction": Kind(_stribeck),
+    "presliding_friction": Kind(_bristles),
+    "position_dependent_friction": Kind(_uneven, axes=turning),
     "viscous_friction": Kind(_viscous),
     "load_dependent_friction": Kind(_load_friction),
     "asymmetric_friction": Kind(_asymmetric),

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from axisight.blind import formulas, joint_formulas
+from axisight.blind import formulas, friction_formulas, joint_formulas
 from axisight.blind.formulas import Formula
 from axisight.blind.machine import NOTHING, Native
 from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning, unloaded
-from axisight.blind.withheld import KINDS
+from axisight.blind.withheld import KINDS, on_joint, uneven, yielding
 
 # Angle of a motor over which dry friction comes after a reversal.
 _STRAIN_RAD = 2e-3
@@ -36,6 +36,19 @@ def _by(name: str, law: Law) -> Kind:
 def _dahl(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
     size = values["coulomb_nm"]
     return formulas.DahlFriction(size, size / _STRAIN_RAD)
+
+
+def _elements(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    size, way = between(rng, 0.2, 0.7) * scene.torque(axis), yielding(rng, scene, axis)
+    values = {"coulomb_nm": size, "mean_way_rad": way}
+    law = friction_formulas.SlidingElements(size, way)
+    return Drawn("presliding_friction", axis, values, laws=[law])
+
+
+def _uneven(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    values = uneven(rng, scene, axis)
+    law = friction_formulas.UnevenArctan(**on_joint(scene, axis, values), corner_rad_s=5e-4)
+    return Drawn("position_dependent_friction", axis, values, laws=[law])
 
 
 def _knee(_rng: Rng, scene: Scene, axis: int, values: Mapping[str, float]) -> Formula:
@@ -214,6 +227,8 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
         }.items()
     }
     | {
+        "presliding_friction": Kind(_elements),
+        "position_dependent_friction": Kind(_uneven, axes=turning),
         "stribeck_friction": Kind(_stribeck),
         "quadratic_drag": Kind(_drag),
         "gravity_compensation": Kind(_balancer, axes=turning),

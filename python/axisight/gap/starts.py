@@ -173,7 +173,7 @@ _TWICE = 2
 def _gear_waves(trial: Trial) -> FreeEffect:
     """Begin with the two strongest orders of the residual over the motor angle, else twice a motor turn."""
     waves = tuple(p.name for p in trial.info.parameters if p.role == "amplitude")
-    first, *others = sorted(_orders(trial, 2)) or [_TWICE]
+    first, *others = _orders(trial, 2) or [_TWICE]
     values = {"order": float(first), "returned": 0.5, **dict.fromkeys(waves, 0.0)}
     values["second_ratio"] = others[0] / first if others else float(_TWICE)
     # Gears conserve power or pass torque at the nominal ratio: either is as good a guess.

@@ -1,0 +1,58 @@
+"""Formulas of friction that remembers or is uneven, in the engine on Pinocchio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.blind.formulas import Formula, Place
+
+Array = NDArray[np.float64]
+
+# Ways, of their mean, after which elements slip one after another.
+_SPREAD = np.array([0.25, 0.75, 1.25, 1.75])
+
+
+@dataclass
+class SlidingElements(Formula):
+    """Dry friction of the motor by equal elements in parallel, each elastic up to its own way (Al-Bender 2005)."""
+
+    dry_nm: float
+    way_rad: float
+    strain: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    motor: Array = field(default_factory=lambda: np.zeros(1))
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin without strain."""
+        del step_s
+        self.motor, self.strain = place.motor, np.zeros((len(_SPREAD), *place.motor.shape))
+
+    def _strains(self, at: Place) -> Array:
+        ways = _SPREAD.reshape(-1, *[1] * np.ndim(at.motor)) * self.way_rad
+        return np.clip(self.strain + (at.motor - self.motor) / ways, -1.0, 1.0)
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        return -self.dry_nm * self._strains(at).mean(axis=0), 0.0
+
+    def moved(self, at: Place) -> None:
+        """Keep the strains."""
+        self.strain, self.motor = self._strains(at), at.motor
+
+
+@dataclass
+class UnevenArctan(Formula):
+    """Dry friction of the joint that is larger in some places, its sign an arc tangent of speed."""
+
+    dry_nm: float
+    share: float
+    waves: float
+    phase: float
+    corner_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the joint."""
+        size = self.dry_nm * (1.0 + self.share * np.sin(self.waves * at.joint + self.phase))
+        return 0.0, -size * 2 / np.pi * np.arctan(at.joint_speed / self.corner_rad_s)

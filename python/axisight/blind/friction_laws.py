@@ -1,0 +1,52 @@
+"""Laws of friction that remember where the axis was, and of friction that is larger in some places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, sin
+
+from axisight.blind.laws import Axis, Law
+
+# Of the strain at which bristles slip, up to which they only bend (Dupont et al. 2002).
+_ELASTIC = 0.6
+
+
+@dataclass
+class ElastoPlastic(Law):
+    """Bristles of the motor that bend, and slip the more the nearer they are to what they hold."""
+
+    dry_nm: float
+    way_rad: float
+    strain: float = 0.0
+    motor: float | None = None
+
+    def begin(self, step_s: float) -> None:
+        """Begin without strain."""
+        del step_s
+        self.strain, self.motor = 0.0, None
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        moved = 0.0 if self.motor is None else at.motor - self.motor
+        self.motor = at.motor
+        towards = self.strain * copysign(1.0, moved)
+        slips = min(max((towards - _ELASTIC) / (1.0 - _ELASTIC), 0.0), 1.0)
+        strain = self.strain + moved / self.way_rad * (1.0 - slips)
+        self.strain = min(max(strain, -1.0), 1.0)
+        return -self.dry_nm * self.strain, 0.0
+
+
+@dataclass
+class UnevenFriction(Law):
+    """Dry friction of the joint, larger where a wave over its angle is: ``waves`` of them in a radian."""
+
+    dry_nm: float
+    share: float
+    waves: float
+    phase: float
+    corner_rad_s: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the joint."""
+        size = self.dry_nm * (1.0 + self.share * sin(self.waves * at.joint + self.phase))
+        return 0.0, -size * at.joint_speed / (abs(at.joint_speed) + self.corner_rad_s)

@@ -1,0 +1,69 @@
+"""Friction that remembers or is uneven, in both engines of the benchmark: closed forms."""
+
+import numpy as np
+import pytest
+
+from axisight.blind.drawing import ENGINES
+from axisight.blind.formulas import Place
+from axisight.blind.friction_formulas import SlidingElements, UnevenArctan
+from axisight.blind.friction_laws import ElastoPlastic, UnevenFriction
+from axisight.blind.laws import Axis
+
+DRY, WAY = 0.7, 0.05
+
+
+def along(motor: np.ndarray, engine: str) -> np.ndarray:
+    """Friction on a motor that follows these angles."""
+    if engine == "mujoco":
+        law = ElastoPlastic(DRY, WAY)
+        law.begin(1e-3)
+        return np.array([law.torque(Axis(0.0, m, 0.0, 0.0, 0.0, 0.01, 0.0))[0] for m in motor])
+    formula, out = SlidingElements(DRY, WAY), []
+    places = [Place(0.0, np.array([m]), *[np.zeros(1)] * 3, 0.01, 1.0, 0.0) for m in motor]
+    formula.begin(places[0], 1e-3)
+    for place in places:
+        out.append(float(np.asarray(formula.torque(place)[0])[0]))
+        formula.moved(place)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
+def test_it_yields_before_it_slips_and_remembers(engine: str):
+    """A spring for small moves, dry friction after long ones, a loop that a reversal of twice the way closes."""
+    small = np.linspace(0.0, 0.1 * WAY, 20)
+    torque = along(small, engine)
+    assert np.diff(torque) == pytest.approx(np.diff(torque)[0], rel=1e-9)
+    there = np.linspace(0.0, 4 * WAY, 2000)
+    path = np.concatenate([there, there[::-1], there])
+    torque = along(path, engine)
+    assert torque[1999] == pytest.approx(-DRY, rel=1e-3)
+    assert torque[3999] == pytest.approx(DRY, rel=1e-3)
+    assert torque[-1] == pytest.approx(-DRY, rel=1e-3)
+    # Elements that slip one by one give back what bends both ways: of every leg twice the way is lost.
+    work = -np.sum(torque[2000:] * np.gradient(path)[2000:])
+    # Bristles that slip before the end lose less.
+    near = 0.01 if engine == "pinocchio" else 0.3
+    assert 4 * WAY - 0.5 * work / DRY == pytest.approx(2 * WAY, rel=near)
+
+
+def test_friction_is_uneven_over_the_joint():
+    """Dry friction far above its corner, of the size of the place and against the speed."""
+    angle, share, waves, phase = 0.3, 0.8, 5.0, 0.4
+    size = DRY * (1 + share * np.sin(waves * angle + phase))
+    law = UnevenFriction(DRY, share, waves, phase, 1e-6)
+    formula = UnevenArctan(DRY, share, waves, phase, 1e-6)
+    for speed in (-2.0, 2.0):
+        place = Place(
+            0.0, np.array([30.0]), np.array([100.0 * speed]), *[np.zeros(1)] * 2, 0.01, 1.0, 0.0
+        )
+        found = [
+            law.torque(Axis(0.0, 30.0, 100 * speed, angle, speed, 0.01, 0.0)),
+            [float(np.asarray(x).squeeze()) for x in formula.torque(place)],
+        ]
+        for motor, joint in found:
+            assert (motor, joint) == (0.0, pytest.approx(-np.sign(speed) * size, rel=1e-5))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_both_are_drawn(engine: str):
+    assert {"presliding_friction", "position_dependent_friction"} <= set(ENGINES[engine])
