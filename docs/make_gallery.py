@@ -122,6 +122,9 @@ SIZES: dict[str, dict[str, float]] = {
     "torque_saturation": {"limit_nm": 8.5},
     "power_supply_sag": {"sag_1_w": 0.001},
     "position_quantization": {"increment_rad": 1e-4},
+    # Cold where a log begins, warm as modelled.
+    "friction_warmup": {"viscous_nm_s_rad": -0.05, "cold_nm_s_rad": 0.05},
+    "position_dependent_friction": {"mean_nm": 0.4},
     "base_compliance": {"about_x_rad_nm": 5e-8, "about_y_rad_nm": 5e-8},
 }
 # Shown from the beginning, as they change with time.
@@ -304,8 +307,7 @@ def draw(names: list[str]) -> None:
     save(motions_picture(bases), "motions")
     for info in map(axisight.effect_info, names or axisight.effect_table()):
         motion, i = motion_of(info.name), axis_of(info) - 1
-        method: Any = "auto" if info.stiff else "dopri5"
-        run = axisight.simulate(robot, wanted[motion], effects=[at_work(info)], method=method)
+        run = axisight.simulate(robot, wanted[motion], effects=[at_work(info)], method="auto")
         if run.attrs["status"] != "completed":
             raise RuntimeError(f"{info.name}: {run.attrs['status']}")
         base = bases[motion]
