@@ -19,7 +19,7 @@ from axisight.gap import verdict_schema
 from axisight.gap.candidates import all_candidates
 from axisight.gap.orders import Turning
 from axisight.gap.settings import DEFAULT_TOLERANCES
-from axisight.gap.starts import Situation
+from axisight.gap.situation import Situation
 from axisight.logs import read_log
 from axisight.robot_file import Provenance, hash_file, identified, load_identified, write_identified
 from axisight.robot_file.effect_tables import stated

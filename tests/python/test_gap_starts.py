@@ -10,7 +10,8 @@ from axisight.effects import effect_info
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.orders import Turning
 from axisight.gap.screening import Bench, Screen
-from axisight.gap.starts import STARTS, Situation, Trial
+from axisight.gap.situation import Situation, Trial
+from axisight.gap.starts import STARTS
 from gap_data import bare_axis, logs_of
 
 PLAN = {"multisine": ("multisine", 1)}
@@ -68,3 +69,16 @@ def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():
     assert widths[-1] >= 9e-4 * (1 - 1e-12)
     # Impacts stay in phase from one width to the next.
     assert np.all(widths[1:] / widths[:-1] < 1.26)
+
+
+def test_uneven_friction_is_looked_for_at_its_wave():
+    """As much of the residual is promised from there as from the true order, but for a tenth; from a far one not."""
+    order = 0.9
+    uneven = {"mean_nm": 0.4, "cosine_nm": 0.2, "sine_nm": -0.2, "order": order}
+    option, screen, explainable = screened(Effect("position_dependent_friction", 1, uneven))
+    found = (option.effect.parameters or {})["order"]
+    low, high = option.limits("order")
+    assert low < order < high
+    gains = [screen.starts([option.at({"order": n})])[0].gain for n in (found, order, 0.3 * order)]
+    assert gains[0] > 0.9 * gains[1] > 0.85 * explainable
+    assert gains[2] < gains[0]

@@ -13,7 +13,8 @@ from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.effects.stated import BRISTLES
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
-from axisight.gap.starts import STARTS, TARGET_STARTS, Place, Response, Situation, Trial
+from axisight.gap.situation import Place, Response, Situation, Trial
+from axisight.gap.starts import STARTS, TARGET_STARTS
 from axisight.logs import Log
 from axisight.robot import Robot
 

@@ -6,75 +6,21 @@ data have nothing to start from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, EffectInfo
 from axisight.effects.stated import BRISTLES
 from axisight.gap.evidence import FreeEffect
-from axisight.gap.orders import Complex, Turning, passed, strongest_orders
-from axisight.logs import Log
+from axisight.gap.orders import passed, strongest_orders
+from axisight.gap.situation import Situation, Trial
+from axisight.gap.uneven import wave_of_friction
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
-
-Response = Callable[[str, int, Array], Complex]
-"""Of the weighted residual on an axis (from 0) to an effect there, by its name, at frequencies [Hz]."""
-
-
-Place = int | tuple[int, int] | None
-"""Of an effect: an axis from 1, two of them, or the arm."""
-
-
-@dataclass(frozen=True)
-class Situation:
-    """What start values are taken from.
-
-    ``turning[log][axis]``: weighted residual torque of the model, and how the motor turned;
-    ``response``: how effects that repeat with the motor angle show in it.
-    """
-
-    turning: Sequence[Sequence[Turning]]
-    response: Response
-    enough: Array
-    """Mean square of the residual of each axis up to which no cause is worth naming."""
-
-    def is_left(self, index: int) -> bool:
-        """Whether the residual of an axis holds something worth a cause."""
-        logs = [axes[index].residual for axes in self.turning]
-        square = sum(float(r @ r) for r in logs) / sum(len(r) for r in logs)
-        return bool(square > self.enough[index])
-
-
-@dataclass(frozen=True)
-class Trial:
-    """An effect to be tried at a place: ``axis`` from 1, two of them, or None for the arm."""
-
-    info: EffectInfo
-    place: Place
-    robot: Robot
-    logs: Sequence[Log]
-    at: Situation
-
-    @property
-    def index(self) -> int:
-        """Column of the axis, of the first of two."""
-        axis = self.place[0] if isinstance(self.place, tuple) else self.place
-        return 0 if axis is None else axis - 1
-
-    def effect(self, values: Mapping[str, float]) -> Effect:
-        """Return the effect with these parameters."""
-        if isinstance(self.place, tuple):
-            return Effect(self.info.name, None, values, self.place)
-        return Effect(self.info.name, self.place, values)
-
-    def torque(self) -> list[Array]:
-        """Return the torque of the axis in every log [Nm]."""
-        return [log.torque_nm[:, self.index] for log in self.logs]
 
 
 def _neutral(trial: Trial) -> FreeEffect:
@@ -403,21 +349,31 @@ def _balancer(trial: Trial) -> FreeEffect | None:
     return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
 
 
-# Over less of a wave it is as good as a constant and a slope; how many more waves there may be.
+# Over less of a wave it is as good as a constant and a slope, and how many waves there may be; how far
+# a fit goes from the one that is found.
 _LEAST_TURN_RAD = 1.5
-_MORE_WAVES = 6.0
+_MOST_TURNS_RAD = 15.0
+_NEAR = 3.0
 
 
 def _uneven(trial: Trial) -> FreeEffect | None:
-    """Begin as a law, once a turn of the joint, or a quarter of a wave over as far as it turns."""
-    ratio = abs(float(trial.robot.gear_ratio[trial.index]))
-    travel = max(float(np.ptp(log.position_rad[:, trial.index])) for log in trial.logs)
-    if trial.robot.axis_is_prismatic[trial.index] or travel == 0:
+    """Begin as a law, with the wave of the residual's dry friction over the motor angle, where there is one."""
+    if (
+        trial.robot.axis_is_prismatic[trial.index]
+        or _axis_share(trial.at, trial.index) <= _SMALL_SHARE
+    ):
         return None
-    order = max(ratio, _LEAST_TURN_RAD / travel)
-    begin = _law(smoothing_rad_s=_SMOOTHING)(trial)
-    begin = begin.at({"order": order})
-    return replace(begin, bounds={**begin.bounds, "order": (0.3 * order, _MORE_WAVES * order)})
+    logs = [axes[trial.index] for axes in trial.at.turning]
+    responses = [trial.at.response(trial.info.name, trial.index, log.frequency_hz) for log in logs]
+    travel = max(float(np.ptp(log.angle_rad)) for log in logs)
+    if travel == 0:
+        return None
+    ends = (_LEAST_TURN_RAD / travel, _MOST_TURNS_RAD / travel)
+    order = wave_of_friction(logs, responses, *ends)
+    if order is None:
+        return None
+    begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at({"order": order})
+    return replace(begin, bounds={**begin.bounds, "order": (order / _NEAR, order * _NEAR)})
 
 
 # From the slowest swing that ten seconds show to those that gears have themselves; a swing is found
