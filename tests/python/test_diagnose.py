@@ -111,6 +111,14 @@ def test_a_withheld_effect_is_named(effect):
         )
 
 
+def test_friction_that_yields_over_next_to_nothing_is_dry_friction():
+    """Another rounding of the corner is no other cause: the way of the law that yields ends at its bound."""
+    found = run([Effect("presliding_friction", 1, {"coulomb_nm": 0.5, "presliding_rad": 2e-3})])
+    assert found.verdict == "explained", found.headline
+    assert [c.label for c in found.causes] == ["coulomb_friction@1"]
+    assert found.causes[0].parameters["coulomb_nm"].value == pytest.approx(0.5, rel=0.05)
+
+
 def test_several_orders_of_a_ripple_are_one_cause():
     waves = {"order_1": 48.0, "cosine_1_rad": 2e-4, "order_2": 12.0, "sine_2_rad": 3e-4}
     found = run([Effect("resolver_ripple", 1, waves)])

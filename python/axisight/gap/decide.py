@@ -16,6 +16,7 @@ from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
 from axisight.gap.terms import idle_numbers
+from axisight.gap.yielding import held_to_dry_friction
 
 Array = NDArray[np.float64]
 
@@ -279,6 +280,7 @@ def stand(
         lambda left, which: -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - cost[which],
     )
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
+    logp = held_to_dry_friction(mine, logp, layout.stretch)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
     samples = float(layout.samples()[axis])

@@ -32,7 +32,6 @@ const fn info(scope: Scope, acts: Acts) -> EffectInfo {
         stands_for: None,
         linear: Linear::No,
         inverse_dynamics: false,
-        stiff: false,
         absorbed_by: &[],
         shown_by: &[],
         parameters: &[],
