@@ -352,9 +352,10 @@ fn a_coarse_encoder_reads_steps() {
 /// A gear that runs ahead by two waves carries the torque of its spring at what they add, and conserves power.
 #[test]
 fn a_transmission_error_has_two_waves() {
-    let (order, waves) = (3.0, [2e-4, -1e-4, 3e-5, 5e-5]);
+    let (order, ratio_of_second, waves) = (3.0, 1.5, [2e-4, -1e-4, 3e-5, 5e-5]);
     let robot = conservative();
-    let values = [order, waves[0], waves[1], 1.0, waves[2], waves[3]];
+    let [a, b, c, d] = waves;
+    let values = [order, a, b, 1.0, c, d, ratio_of_second];
     let waving = plant::<f64>(&robot, &[effect("transmission_error", Some(0), &values)]);
     let (joint, ratio, inertia, stiffness) = drives(&robot)[0];
     let (m, n) = (waving.n_motors(), waving.n_angles());
@@ -363,10 +364,10 @@ fn a_transmission_error_has_two_waves() {
         let mut x = vec![0.0; waving.n_states()];
         x[0] = phi;
         let at = |k: f64| (k * order * phi).sin_cos();
-        let ((s1, c1), (s2, c2)) = (at(1.0), at(2.0));
+        let ((s1, c1), (s2, c2)) = (at(1.0), at(ratio_of_second));
         let ahead = waves[0] * c1 + waves[1] * s1 + waves[2] * c2 + waves[3] * s2;
         let first = order * (waves[1] * c1 - waves[0] * s1);
-        let slope = first + 2.0 * order * (waves[3] * c2 - waves[2] * s2);
+        let slope = first + ratio_of_second * order * (waves[3] * c2 - waves[2] * s2);
         let torque = stiffness * (ratio * phi + ahead);
         let dx = derivative(&waving, &x, &[0.0; 3]);
         let on_motor = -dx[n] * inertia;

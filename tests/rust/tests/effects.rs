@@ -38,7 +38,7 @@ fn at_work(info: &EffectInfo) -> Vec<f64> {
         // Orders of harmonics that are switched off; different ones.
         Role::Shape if p.neutral <= p.lower && p.name.starts_with("order") => 2.0 + i as f64 / 3.0,
         // Between its bounds.
-        Role::Shape if p.name == "damped" => p.typical,
+        Role::Shape if ["damped", "relaxation_s"].contains(&p.name) => p.typical,
         Role::Shape => p.neutral,
     };
     info.parameters.iter().enumerate().map(value).collect()
@@ -133,8 +133,8 @@ fn derivatives_agree_with_finite_differences() {
             // What is damped in a gap shows where it is crossed, which is no place to change its width.
             let axis = if p.name == "damped" { 0 } else { axis };
             let place = (info.scope != Scope::Arm).then_some(axis);
-            // Orders multiply a motor angle of 70 rad.
-            let share = if p.name.starts_with("order") {
+            // Orders, and what multiplies them, multiply a motor angle of 70 rad.
+            let share = if p.name.starts_with("order") || p.name == "second_ratio" {
                 1e-4
             } else {
                 1e-2
@@ -378,7 +378,7 @@ fn as_meant(info: &EffectInfo) -> Box<dyn Kernel<f64>> {
     let value = |p: &axisight_core::effects::ParameterInfo| match p.role {
         Role::Amplitude => p.typical,
         // Between its bounds.
-        Role::Shape if p.name == "damped" => p.typical,
+        Role::Shape if ["damped", "relaxation_s"].contains(&p.name) => p.typical,
         Role::Shape => p.neutral,
     };
     let values: Vec<f64> = info.parameters.iter().map(value).collect();

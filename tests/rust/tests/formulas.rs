@@ -224,7 +224,7 @@ fn a_deadband_takes_its_width_off_every_torque() {
 
 #[test]
 fn friction_of_a_place_is_a_wave_over_the_angle() {
-    let p = [0.5, -0.2, 0.01, 0.1];
+    let p = [0.5, -0.2, 0.01, 0.1, 0.6];
     let kernel = build::<f64>("position_dependent_friction", &p).expect("in the table");
     for (angle, speed) in [(0.0, 3.0), (40.0, 0.05), (-130.0, -0.02), (300.0, -20.0)] {
         let motor = Motor {
@@ -234,7 +234,7 @@ fn friction_of_a_place_is_a_wave_over_the_angle() {
             load: 0.0,
             internal: &[],
         };
-        let level = 0.5 * f64::cos(0.01 * angle) - 0.2 * f64::sin(0.01 * angle);
+        let level = 0.6 + 0.5 * f64::cos(0.01 * angle) - 0.2 * f64::sin(0.01 * angle);
         let want = -level * f64::tanh(speed / 0.1);
         assert!((kernel.motor_torque(&motor) - want).abs() < 1e-14);
     }
@@ -434,8 +434,8 @@ fn the_axis_fit_and_the_simulator_are_one_model() {
 
 #[test]
 fn warming_friction_follows_its_own_clock() {
-    let (slope, time) = (-0.01, 4.0);
-    let kernel = build::<f64>("friction_warmup", &[slope, time]).expect("in the table");
+    let (slope, time, cold) = (-0.01, 4.0, 0.02);
+    let kernel = build::<f64>("friction_warmup", &[slope, time, cold]).expect("in the table");
     assert_eq!(kernel.n_internal(), 1);
     for done in [0.0, 0.3, 1.0] {
         let internal = [done];
@@ -450,6 +450,6 @@ fn warming_friction_follows_its_own_clock() {
         kernel.motor_rates(&motor, &mut rates);
         // The state is 1 - e^(-t/T), whose rate is e^(-t/T) / T.
         assert!((rates[0] - (1.0 - done) / time).abs() < 1e-15);
-        assert!((kernel.motor_torque(&motor) + slope * done * 20.0).abs() < 1e-15);
+        assert!((kernel.motor_torque(&motor) + (cold + slope * done) * 20.0).abs() < 1e-15);
     }
 }

@@ -429,7 +429,10 @@ fn misuse_is_refused_by_name() {
         ("coulomb_friction", vec![0.5, 0.5]),
         ("backlash", vec![1e-4, 0.0]),
         ("quadratic_drag", vec![1e-3]),
-        ("transmission_error", vec![2.0, 1e-4, 0.0, 1.0, 0.0, 0.0]),
+        (
+            "transmission_error",
+            vec![2.0, 1e-4, 0.0, 1.0, 0.0, 0.0, 2.0],
+        ),
     ] {
         let build = |p: &[f64]| LinearPlant::new(&robot, &[effect(name, Some(0), p)], &[0.0; 3]);
         match build(&parameters).map(|_| ()) {
