@@ -280,7 +280,8 @@ def stand(
         lambda left, which: -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - cost[which],
     )
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
-    logp = held_to_dry_friction(mine, logp, layout.stretch)
+    tried = [t.candidate.effect for t in mine]
+    logp = held_to_dry_friction(tried, [t.evidence for t in mine], logp, layout.stretch)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
     samples = float(layout.samples()[axis])

@@ -7,17 +7,14 @@ takes up the difference, and predicts better by it. Where the way is real its si
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.effects.stated import BRISTLES, DRY_FRICTION
 from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
-
-if TYPE_CHECKING:
-    from axisight.gap.decide import Trial
 
 Array = NDArray[np.float64]
 
@@ -28,18 +25,23 @@ _UNKNOWN = 0.5
 _USUAL = float(np.log(10.0))
 
 
-def held_to_dry_friction(trials: Sequence[Trial], logp: Array, stretch: NDArray[np.int64]) -> Array:
-    """Return log-probabilities (n_trials and others,) with laws of an unknown way less likely than without one.
+def held_to_dry_friction(
+    effects: Sequence[Effect],
+    fits: Sequence[Evidence],
+    logp: Array,
+    stretch: NDArray[np.int64],
+) -> Array:
+    """Return log-probabilities (n_fits and others,) with laws of an unknown way less likely than without one.
 
-    ``stretch`` (n_blocks,): the stretch of time of each block.
+    ``effects``: of candidates, and their ``fits``; ``stretch`` (n_blocks,): the stretch of time of each block.
     """
     out = logp.copy()
-    places = {(t.candidate.effect.name, t.candidate.effect.axis): i for i, t in enumerate(trials)}
+    places = {(effect.name, effect.axis): i for i, effect in enumerate(effects)}
     for (name, axis), i in places.items():
         plain = places.get((DRY_FRICTION[0], axis))
         if name != BRISTLES[0] or plain is None:
             continue
-        if way_error(trials[i].evidence, stretch) > _UNKNOWN:
+        if way_error(fits[i], stretch) > _UNKNOWN:
             out[i] = min(out[i], out[plain] - _USUAL)
     return out
 
