@@ -68,3 +68,9 @@ class Trial:
     def torque(self) -> list[Array]:
         """Return the torque of the axis in every log [Nm]."""
         return [log.torque_nm[:, self.index] for log in self.logs]
+
+    def turned(self) -> tuple[list[Turning], list[Complex]]:
+        """Return how the motor of the axis turned in every log, and how the effect shows in its residual."""
+        logs = [axes[self.index] for axes in self.at.turning]
+        shown = [self.at.response(self.info.name, self.index, log.frequency_hz) for log in logs]
+        return logs, shown

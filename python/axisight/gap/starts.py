@@ -104,9 +104,7 @@ def _waves(trial: Trial) -> FreeEffect | None:
 
 def _orders(trial: Trial, count: int) -> list[int]:
     """Return the strongest orders of the residual over the motor angle, as the effect shows in it."""
-    logs = [axes[trial.index] for axes in trial.at.turning]
-    found = trial.at.response
-    responses = [found(trial.info.name, trial.index, log.frequency_hz) for log in logs]
+    logs, responses = trial.turned()
     # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
     least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
     return strongest_orders(logs, responses, count=count, least_turns=least)
@@ -363,8 +361,7 @@ def _uneven(trial: Trial) -> FreeEffect | None:
         or _axis_share(trial.at, trial.index) <= _SMALL_SHARE
     ):
         return None
-    logs = [axes[trial.index] for axes in trial.at.turning]
-    responses = [trial.at.response(trial.info.name, trial.index, log.frequency_hz) for log in logs]
+    logs, responses = trial.turned()
     travel = max(float(np.ptp(log.angle_rad)) for log in logs)
     if travel == 0:
         return None
