@@ -45,8 +45,8 @@ def off(engine: str, machine: Machine, ours: list[Effect], reference: np.ndarray
         ("mujoco", joint_laws.Balancer(900.0, -300.0), Effect("gravity_compensation", 2, UPRIGHT)),
         (
             "mujoco",
-            joint_laws.Cable(900.0),
-            Effect("cable_stiffness", 2, {"stiffness_nm_rad": 900.0}),
+            joint_laws.Cable(900.0, 0.2),
+            Effect("cable_stiffness", 2, {"stiffness_nm_rad": 900.0, "at_zero_nm": 180.0}),
         ),
         (
             "pinocchio",

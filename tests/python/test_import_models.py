@@ -101,11 +101,11 @@ def test_an_mjcf_says_drives(tmp_path: Path):
     assert (drive.gear_ratio, drive.motor_inertia) == pytest.approx((1 / 50, 0.2 / 50**2))
     assert drive.viscous_friction == pytest.approx(0.7 / 50**2)
     assert [e.label for e in robot.effects] == ["cable_stiffness@1", "coulomb_friction@1"]
-    assert robot.effects[0].values() == [3.0]
+    assert robot.effects[0].values() == [3.0, 0.0]
     elsewhere = changed(MJCF, 'stiffness="3"', 'stiffness="3" springref="0.2"')
     robot = import_robot(written(tmp_path, elsewhere, "elsewhere.xml"))
-    assert [e.label for e in robot.effects] == ["coulomb_friction@1"]
-    assert "spring of 3 left out: it pulls to another place than zero" in robot.toml
+    assert [e.label for e in robot.effects] == ["cable_stiffness@1", "coulomb_friction@1"]
+    assert robot.effects[0].values() == pytest.approx([3.0, 0.6])
 
 
 def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):

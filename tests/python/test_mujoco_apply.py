@@ -44,7 +44,10 @@ LAWS = {
         {"cosine_nm": 4.0, "sine_nm": 2.0},
         lambda a, w, u, g: R * (4 * np.cos(R * a) + 2 * np.sin(R * a)),
     ),
-    "cable_stiffness": ({"stiffness_nm_rad": 6.0}, lambda a, w, u, g: -R * 6 * R * a),
+    "cable_stiffness": (
+        {"stiffness_nm_rad": 6.0, "at_zero_nm": 1.5},
+        lambda a, w, u, g: R * (1.5 - 6 * R * a),
+    ),
     "power_supply_sag": (
         {"sag_1_w": 0.1, "curvature": 1.0},
         lambda a, w, u, g: -u * (x := 0.1 * np.maximum(u * w, 0)) / (1 + x),
@@ -71,7 +74,7 @@ def test_torques_are_those_of_the_page_of_effects(name: str):
         speeds, command = 0.1 * random.normal(size=(5, 3)), 0.2 * random.normal(size=3)
         of_command = torques.of_command(command)
         found = torques(angle, speeds, load, command) + of_command
-        spring = 6 * angle[1] if name == "cable_stiffness" else 0.0
+        spring = 6 * angle[1] - 1.5 if name == "cable_stiffness" else 0.0
         motor = (angle[1] / R, speeds[:, 1] / R, command[1], (load[1] + spring) * R)
         np.testing.assert_allclose(found[:, 1] * R, law(*motor), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(found[:, [0, 2]], 0.0, atol=1e-11)

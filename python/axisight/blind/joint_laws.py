@@ -22,13 +22,14 @@ class Balancer(Law):
 
 @dataclass
 class Cable(Law):
-    """Cables that pull a joint back to its zero."""
+    """Cables that pull a joint back to where they rest."""
 
     stiffness_nm_rad: float
+    rest_rad: float = 0.0
 
     def torque(self, at: Axis) -> tuple[float, float]:
         """Return it on the joint."""
-        return 0.0, -self.stiffness_nm_rad * at.joint
+        return 0.0, -self.stiffness_nm_rad * (at.joint - self.rest_rad)
 
 
 @dataclass

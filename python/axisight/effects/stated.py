@@ -116,8 +116,8 @@ LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
 Parameters: the shift in the frame of the link; its own; angles about x and y.
 """
 
-JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad")
-"""What a spring that pulls a joint to zero is, and its parameter."""
+JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad", "at_zero_nm")
+"""What a spring of a joint is: its stiffness, and its torque where the joint is at zero."""
 
 LAG = ("actuator_bandwidth", "time_constant_s")
 """What a drive that follows its command with a first-order lag is, and its parameter."""

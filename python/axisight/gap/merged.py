@@ -21,6 +21,7 @@ from axisight.gap.decide import (
     Ranked,
     Standing,
     Trial,
+    clearly_worse,
     likelier,
     numbers,
     stand,
@@ -96,11 +97,18 @@ def one_for_several(
             more = _DIFFER.get(family, 0.0) * (none - both)
             # A lone load needs none of that: no other law has to be imitated.
             mends = not fitter.adds_up and len(several) > 1 and alone - both < more
+            mends = mends or (_made_of(ranked, several) and not clearly_worse(alone, both))
             if mends or likelier(alone, ranked.trial.cost, than=(both, count)):
                 return standing.best, standing
             # What leaves more than that is none in their place.
             standing = standing.without(ranked.trial.label)
     return None
+
+
+def _made_of(ranked: Ranked, several: Sequence[FreeEffect]) -> bool:
+    """Whether a candidate is made of several effects: one cause, where they are as many as it has parts."""
+    parts = effect_info(ranked.trial.candidate.effect.name).parts
+    return bool(parts) and sorted(parts) == sorted(f.effect.name for f in several)
 
 
 def _needed_numbers(several: Sequence[FreeEffect], model: Evidence) -> float:

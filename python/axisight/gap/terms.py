@@ -22,7 +22,7 @@ Term = tuple[tuple[str, ...], float]
 
 # Fitted values of a term of a series: cosine, sine and order.
 _OF_A_WAVE = 3.0
-_COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm", "about_x_rad", "about_y_rad")
+_COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm", "at_zero_nm", "about_x_rad", "about_y_rad")
 
 
 def idle_numbers(evidence: Evidence, pays: Callable[[float, float, float], bool]) -> float:

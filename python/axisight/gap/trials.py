@@ -304,18 +304,21 @@ class Trials:
 
         Where one found before explains enough of what is left on an axis, what is tried there is bound
         to feel it and has to wait for the next round: it goes to ``waiting``, unless it promises as
-        much as any.
+        much as any of that one's axis.
         """
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
-        most = max((start.gain for start in chosen), default=0.0)
+        most = _best(chosen, self.layout.n_axes)
         found: list[Trial] = []
         done = 0
         for axis, here in self._turns(chosen):
-            explained = (falls(found, self.current, self.layout) / left).max(axis=0, initial=0.0)
             now = here
-            if axis is not None and explained[axis - 1] > _FELT:
-                now = [s for s in here if s.gain > _AS_MUCH * most]
-                self.waiting += [s for s in here if s.gain <= _AS_MUCH * most]
+            if axis is not None and found:
+                explained = falls(found, self.current, self.layout)[:, axis - 1] / left[axis - 1]
+                felt = found[int(np.argmax(explained))].candidate.effect.axis
+                if explained.max() > _FELT:
+                    bar = _AS_MUCH * (most.max() if felt is None else most[felt - 1])
+                    now = [s for s in here if s.gain > bar]
+                    self.waiting += [s for s in here if s.gain <= bar]
             self.progress(label, done, len(chosen))
             found += self._fitted(pool, now)
             done += len(here)

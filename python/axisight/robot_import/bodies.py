@@ -76,10 +76,11 @@ class Drive:
     """What a file says of the drive of a joint, on the joint side unless said otherwise.
 
     ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
-    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to zero; ``servo``
-    of an actuator that is told positions, its gains of position [Nm/rad] and speed [Nm s/rad], motor side;
-    ``gain`` is a motor's torque per command, ``limit_nm`` the largest, ``delay_s`` and ``lag_s`` by which torque
-    is late; ``effort`` [Nm] the limit of the joint, 0 where none is said.
+    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to
+    ``spring_rest_rad``; ``servo`` of an actuator that is told positions, its gains of position [Nm/rad] and
+    speed [Nm s/rad], motor side; ``gain`` is a motor's torque per command, ``limit_nm`` the largest,
+    ``delay_s`` and ``lag_s`` by which torque is late; ``effort`` [Nm] the limit of the joint, 0 where none is
+    said.
     """
 
     gear_ratio: float = 1.0
@@ -87,6 +88,7 @@ class Drive:
     damping: float = 0.0
     friction: float = 0.0
     spring: float = 0.0
+    spring_rest_rad: float = 0.0
     servo: tuple[float, float] | None = None
     gain: float = 1.0
     limit_nm: float = math.inf

@@ -50,12 +50,14 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         table, ratio = _joint(joint, mass, drive)
         tables.append(table)
         dry = _dry_friction(joint, drive, ratio)
-        if joint.body.drive.spring > 0:
+        spring = joint.body.drive.spring
+        if spring > 0:
             effects.append(
                 {
                     "name": JOINT_SPRING[0],
                     "axis": number,
-                    JOINT_SPRING[1]: joint.body.drive.spring,
+                    JOINT_SPRING[1]: spring,
+                    JOINT_SPRING[2]: spring * joint.body.drive.spring_rest_rad,
                 }
             )
         effects += _torque_path(joint.body.drive, number)

@@ -147,7 +147,8 @@ class _Compiled:
                 float(model.dof_armature[dof]),
                 float(model.dof_damping[dof]),
                 float(model.dof_frictionloss[dof]),
-                float(model.jnt_stiffness[j]) if self._springs_to_zero(j) else 0.0,
+                float(model.jnt_stiffness[j]),
+                float(model.qpos_spring[model.jnt_qposadr[j]]),
                 self.servos.get(j),
                 *self._torque_path(j),
             )
@@ -170,9 +171,6 @@ class _Compiled:
             bare=bare,
             of=body,
         )
-
-    def _springs_to_zero(self, j: int) -> bool:
-        return float(self.model.qpos_spring[self.model.jnt_qposadr[j]]) == 0.0
 
     def _mass(self, i: int) -> Mass | None:
         model = self.model
@@ -247,12 +245,6 @@ class _Compiled:
                 out.append(f"actuator {self._name('actuator', i)!r}: limits of its force left out")
             if is_servo and _delays(model)[i] > 0:
                 out.append(f"actuator {self._name('actuator', i)!r}: delay left out")
-        for j in range(model.njnt):
-            if model.jnt_stiffness[j] != 0 and not self._springs_to_zero(j):
-                out.append(
-                    f"joint {self._name('joint', j)!r}: spring of {model.jnt_stiffness[j]:g} left out: it pulls "
-                    f"to another place than zero"
-                )
         counts = {
             "equality constraints": model.neq,
             "tendons": model.ntendon,

@@ -156,7 +156,7 @@ def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move:
         edits.set(body, {"pos": place.tolist()}, said(_of(move, LINK_GEOMETRY)))
     if move.zero_rad:
         # A larger angle than is read is a smaller one that the model counts from.
-        reference = own.number("ref", 0.0) - move.zero_rad * _per_radian(root)
+        reference = own.number("ref", 0.0) - move.zero_rad * angle_unit(root)
         edits.set(own, {"ref": reference}, said(_of(move, JOINT_ZERO[0])))
     return ""
 
@@ -185,7 +185,7 @@ def _of(move: _Move, effect: str) -> list[Cause]:
     return [cause for cause in move.causes if cause.effect == effect]
 
 
-def _per_radian(root: Element) -> float:
+def angle_unit(root: Element) -> float:
     """Return how much of the unit of angles, which an MJCF chooses, is one radian."""
     said_so = [e.attributes["angle"] for e in _all(root, "compiler") if "angle" in e.attributes]
     return 1.0 if said_so[-1:] == ["radian"] else math.degrees(1.0)

@@ -15,6 +15,7 @@ from axisight.effects.stated import (
 )
 from axisight.robot import Robot
 from axisight.robot_import.xml_tree import Element
+from axisight.write_back.frames import angle_unit
 from axisight.write_back.placed import Placed, said
 from axisight.write_back.xml_edits import Edits
 
@@ -35,26 +36,32 @@ JOINT_NUMBERS = {
 
 
 def write_joint(
-    edits: Edits, root: str, joint: Element, robot: Robot, axis: int, causes: Sequence[Cause]
+    edits: Edits,
+    root: Element,
+    joint: Element,
+    robot: Robot,
+    axis: int,
+    causes: Sequence[Cause],
 ) -> Placed:
     """Write the causes of one axis (from 0) that are numbers of its joint, with one comment."""
+    per_radian = angle_unit(root)
     placed = Placed()
     by_number: dict[str, list[Cause]] = {}
     for cause in causes:
-        by_number.setdefault(JOINT_NUMBERS[root][cause.effect], []).append(cause)
+        by_number.setdefault(JOINT_NUMBERS[root.tag][cause.effect], []).append(cause)
     numbers: dict[str, float] = {}
     for name, mine in by_number.items():
         value = _number(robot, axis, mine)
         if value < 0:
             placed.refuse(mine, f"{name} would be {value:.4g}, and models have none below zero")
-        elif name == "stiffness" and _pulls_elsewhere(joint):
-            placed.refuse(mine, "the joint's spring pulls to another place than zero")
         else:
             numbers[name] = value
+            if name == "stiffness":
+                numbers |= _rest(joint, mine[-1], value, per_radian)
             placed.take(mine)
     there = [cause for cause in causes if cause.label in placed.there]
     if there:
-        _edit(edits, root, joint, numbers, said(there))
+        _edit(edits, root.tag, joint, numbers, said(there))
     return placed
 
 
@@ -75,8 +82,13 @@ def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
     return value / ratio**2
 
 
-def _pulls_elsewhere(joint: Element) -> bool:
-    return joint.numbers("springref", 1, (0.0,)) != (0.0,)
+def _rest(joint: Element, spring: Cause, stiffness: float, per_radian: float) -> dict[str, float]:
+    """Return where a spring rests, in the unit of the file; nothing where that is zero and it says nothing."""
+    at_zero = spring.parameters.get(JOINT_SPRING[2])
+    if at_zero is None or stiffness == 0:
+        return {"springref": 0.0} if "springref" in joint.attributes else {}
+    slides = joint.attributes.get("type") == "slide"
+    return {"springref": at_zero.value / stiffness * (1.0 if slides else per_radian)}
 
 
 def _edit(

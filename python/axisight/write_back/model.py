@@ -134,7 +134,7 @@ def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause])
         mine = [cause for cause in causes if not cause.axes and cause.axis == axis + 1]
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
-            out.append(write_joint(edits, root.tag, joints[name], robot, axis, numbers))
+            out.append(write_joint(edits, root, joints[name], robot, axis, numbers))
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         if drives and root.tag == "mujoco":
             out.append(write_drive(edits, root, name, drives))

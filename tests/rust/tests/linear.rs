@@ -273,7 +273,7 @@ fn nonlinear_plant_agrees_as_the_amplitude_falls() {
             effect("joint_stiffness", Some(0), &[-0.2]),
             effect("nonlinear_stiffness", Some(0), &[1e10]),
             effect("gravity_compensation", Some(0), &[50.0, 20.0]),
-            effect("cable_stiffness", Some(0), &[300.0]),
+            effect("cable_stiffness", Some(0), &[300.0, 40.0]),
             effect("input_delay", Some(0), &[7e-4]),
             effect("actuator_bandwidth", Some(0), &[4e-4]),
             effect("torque_constant", Some(0), &[0.1]),

@@ -5,9 +5,9 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "cable_stiffness",
-    summary: "cables and hoses pull the joint back in proportion to its angle",
-    equation: "tau_j = -k q on the joint",
-    source: "Hooke's law on the joint angle",
+    summary: "cables and hoses pull the joint back to where they rest, in proportion to the angle",
+    equation: "tau_j = p - k q on the joint, at rest where q = p / k",
+    source: "Hooke's law on the angle from rest",
     scope: Scope::Axis,
     acts: Acts::Joint,
     family: Family::Load,
@@ -20,25 +20,42 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: true,
     absorbed_by: &[],
     shown_by: &[Experiment::Poses],
-    parameters: &[ParameterInfo {
-        name: "stiffness_nm_rad",
-        unit: "Nm/rad (joint side)",
-        role: Role::Amplitude,
-        neutral: 0.0,
-        lower: -1e7,
-        upper: 1e7,
-        typical: 500.0,
-    }],
+    parameters: &[
+        ParameterInfo {
+            name: "stiffness_nm_rad",
+            unit: "Nm/rad (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e7,
+            upper: 1e7,
+            typical: 500.0,
+        },
+        ParameterInfo {
+            name: "at_zero_nm",
+            unit: "Nm (joint side)",
+            role: Role::Amplitude,
+            neutral: 0.0,
+            lower: -1e7,
+            upper: 1e7,
+            typical: 100.0,
+        },
+    ],
 };
 
-struct Cable<S>(S);
+struct Cable<S> {
+    stiffness: S,
+    at_zero: S,
+}
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Cable(p[0]))
+    Box::new(Cable {
+        stiffness: p[0],
+        at_zero: p[1],
+    })
 }
 
 impl<S: Scalar> Kernel<S> for Cable<S> {
     fn joint_torque(&self, joint: &Joint<'_, S>) -> S {
-        -(self.0 * joint.angle)
+        self.at_zero - self.stiffness * joint.angle
     }
 }
