@@ -118,7 +118,7 @@ LONGER = several("link_geometry", 1, x_m=0.03, y_m=-0.02, z_m=0.01)
 ZEROS = [several("joint_zero_offset", axis, offset_rad=0.1 * axis) for axis in (1, 2)]
 TILTED = several("base_tilt", None, about_x_rad=0.12, about_y_rad=-0.2)
 GAIN = several("torque_constant", 1, relative_error=0.07)
-SPRING = several("cable_stiffness", 2, stiffness_nm_rad=4.0)
+SPRING = several("cable_stiffness", 2, stiffness_nm_rad=4.0, at_zero_nm=1.2)
 ROTORS = (
     several("rotor_inertia", 2, inertia_kg_m2=0.3),
     several("motor_inertia", 1, relative_change=0.5),
@@ -184,6 +184,20 @@ def test_an_mjcf_has_gains_springs_and_rotors(tmp_path: Path):
         tmp_path / "more.xml",
     )
     assert 'gainprm="1.02"/>' in other.path.read_text()
+
+
+@pytest.mark.parametrize("unit", ["radian", "degree"])
+@pytest.mark.parametrize("at_zero_nm", [0.0, 1.2])
+def test_a_spring_rests_where_it_was_found_to(tmp_path: Path, unit: str, at_zero_nm: float):
+    """It takes the place of the one in the file, whose rest is that of the file until then."""
+    text = changed(MJCF, 'angle="radian"', f'angle="{unit}"')
+    text = changed(text, "stiffness=", 'springref="0.4" stiffness=')
+    source = written(tmp_path, text, "arm.xml")
+    before, rest = load_robot(source), 0.4 if unit == "radian" else np.deg2rad(0.4)
+    assert before.effects[0].values() == pytest.approx([3.0, 3.0 * rest])
+    cause = several("cable_stiffness", 1, stiffness_nm_rad=4.0, at_zero_nm=at_zero_nm)
+    made = write_model(source, before, [cause], tmp_path / "new.xml")
+    assert load_robot(made.path).effects[0].values() == pytest.approx([4.0, at_zero_nm])
 
 
 DRIVE = [
@@ -351,16 +365,6 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
         "link_inertia@2": "'lower' has no mass of its own",
         "torque_constant@2": "expected one motor of the joint that has a gain, got none",
     }
-    other = written(
-        tmp_path, changed(MJCF, "stiffness=", 'springref="0.4" stiffness='), "other.xml"
-    )
-    made = write_model(
-        other,
-        load_robot(other),
-        [several("cable_stiffness", 1, stiffness_nm_rad=4.0)],
-        tmp_path / "o.xml",
-    )
-    assert made.why == {"cable_stiffness@1": "the joint's spring pulls to another place than zero"}
     made = write_model(source, load_robot("scara_like"), [LOAD], tmp_path / "s.xml")
     assert made.why == {"payload": "the robot is not the chain that the file says"}
     urdf = written(tmp_path, URDF)

@@ -419,3 +419,10 @@ def of_one_formula(standing: Standing) -> list[Ranked]:
         if {r.trial.candidate.effect.name, first.trial.candidate.effect.name} <= ONE_FORMULA
         and r.score > least
     ]
+
+
+def without_composite(standing: Standing, part: Ranked) -> Standing:
+    """Put the first part in the place of its composite, with the probability of both."""
+    merged = replace(part, probability=part.probability + standing.best.probability)
+    rest = tuple(r for r in standing.ranked[1:] if r is not part)
+    return replace(standing, ranked=(merged, *rest))

@@ -17,7 +17,9 @@ from axisight.gap.decide import (
     Ranked,
     Standing,
     Trial,
+    clearly_worse,
     falls,
+    without_composite,
 )
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
@@ -312,7 +314,7 @@ def _named_simply(
     if fitter.adds_up:
         whole = without_rival_composites(led)
         return in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
-    simpler = _simpler(led)
+    simpler = _simpler(led, fitter)
     return ((simpler.best, simpler),)
 
 
@@ -529,14 +531,28 @@ def _first_part(standing: Standing) -> Ranked | None:
     return next((r for r in standing.ranked if r.trial.label == label), None)
 
 
-def _simpler(standing: Standing) -> Standing:
-    """Return a standing led by the first part of a composite winner, where that does nearly as well alone.
+def _simpler(standing: Standing, fitter: ModelFitter) -> Standing:
+    """Return a standing led by the first part of a composite winner, where parts do nearly as well or better.
 
-    The composite stays a rival. Where it takes both parts, one cause is likelier than two.
+    Where the first does nearly as well alone, the composite stays a rival. Where it takes both parts, one cause is
+    likelier than two: it has to leave clearly more than they do.
     """
     part = _first_part(standing)
-    near = part is not None and any(r is part for r in standing.inseparable())
-    return standing.led_by(part) if part is not None and near else standing
+    if part is None:
+        return standing
+    if any(r is part for r in standing.inseparable()):
+        return standing.led_by(part)
+    winner = standing.best
+    effect = winner.trial.candidate.effect
+    second = effect_info(effect.name).parts[1]
+    other = FreeEffect(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
+    try:
+        both = fitter.fit([*part.trial.evidence.free, other], part.trial.evidence, lazy=True)
+    except InputError:
+        return standing
+    if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
+        return without_composite(standing, part)
+    return standing
 
 
 def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> bool:

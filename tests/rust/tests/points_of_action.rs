@@ -184,11 +184,11 @@ fn springs_on_odometers_are_known_springs() {
         c.stiffness += 3e5;
     }
     let by_name =
-        |name: &str, axis, p: f64| plant::<f64>(&robot, &[effect(name, Some(axis), &[p])]);
+        |name: &str, axis, p: &[f64]| plant::<f64>(&robot, &[effect(name, Some(axis), p)]);
     let cases = [
         (
             with(&robot, &JOINT, Place::Axis(1), Odometer { k: 4e4 }),
-            by_name("cable_stiffness", 1, 4e4),
+            by_name("cable_stiffness", 1, &[4e4, 0.0]),
         ),
         (
             with(
@@ -197,7 +197,7 @@ fn springs_on_odometers_are_known_springs() {
                 Place::Axis(0),
                 Odometer { k: 0.2 * stiffness },
             ),
-            by_name("joint_stiffness", 0, 0.2),
+            by_name("joint_stiffness", 0, &[0.2]),
         ),
         (
             with(&robot, &ARM, Place::Arm, Odometer { k: 3e5 }),
