@@ -365,6 +365,9 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
         "link_inertia@2": "'lower' has no mass of its own",
         "torque_constant@2": "expected one motor of the joint that has a gain, got none",
     }
+    pull = [several("cable_stiffness", 1, stiffness_nm_rad=0.0, at_zero_nm=1.0)]
+    made = write_model(source, robot, pull, tmp_path / "o.xml")
+    assert made.why == {"cable_stiffness@1": "without stiffness a spring rests nowhere"}
     made = write_model(source, load_robot("scara_like"), [LOAD], tmp_path / "s.xml")
     assert made.why == {"payload": "the robot is not the chain that the file says"}
     urdf = written(tmp_path, URDF)

@@ -44,7 +44,6 @@ def write_joint(
     causes: Sequence[Cause],
 ) -> Placed:
     """Write the causes of one axis (from 0) that are numbers of its joint, with one comment."""
-    per_radian = angle_unit(root)
     placed = Placed()
     by_number: dict[str, list[Cause]] = {}
     for cause in causes:
@@ -54,10 +53,13 @@ def write_joint(
         value = _number(robot, axis, mine)
         if value < 0:
             placed.refuse(mine, f"{name} would be {value:.4g}, and models have none below zero")
+        elif name == "stiffness" and value == 0 and _at_zero(mine[-1]):
+            placed.refuse(mine, "without stiffness a spring rests nowhere")
         else:
             numbers[name] = value
             if name == "stiffness":
-                numbers |= _rest(joint, mine[-1], value, per_radian)
+                unit = 1.0 if robot.axis_is_prismatic[axis] else angle_unit(root)
+                numbers |= _rest(joint, _at_zero(mine[-1]), value, unit)
             placed.take(mine)
     there = [cause for cause in causes if cause.label in placed.there]
     if there:
@@ -82,13 +84,17 @@ def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
     return value / ratio**2
 
 
-def _rest(joint: Element, spring: Cause, stiffness: float, per_radian: float) -> dict[str, float]:
-    """Return where a spring rests, in the unit of the file; nothing where that is zero and it says nothing."""
-    at_zero = spring.parameters.get(JOINT_SPRING[2])
-    if at_zero is None or stiffness == 0:
+def _at_zero(spring: Cause) -> float:
+    """Return the torque of a spring [Nm] where its joint is at zero."""
+    found = spring.parameters.get(JOINT_SPRING[2])
+    return 0.0 if found is None else found.value
+
+
+def _rest(joint: Element, at_zero: float, stiffness: float, unit: float) -> dict[str, float]:
+    """Return where a spring rests, one radian being ``unit``; nothing where that is zero and the file says nothing."""
+    if at_zero == 0:
         return {"springref": 0.0} if "springref" in joint.attributes else {}
-    slides = joint.attributes.get("type") == "slide"
-    return {"springref": at_zero.value / stiffness * (1.0 if slides else per_radian)}
+    return {"springref": at_zero / stiffness * unit}
 
 
 def _edit(
