@@ -23,20 +23,26 @@ def free(label: str) -> FreeEffect:
 
 
 class Round(Trials):
-    """A round on two axes with one block each, whose fits have known losses by label."""
+    """A round on axes with one block each, whose fits have known losses by label."""
 
-    def __init__(self, losses: dict[str, tuple[float, float]]) -> None:
-        one = np.ones(2, dtype=np.int64)
-        self.layout = Layout(np.array([0, 1]), one, one, one)
-        self.current, self.floor = np.array([10.0, 2.0]), np.array([1.0, 1.0])
-        self.least, self.settings = np.zeros(2), Settings()
+    def __init__(self, losses: dict[str, tuple[float, ...]]) -> None:
+        n = len(next(iter(losses.values())))
+        one = np.ones(n, dtype=np.int64)
+        self.layout = Layout(np.arange(n), one, one, one)
+        self.current, self.floor = np.array([10.0, *[2.0] * (n - 1)]), np.ones(n)
+        self.least, self.settings = np.zeros(n), Settings()
         self.losses, self.waiting, self.asked = losses, [], []
         self.progress = lambda *_: None
 
     def _fitted(self, pool, starts):
         labels = [start.option.effect.label for start in starts]
         self.asked += labels
-        return [SimpleNamespace(label=x, held_out=np.array(self.losses[x])) for x in labels]
+        return [
+            SimpleNamespace(
+                label=label, candidate=start.option, held_out=np.array(self.losses[label])
+            )
+            for label, start in zip(labels, starts, strict=True)
+        ]
 
     def fit(self, promises: dict[str, float], falls: tuple[float, float] = (0.5, 0.5)) -> list[str]:
         """Fit candidates with these promises, one of the arm by axis; return the labels of those fitted."""
@@ -68,6 +74,21 @@ def test_what_promises_as_much_as_any_does_not_wait():
     promises = {"torque_offset@1": 8.0, "torque_offset@2": 7.9, "backlash@2": 5.0}
     assert round_.fit(promises) == ["torque_offset@1", "torque_offset@2"]
     assert [s.option.effect.label for s in round_.waiting] == ["backlash@2"]
+
+
+def test_what_promises_as_much_as_what_explains_it_does_not_wait():
+    # A constant on axis 3 hangs on axis 2, too; that play promises far more on axis 1 is nothing to it.
+    losses = {
+        "backlash@1": (2.0, 2.0, 2.0),
+        "torque_offset@2": (10.0, 1.1, 1.1),
+        "torque_offset@3": (10.0, 1.0, 1.0),
+    }
+    promises = {"backlash@1": 8.0, "torque_offset@2": 0.81, "torque_offset@3": 0.8}
+    assert set(Round(losses).fit(promises)) == set(losses)
+    # What promises less waits.
+    round_ = Round(losses)
+    round_.fit({**promises, "torque_offset@3": 0.5})
+    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@3"]
 
 
 def test_what_nothing_elsewhere_explains_is_fitted():

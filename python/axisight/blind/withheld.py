@@ -121,7 +121,7 @@ def _balancer(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 def _cable(rng: Rng, scene: Scene, axis: int) -> Drawn:
     stiffness = between(rng, 0.05, 0.3) * scene.rated_nm(axis)
-    rest = between(rng, -0.3, 0.3)
+    rest = float(rng.uniform(-0.3, 0.3))
     values = {"stiffness_nm_rad": stiffness, "at_zero_nm": stiffness * rest}
     law = joint_laws.Cable(stiffness, rest)
     return Drawn("cable_stiffness", axis, values, laws=[law])
