@@ -26,7 +26,7 @@ class Round(Trials):
     """A round on axes with one block each, whose fits have known losses by label."""
 
     def __init__(self, losses: dict[str, tuple[float, ...]]) -> None:
-        n = len(next(iter(losses.values())))
+        n = len(next(iter(losses.values()), (0.0, 0.0)))
         one = np.ones(n, dtype=np.int64)
         self.layout = Layout(np.arange(n), one, one, one)
         self.current, self.floor = np.array([10.0, *[2.0] * (n - 1)]), np.ones(n)
