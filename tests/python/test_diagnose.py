@@ -69,11 +69,14 @@ def test_scatter_alone_is_none():
             1,
             {"viscous_nm_s_rad": -0.02, "time_constant_s": 2.0, "cold_nm_s_rad": 0.02},
         ),
+        # Most of a wave over the travel: a quarter of one is a constant and a slope.
         Effect(
             "position_dependent_friction",
             1,
-            {"mean_nm": 0.4, "cosine_nm": 0.2, "sine_nm": 0.3, "order": 0.05},
+            {"mean_nm": 0.4, "cosine_nm": 0.2, "sine_nm": 0.3, "order": 0.2},
         ),
+        # Behind an elastic gear friction holds the arm, and bends the gear before the arm slips.
+        Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "arm_share": 1.0}),
         Effect("gear_hysteresis", 1, {"share": 0.3, "deflection_rad": 3e-4}),
         Effect("torque_deadband", 1, {"width_nm": 0.4}),
         Effect("piecewise_stiffness", 1, {"step": 0.8, "knee_rad": 3e-4}),

@@ -72,13 +72,17 @@ def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():
 
 
 def test_uneven_friction_is_looked_for_at_its_wave():
-    """As much of the residual is promised from there as from the true order, but for a tenth; from a far one not."""
+    """As much of the residual is promised from there as from the true order, but for a tenth; from a far one not.
+
+    Where the friction is known to be the motor's.
+    """
     order = 0.9
     uneven = {"mean_nm": 0.4, "cosine_nm": 0.2, "sine_nm": -0.2, "order": order}
     option, screen, explainable = screened(Effect("position_dependent_friction", 1, uneven))
     found = (option.effect.parameters or {})["order"]
     low, high = option.limits("order")
     assert low < order < high
-    gains = [screen.starts([option.at({"order": n})])[0].gain for n in (found, order, 0.3 * order)]
+    orders = [option.at({"order": n, "arm_share": 0.0}) for n in (found, order, 0.3 * order)]
+    gains = [screen.starts([one])[0].gain for one in orders]
     assert gains[0] > 0.9 * gains[1] > 0.85 * explainable
     assert gains[2] < gains[0]

@@ -85,6 +85,15 @@ RIGID_BODY_QUANTITIES = {
 DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
 """What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
 
+STRIBECK = (
+    "stribeck_friction",
+    *("coulomb_nm", "excess_nm", "stribeck_speed_rad_s", "smoothing_rad_s"),
+)
+"""Dry friction that is larger at standstill: its moment, excess, the speed over which that falls, its corner."""
+
+BEHIND_GEAR = "arm_share"
+"""Which share of a friction the arm feels, behind an elastic gear: a parameter of friction laws without a memory."""
+
 BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
 """What dry friction is that yields before it slips, over which way, and how fast it may slip in fits.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
-from axisight.effects.stated import BRISTLES
+from axisight.effects.stated import BEHIND_GEAR, BRISTLES
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.orders import Turning, turning
 from axisight.gap.situation import Place, Response, Situation, Trial
@@ -74,9 +74,28 @@ def all_candidates(
     with ThreadPoolExecutor(threads) as pool:
         starts = {**STARTS, **TARGET_STARTS} if by_targets else STARTS
         found = pool.map(lambda t: starts[t.info.name](t), trials)
-        out = [candidate for candidate in found if candidate is not None]
+        out = [
+            _on_the_motor(c) if inverse_dynamics or _is_rigid(robot, c.effect) else c
+            for c in found
+            if c is not None
+        ]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+def _is_rigid(robot: Robot, effect: Effect) -> bool:
+    """Whether the gear of the axis that an effect acts on is."""
+    return isinstance(effect.axis, int) and bool(robot.axis_is_rigid[effect.axis - 1])
+
+
+def _on_the_motor(candidate: FreeEffect) -> FreeEffect:
+    """Return a candidate without what tells friction of the motor from friction behind an elastic gear."""
+    given = dict(candidate.effect.parameters or {})
+    if BEHIND_GEAR not in given:
+        return candidate
+    effect = replace(candidate.effect, parameters={**given, BEHIND_GEAR: 0.0})
+    free = tuple(name for name in candidate.free if name != BEHIND_GEAR)
+    return replace(candidate, effect=effect, free=free)
 
 
 def _in_torque(info: EffectInfo) -> bool:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import LOOP_LIKE, ONE_FORMULA, PLAY, SPRING_CHANGES
+from axisight.effects.stated import BEHIND_GEAR, LOOP_LIKE, ONE_FORMULA, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.apart import NEXT_TO_NOTHING, held_apart
+from axisight.gap.dry_friction import held_to_dry_friction
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
 from axisight.gap.terms import idle_numbers
-from axisight.gap.yielding import held_to_dry_friction
 
 Array = NDArray[np.float64]
 
@@ -33,9 +33,12 @@ _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
 
 
 def numbers(effect: FreeEffect) -> float:
-    """Return the number of fitted values of an effect; the order of a harmonic counts too."""
+    """Return the number of fitted values of an effect; the order of a harmonic counts too.
+
+    On which side of a gear it acts is a place, which counts no more than the axis does.
+    """
     harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in effect.free)
-    return float(len(effect.free) + harmonics)
+    return float(len(effect.free) + harmonics - (BEHIND_GEAR in effect.free))
 
 
 @dataclass(frozen=True)

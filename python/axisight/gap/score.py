@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.fitting import PRIOR_REACH
 from axisight.gap.evidence import Evidence, Linearized
 
@@ -70,19 +71,62 @@ def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
     """Return how a re-fit without the blocks ``inside`` moves the parameters, to first order."""
     matrix = evidence.matrix[~inside].sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient[~inside].sum(axis=0) + evidence.prior_gradient
+    # Parameters this part of the data says nothing about stay where they are.
+    matrix += np.diag(1e-9 * np.einsum("bii->i", evidence.matrix) + 1e-30)
+    reach = _reach_of_shapes(evidence)
     free = ~_pinned(evidence)
     step = np.zeros(len(gradient))
-    if free.any():
+    while free.any():
         a = matrix[np.ix_(free, free)]
-        # Parameters this part of the data says nothing about stay where they are.
-        ridge = 1e-9 * np.diag(np.diag(evidence.matrix.sum(axis=0)))[np.ix_(free, free)]
-        step[free] = -np.linalg.solve(a + ridge + 1e-30 * np.eye(len(a)), gradient[free])
-    return step / max(1.0, _prior_lengths(evidence, step))
+        step[free] = -np.linalg.solve(a, (gradient + matrix @ np.where(free, 0.0, step))[free])
+        beyond = free & (np.abs(step) > reach)
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, -reach, reach)[beyond]
+        free &= ~beyond
+    return step / max(1.0, _prior_lengths(evidence, step), _effect_lengths(evidence, step))
+
+
+# Of a number that shapes a law, over which its law is about linear in it: waves over an angle are half a radian
+# out of phase after that, where they come round once.
+_STRAIGHT = 0.1
+
+
+def _reach_of_shapes(evidence: Evidence) -> Array:
+    """Return how far a linear step may take each parameter (n_parameters,) that shapes a law of an effect."""
+    reach = np.full(len(evidence.parameters), np.inf)
+    for i, (place, name) in enumerate(evidence.parameters):
+        if place is not None and place < len(evidence.effects):
+            effect = evidence.effects[place]
+            if any(
+                p.name == name and p.role == "shape" for p in effect_info(effect.name).parameters
+            ):
+                reach[i] = _STRAIGHT * abs((effect.parameters or {})[name])
+    return reach
 
 
 def _prior_lengths(evidence: Evidence, step: Array) -> float:
     """Return the largest move in prior standard deviations: beyond one, a linear step is no guide."""
     return float(np.abs(step * np.sqrt(np.diag(evidence.prior_matrix))).max(initial=0.0))
+
+
+def _effect_lengths(evidence: Evidence, step: Array) -> float:
+    """Return the largest move of an effect in its own size: beyond one, a linear step is no guide.
+
+    The size of a number is that of the largest of its effect in the same unit.
+    """
+    longest = 0.0
+    for place, effect in enumerate(evidence.effects):
+        sizes: dict[str, float] = {}
+        units = {p.name: p.unit for p in effect_info(effect.name).parameters}
+        for name, value in (effect.parameters or {}).items():
+            sizes[units[name]] = max(sizes.get(units[name], 0.0), abs(value))
+        for name, unit in units.items():
+            key = (place, name)
+            if key in evidence.parameters and sizes.get(unit, 0.0) > 0:
+                moved = abs(step[evidence.parameters.index(key)])
+                longest = max(longest, float(moved) / sizes[unit])
+    return longest
 
 
 # Of its value: a number this near to a bound is at it.

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects.stated import BRISTLES
+from axisight.effects.stated import BEHIND_GEAR, BRISTLES
+from axisight.gap.cutoff import rigid_below_hz
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.orders import passed, strongest_orders
 from axisight.gap.situation import Situation, Trial
@@ -35,6 +36,10 @@ def _before_the_last(trial: Trial) -> FreeEffect | None:
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
 
 
+# Share of a friction behind the gear: from the middle a fit finds either side.
+_ON_BOTH_SIDES = 0.5
+
+
 def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
     """Begin at neutral values; speeds that shape a friction law are shares of the speeds seen."""
 
@@ -42,6 +47,8 @@ def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
         top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
         found = {name: share * top for name, share in shares.items()}
         values = {p.name: p.neutral for p in trial.info.parameters} | found
+        if BEHIND_GEAR in values:
+            values[BEHIND_GEAR] = _ON_BOTH_SIDES
         bounds = {name: (0.1 * value, 10 * value) for name, value in found.items()}
         return FreeEffect(trial.effect(values), tuple(values), bounds=bounds)
 
@@ -348,10 +355,11 @@ def _balancer(trial: Trial) -> FreeEffect | None:
 
 
 # Over less of a wave it is as good as a constant and a slope, and how many waves there may be; how far
-# a fit goes from the one that is found.
+# a fit goes from the one that is found, and with how much of its wave it begins.
 _LEAST_TURN_RAD = 1.5
 _MOST_TURNS_RAD = 15.0
 _NEAR = 3.0
+_BEGUN = 0.3
 
 
 def _uneven(trial: Trial) -> FreeEffect | None:
@@ -366,11 +374,17 @@ def _uneven(trial: Trial) -> FreeEffect | None:
     if travel == 0:
         return None
     ends = (_LEAST_TURN_RAD / travel, _MOST_TURNS_RAD / travel)
-    order = wave_of_friction(logs, responses, *ends)
-    if order is None:
+    wave = wave_of_friction(logs, responses, *ends, below_hz=rigid_below_hz(trial.robot))
+    if wave is None:
         return None
-    begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at({"order": order})
-    return replace(begin, bounds={**begin.bounds, "order": (order / _NEAR, order * _NEAR)})
+    order, cosine, sine = wave
+    # An order has no slope where its wave is zero.
+    begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at(
+        {"order": order, "cosine_nm": _BEGUN * cosine, "sine_nm": _BEGUN * sine}
+    )
+    return replace(
+        begin, bounds={**begin.bounds, "order": (max(order / _NEAR, 0.5 * ends[0]), order * _NEAR)}
+    )
 
 
 # From the slowest swing that ten seconds show to those that gears have themselves; a swing is found

@@ -222,9 +222,56 @@ fn a_deadband_takes_its_width_off_every_torque() {
     }
 }
 
+/// A gear that does not bend feels one torque, wherever the friction is: motor side, that of the motor and
+/// `r` times that of the joint. Power too: what both take is what the whole takes.
+#[test]
+fn a_share_of_friction_acts_behind_the_gear() {
+    let laws: [(&str, &[f64]); 4] = [
+        ("coulomb_friction", &[0.5, 0.1]),
+        ("asymmetric_friction", &[0.5, 0.3, 0.1]),
+        ("stribeck_friction", &[0.5, 0.3, 3.0, 0.1]),
+        ("position_dependent_friction", &[0.5, -0.2, 0.01, 0.1, 0.6]),
+    ];
+    let ratio = -1.0 / 120.0;
+    for (name, values) in laws {
+        let kernel_with = |share: f64| {
+            let p = [values, &[share]].concat();
+            build::<f64>(name, &p).expect("in the table")
+        };
+        for (angle, speed) in [(0.3, 4.0), (40.0, 0.05), (-130.0, -0.02), (300.0, -20.0)] {
+            let torques = |share: f64| {
+                let kernel = kernel_with(share);
+                let motor = kernel.motor_torque(&Motor {
+                    angle,
+                    speed,
+                    command: 0.0,
+                    load: 0.0,
+                    internal: &[],
+                });
+                let joint = kernel.joint_torque(&Joint {
+                    angle: ratio * angle,
+                    speed: ratio * speed,
+                    ratio,
+                    internal: &[],
+                });
+                (motor, joint, kernel.acts_behind_gear())
+            };
+            let (whole, nothing, behind) = torques(0.0);
+            assert_eq!(nothing, 0.0, "{name}");
+            assert!(!behind && torques(0.3).2, "{name}");
+            let (motor, joint, _) = torques(0.3);
+            let off = |got: f64, want: f64| ((got - want) / whole).abs();
+            assert!(off(motor, 0.7 * whole) < 1e-15, "{name}: {motor}");
+            // Rounding of the turn to the joint and back, of speeds in a corner of 0.1 rad/s.
+            assert!(off(joint * ratio, 0.3 * whole) < 1e-14, "{name}: {joint}");
+            assert!(joint * ratio * speed < 0.0, "{name}: against its motion");
+        }
+    }
+}
+
 #[test]
 fn friction_of_a_place_is_a_wave_over_the_angle() {
-    let p = [0.5, -0.2, 0.01, 0.1, 0.6];
+    let p = [0.5, -0.2, 0.01, 0.1, 0.6, 0.0];
     let kernel = build::<f64>("position_dependent_friction", &p).expect("in the table");
     for (angle, speed) in [(0.0, 3.0), (40.0, 0.05), (-130.0, -0.02), (300.0, -20.0)] {
         let motor = Motor {
@@ -253,6 +300,7 @@ fn what_swings_on_a_joint_has_the_response_of_a_mass_on_a_spring() {
             let at = Joint {
                 angle: (forced * t).sin(),
                 speed,
+                ratio: 1.0,
                 internal,
             };
             let mut rates = [0.0; 2];
@@ -345,7 +393,13 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
     let settings = [
         setting(
             "stribeck_friction",
-            &[value(6), value(8), fixed(STRIBECK_SPEED), fixed(SMOOTHING)],
+            &[
+                value(6),
+                value(8),
+                fixed(STRIBECK_SPEED),
+                fixed(SMOOTHING),
+                fixed(0.0),
+            ],
         ),
         setting("backlash", &[value(7), fixed(0.0)]),
         setting("nonlinear_stiffness", &[value(3)]),

@@ -11,7 +11,7 @@ const SAMPLES: usize = 150;
 /// Effects that go through every elementary function and every point of action.
 fn settings<S: Scalar>() -> Vec<EffectSetting<S>> {
     vec![
-        effect("stribeck_friction", Some(0), &[0.5, 0.3, 3.0, 0.1]),
+        effect("stribeck_friction", Some(0), &[0.5, 0.3, 3.0, 0.1, 0.0]),
         effect("nonlinear_stiffness", Some(1), &[2e11]),
         effect("backlash", Some(0), &[1e-4, 0.3]),
         effect(

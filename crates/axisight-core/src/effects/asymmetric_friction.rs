@@ -1,13 +1,14 @@
 //! Coulomb friction that differs between the two directions of motion.
 
 use super::formulas::smoothed_sign;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
+use super::sides::{ARM_SHARE, Friction, on_sides};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "asymmetric_friction",
     summary: "Coulomb friction of different size forward and backward",
-    equation: "tau_f = t (F_+ (1 + t) + F_- (1 - t)) / 2,  t = tanh(phi' / v_0)",
+    equation: "tau_f = t (F_+ (1 + t) + F_- (1 - t)) / 2,  t = tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), section 2",
     scope: Scope::Axis,
     acts: Acts::Motor,
@@ -41,6 +42,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.5,
         },
         SMOOTHING,
+        ARM_SHARE,
     ],
 };
 
@@ -51,16 +53,17 @@ struct Asymmetric<S> {
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Asymmetric {
+    let friction = Asymmetric {
         mean: (p[0] + p[1]) * 0.5,
         half_difference: (p[0] - p[1]) * 0.5,
         inverse_width: p[2].recip(),
-    })
+    };
+    on_sides(friction, p[3])
 }
 
-impl<S: Scalar> Kernel<S> for Asymmetric<S> {
-    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let t = smoothed_sign(motor.speed, self.inverse_width);
+impl<S: Scalar> Friction<S> for Asymmetric<S> {
+    fn torque(&self, _angle: S, speed: S) -> S {
+        let t = smoothed_sign(speed, self.inverse_width);
         -(t * self.half_difference.fma(t, self.mean))
     }
 }

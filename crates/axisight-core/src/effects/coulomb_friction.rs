@@ -1,13 +1,14 @@
 //! Coulomb friction.
 
 use super::formulas::smoothed_sign;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
+use super::sides::{ARM_SHARE, Friction, on_sides};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "coulomb_friction",
     summary: "constant friction against the direction of motion",
-    equation: "tau_f = F_c tanh(phi' / v_0)",
+    equation: "tau_f = F_c tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Wernholt (2004), eq. (9.7), sign smoothed over the width v_0",
     scope: Scope::Axis,
     acts: Acts::Motor,
@@ -32,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.5,
         },
         SMOOTHING,
+        ARM_SHARE,
     ],
 };
 
@@ -41,14 +43,15 @@ struct Coulomb<S> {
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Coulomb {
+    let friction = Coulomb {
         level: p[0],
         inverse_width: p[1].recip(),
-    })
+    };
+    on_sides(friction, p[2])
 }
 
-impl<S: Scalar> Kernel<S> for Coulomb<S> {
-    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        -(self.level * smoothed_sign(motor.speed, self.inverse_width))
+impl<S: Scalar> Friction<S> for Coulomb<S> {
+    fn torque(&self, _angle: S, speed: S) -> S {
+        -(self.level * smoothed_sign(speed, self.inverse_width))
     }
 }

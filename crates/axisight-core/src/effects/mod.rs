@@ -6,6 +6,7 @@
 //! other models share are in [`formulas`].
 
 mod harmonics;
+mod sides;
 
 pub use axisight_plant::effect::{
     Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, Deflected, EffectError,

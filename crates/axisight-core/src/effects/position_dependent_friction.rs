@@ -1,6 +1,7 @@
 //! Dry friction that changes with the position of the axis.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
+use super::sides::{ARM_SHARE, Friction, on_sides};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -18,7 +19,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "position_dependent_friction",
     summary: "dry friction that is larger in some places of the turn than in others",
-    equation: "tau_f = (m + c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint",
+    equation: "tau_f = (m + c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint; a share a of it behind the gear, there with q / r for phi",
     source: "Armstrong-Helouvry (1991), Control of Machines with Friction (joints of a PUMA 560 over their position); tanh form as coulomb_friction",
     scope: Scope::Axis,
     acts: Acts::Motor,
@@ -46,6 +47,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         SMOOTHING,
         wave("mean_nm"),
+        ARM_SHARE,
     ],
 };
 
@@ -58,19 +60,20 @@ struct Uneven<S> {
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Uneven {
+    let friction = Uneven {
         cosine: p[0],
         sine: p[1],
         order: p[2],
         smoothing: p[3],
         mean: p[4],
-    })
+    };
+    on_sides(friction, p[5])
 }
 
-impl<S: Scalar> Kernel<S> for Uneven<S> {
-    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let (sine, cosine) = (self.order * motor.angle).sin_cos();
+impl<S: Scalar> Friction<S> for Uneven<S> {
+    fn torque(&self, angle: S, speed: S) -> S {
+        let (sine, cosine) = (self.order * angle).sin_cos();
         let level = self.cosine.fma(cosine, self.sine.fma(sine, self.mean));
-        -(level * (motor.speed / self.smoothing).tanh())
+        -(level * (speed / self.smoothing).tanh())
     }
 }

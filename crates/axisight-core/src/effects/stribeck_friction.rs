@@ -1,13 +1,14 @@
 //! Stribeck friction: Coulomb friction with an excess at low speed.
 
 use super::formulas::{smoothed_sign, stribeck_level};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED, Scope};
+use super::sides::{ARM_SHARE, Friction, on_sides};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "stribeck_friction",
     summary: "Coulomb friction that rises towards standstill",
-    equation: "tau_f = (F_c + F_s exp(-(phi' / v_s)^2)) tanh(phi' / v_0)",
+    equation: "tau_f = (F_c + F_s exp(-(phi' / v_s)^2)) tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. (5)",
     scope: Scope::Axis,
     acts: Acts::Motor,
@@ -42,6 +43,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         STRIBECK_SPEED,
         SMOOTHING,
+        ARM_SHARE,
     ],
 };
 
@@ -53,17 +55,18 @@ struct Stribeck<S> {
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Stribeck {
+    let friction = Stribeck {
         coulomb: p[0],
         excess: p[1],
         inverse_speed: p[2].recip(),
         inverse_width: p[3].recip(),
-    })
+    };
+    on_sides(friction, p[4])
 }
 
-impl<S: Scalar> Kernel<S> for Stribeck<S> {
-    fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        let level = stribeck_level(self.coulomb, self.excess, self.inverse_speed, motor.speed);
-        -(level * smoothed_sign(motor.speed, self.inverse_width))
+impl<S: Scalar> Friction<S> for Stribeck<S> {
+    fn torque(&self, _angle: S, speed: S) -> S {
+        let level = stribeck_level(self.coulomb, self.excess, self.inverse_speed, speed);
+        -(level * smoothed_sign(speed, self.inverse_width))
     }
 }

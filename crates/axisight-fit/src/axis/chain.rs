@@ -328,8 +328,8 @@ mod tests {
             theta[layout().excess()] = 0.27;
             theta[layout().stribeck_speed()] = 1.7;
         });
-        let stribeck = kernel("stribeck_friction", &[0.64, 0.27, 1.7, SMOOTHING]);
-        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING]);
+        let stribeck = kernel("stribeck_friction", &[0.64, 0.27, 1.7, SMOOTHING, 0.0]);
+        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING, 0.0]);
         for speed in sweep() {
             let own = chain.friction::<true>(speed, Regime::Smooth);
             assert_same(own, -stribeck.motor_torque(&motor(0.0, speed)));

@@ -49,6 +49,8 @@ pub struct Joint<'a, S> {
     pub angle: S,
     /// Joint speed [rad/s]; zero at rest.
     pub speed: S,
+    /// Gear ratio r, joint angle per motor angle.
+    pub ratio: f64,
     /// States of the effect itself; empty where nothing is integrated.
     pub internal: &'a [S],
 }
@@ -244,6 +246,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
         None
     }
 
+    /// Whether what acts on the motor also acts on the driven joint, behind the gear.
+    fn acts_behind_gear(&self) -> bool {
+        false
+    }
     /// Torque added on the driven joint, joint side [Nm].
     fn joint_torque(&self, _joint: &Joint<'_, S>) -> S {
         S::zero()

@@ -58,6 +58,7 @@ impl<S: Scalar> Axis<S> {
         let state = Joint {
             angle,
             speed,
+            ratio: self.ratio,
             internal: &[],
         };
         let torques = self
@@ -75,6 +76,7 @@ impl<S: Scalar> Axis<S> {
             let state = Joint {
                 angle,
                 speed,
+                ratio: self.ratio,
                 internal: &own[internal.clone()],
             };
             torque += kernel.joint_torque(&state);

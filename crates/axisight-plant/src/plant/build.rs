@@ -226,6 +226,9 @@ impl<S: Scalar> Plant<S> {
             motor_inertia: Some(&mut axis.motor_inertia),
         });
         axis.kernels.push(Arc::clone(&own.kernel));
+        if own.kernel.acts_behind_gear() {
+            axis.on_joint.push(own.clone());
+        }
         match info.acts {
             Acts::Motor => axis.on_motor.push(own),
             Acts::Transmission => axis.on_gear.push(own),

@@ -1,7 +1,9 @@
-"""Dry friction that yields before it slips, held to plain dry friction where logs do not tell over which way.
+"""Laws of friction that are held to plain dry friction, where what they add to it is not there.
 
 Whoever writes dry friction rounds its corner otherwise, over speed or over a small way; a law with a way of its own
-takes up the difference, and predicts better by it. Where the way is real its size is sure.
+takes up the difference, and predicts better by it, as does an excess at standstill that never shows, since the sign
+turns over a wider range of speeds. Where the way is real its size is sure, and where the excess is, friction falls
+with speed.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
-from axisight.effects.stated import BRISTLES, DRY_FRICTION
+from axisight.effects.stated import BRISTLES, DRY_FRICTION, STRIBECK
 from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
 
@@ -21,7 +23,12 @@ Array = NDArray[np.float64]
 # Standard error of the way, of itself, above which it is not known: on machines of three engines up to 0.4, fits
 # that have not ended included, where friction yields; where it does not, the way is at its bound or the error two.
 _UNKNOWN = 0.5
-# By how many times the law without a way is likelier then.
+# By how much of itself friction is larger than at high speed, at some speed, where it has an excess: half a
+# tenth is what another rounding of the corner makes of it.
+_RISES = 0.05
+# Speeds at which that is looked for, of the one over which an excess falls.
+_LOOKED_AT = np.geomspace(1e-3, 10.0, 200)
+# By how many times the law without what it adds is likelier then.
 _USUAL = float(np.log(10.0))
 
 
@@ -31,7 +38,7 @@ def held_to_dry_friction(
     logp: Array,
     stretch: NDArray[np.int64],
 ) -> Array:
-    """Return log-probabilities (n_fits and others,) with laws of an unknown way less likely than without one.
+    """Return log-probabilities (n_fits and others,), of laws that are no more than dry friction less than its own.
 
     ``effects``: of candidates, and their ``fits``; ``stretch`` (n_blocks,): the stretch of time of each block.
     """
@@ -39,11 +46,26 @@ def held_to_dry_friction(
     places = {(effect.name, effect.axis): i for i, effect in enumerate(effects)}
     for (name, axis), i in places.items():
         plain = places.get((DRY_FRICTION[0], axis))
-        if name != BRISTLES[0] or plain is None:
-            continue
-        if way_error(fits[i], stretch) > _UNKNOWN:
+        if plain is not None and _is_plain(name, fits[i], stretch):
             out[i] = min(out[i], out[plain] - _USUAL)
     return out
+
+
+def _is_plain(name: str, fit: Evidence, stretch: NDArray[np.int64]) -> bool:
+    """Whether a fitted law is no more than dry friction."""
+    if name == BRISTLES[0]:
+        return way_error(fit, stretch) > _UNKNOWN
+    return name == STRIBECK[0] and excess_shown(fit.effects[-1]) < _RISES
+
+
+def excess_shown(effect: Effect) -> float:
+    """Return by how much Stribeck friction is at most larger than at high speed, of that [1]."""
+    dry, excess, speed, corner = ((effect.parameters or {})[name] for name in STRIBECK[1:])
+    if dry <= 0:
+        return float("inf") if excess > 0 else 0.0
+    v = _LOOKED_AT * speed
+    friction = (dry + excess * np.exp(-((v / speed) ** 2))) * np.tanh(v / corner)
+    return float(friction.max() / dry - 1.0)
 
 
 def way_error(evidence: Evidence, stretch: NDArray[np.int64]) -> float:

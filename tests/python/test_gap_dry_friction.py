@@ -1,0 +1,45 @@
+"""Laws of friction that add nothing to dry friction are held to it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from axisight import Effect
+from axisight.gap.dry_friction import excess_shown, held_to_dry_friction
+
+# A level of 0.5 Nm, and one Nm more at standstill that falls over 2 rad/s.
+FALLS = {"coulomb_nm": 0.5, "excess_nm": 1.0, "stribeck_speed_rad_s": 2.0}
+
+
+def stribeck(corner_rad_s: float, **others: float) -> Effect:
+    return Effect("stribeck_friction", 1, {**FALLS, "smoothing_rad_s": corner_rad_s, **others})
+
+
+def held(law: Effect, logp: list[float]) -> np.ndarray:
+    """Log-probabilities of dry friction on two axes, a law on the first, and none."""
+    effects = [Effect("coulomb_friction", axis, {"coulomb_nm": 0.5}) for axis in (2, 1)]
+    tried = [*effects, law]
+    fits = [SimpleNamespace(effects=[one]) for one in tried]
+    return held_to_dry_friction(tried, fits, np.array(logp), np.zeros(1, int))
+
+
+def test_an_excess_shows_as_the_sign_turns():
+    # At three corners the sign lacks 5e-3, and the hump a thousandth: of three times the level no more than 0.02.
+    assert 1.98 < excess_shown(stribeck(0.02)) < 2.0
+    assert excess_shown(stribeck(0.02, excess_nm=0.0)) == pytest.approx(0.0, abs=1e-12)
+    # The excess is gone where a wide sign has turned: friction only rises with speed.
+    assert excess_shown(stribeck(4.0, excess_nm=0.5)) < 1e-6
+    assert excess_shown(stribeck(0.02, coulomb_nm=0.0)) == float("inf")
+
+
+@pytest.mark.parametrize(("corner", "likelier"), [(0.02, True), (4.0, False)])
+def test_stribeck_friction_that_never_falls_is_dry_friction(corner, likelier):
+    """It may fit better by its corner: a tenth as likely as dry friction of its own axis is what is left."""
+    found = held(stribeck(corner, excess_nm=0.5), [7.0, -3.0, 2.0, -5.0])
+    assert found[[0, 1, 3]] == pytest.approx([7.0, -3.0, -5.0])
+    assert found[2] == pytest.approx(2.0 if likelier else -3.0 - np.log(10.0))
+
+
+def test_what_is_less_likely_stays_as_it_is():
+    assert held(stribeck(4.0, excess_nm=0.5), [0.0, 0.0, -9.0, 0.0])[2] == -9.0
