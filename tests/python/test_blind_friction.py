@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from axisight.blind import formulas, friction_formulas, friction_laws, laws
 from axisight.blind.drawing import ENGINES
 from axisight.blind.formulas import Place
 from axisight.blind.friction_formulas import SlidingElements, UnevenArctan
 from axisight.blind.friction_laws import ElastoPlastic, UnevenFriction
 from axisight.blind.laws import Axis
+from axisight.blind.scene import Scene
+from axisight.robot import load_robot
 
 DRY, WAY = 0.7, 0.05
 
@@ -62,6 +65,49 @@ def test_friction_is_uneven_over_the_joint():
         ]
         for motor, joint in found:
             assert (motor, joint) == (0.0, pytest.approx(-np.sign(speed) * size, rel=1e-5))
+
+
+def test_behind_the_gear_friction_follows_the_joint():
+    """The motor may stand or run on: the joint has the friction, `1 / r` times as large as a motor would."""
+    ratio, speed, dry = 0.01, -0.3, (0.7, 0.4)
+    # A joint that turns backward in front of a motor that turns forward, the gear bent by as much.
+    law = friction_laws.BehindGear(laws.OneSidedFriction(*dry, 1e-6))
+    formula = friction_formulas.BehindGear(formulas.OneSidedFriction(*dry, 1e-6))
+    one = np.ones(1)
+    place = Place(
+        0.0, 30.0 * one, 100.0 * one, 0.2 * one, (100.0 * ratio - speed) * one, ratio, 1.0, 0.0
+    )
+    law.begin(1e-3)
+    formula.begin(place, 1e-3)
+    found = [
+        law.torque(Axis(0.0, 30.0, 100.0, 30.0 * ratio - 0.2, speed, ratio, 0.0)),
+        [float(np.asarray(x).squeeze()) for x in formula.torque(place)],
+    ]
+    for motor, joint in found:
+        # Corners of a millionth of a radian a second of motors that would turn 30.
+        assert (motor, joint) == (0.0, pytest.approx(dry[1] / ratio, rel=1e-6))
+    # A bristle remembers where the joint was: it is not strained by a motor that turns alone.
+    bristle = friction_formulas.BehindGear(formulas.DahlFriction(0.7, 350.0))
+    still = Place(0.0, 0.0 * one, *[np.zeros(1)] * 3, ratio, 1.0, 0.0)
+    bristle.begin(still, 1e-3)
+    turned = Place(0.0, 0.1 * one, 0.0 * one, 0.1 * ratio * one, 0.0 * one, ratio, 1.0, 0.0)
+    assert bristle.torque(turned)[1] == pytest.approx(0.0, abs=1e-9)
+    bristle.moved(turned)
+    assert abs(bristle.torque(Place(0.0, 0.1 * one, *[np.zeros(1)] * 3, ratio, 1.0, 0.0))[1]) > 1.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction", "asymmetric_friction"])
+def test_a_third_of_dry_friction_is_drawn_behind_the_gear(engine: str, name: str):
+    rng, scene = np.random.default_rng(4), Scene(load_robot("irb6600_like"), [])
+    drawn = [ENGINES[engine][name].draw(rng, scene, 1) for _ in range(300)]
+    there = [d for d in drawn if "arm_share" in d.parameters]
+    # A hundred, give or take three standard deviations of eight.
+    assert 76 < len(there) < 124
+    kind = friction_laws.BehindGear if engine == "mujoco" else friction_formulas.BehindGear
+    assert all(isinstance(law, kind) for d in there for law in d.laws)
+    assert not any(isinstance(law, kind) for d in drawn if d not in there for law in d.laws)
+    assert all(d.laws and not d.native.friction_nm for d in there)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -384,4 +384,6 @@ def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise
     # Where the best leaves four times the noise, formulas may differ by that.
     plain, uneven = (replace(t, held_out=t.held_out + 4.0) for t in (plain, uneven))
     p = {r.trial.candidate.effect.name: r.probability for r in standing([plain, uneven]).ranked}
-    assert p["asymmetric_friction"] / p["coulomb_friction"] == pytest.approx((5.3 / 5.2) ** 30 / cost)
+    assert p["asymmetric_friction"] / p["coulomb_friction"] == pytest.approx(
+        (5.3 / 5.2) ** 30 / cost
+    )

@@ -1,8 +1,8 @@
-"""Formulas of friction that remembers or is uneven, in the engine on Pinocchio."""
+"""Formulas of friction that remembers, is uneven or acts behind the gear, in the engine on Pinocchio."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,3 +56,29 @@ class UnevenArctan(Formula):
         """Return friction on the joint."""
         size = self.dry_nm * (1.0 + self.share * np.sin(self.waves * at.joint + self.phase))
         return 0.0, -size * 2 / np.pi * np.arctan(at.joint_speed / self.corner_rad_s)
+
+
+@dataclass
+class BehindGear(Formula):
+    """A formula of the motor that the arm feels: by angle and speed of the joint."""
+
+    formula: Formula
+
+    def begin(self, place: Place, step_s: float) -> None:
+        """Begin as the formula does."""
+        self.formula.begin(_unbent(place), step_s)
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the joint."""
+        return 0.0, self.formula.torque(_unbent(at))[0] / at.gear_ratio
+
+    def moved(self, at: Place) -> None:
+        """End a step as the formula does."""
+        self.formula.moved(_unbent(at))
+
+
+def _unbent(at: Place) -> Place:
+    """Return where the motor would be if the gear did not bend."""
+    turns, still = 1.0 / at.gear_ratio, np.zeros_like(at.motor)
+    motor, speed = turns * at.joint, turns * at.joint_speed
+    return replace(at, motor=motor, motor_speed=speed, deflection=still, deflection_rate=still)

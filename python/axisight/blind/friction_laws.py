@@ -1,8 +1,8 @@
-"""Laws of friction that remember where the axis was, and of friction that is larger in some places."""
+"""Laws of friction that remember where the axis was, that are larger in some places, or act behind the gear."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, sin
 
 from axisight.blind.laws import Axis, Law
@@ -50,3 +50,22 @@ class UnevenFriction(Law):
         """Return friction on the joint."""
         size = self.dry_nm * (1.0 + self.share * sin(self.waves * at.joint + self.phase))
         return 0.0, -size * at.joint_speed / (abs(at.joint_speed) + self.corner_rad_s)
+
+
+@dataclass
+class BehindGear(Law):
+    """A law of the motor that the arm feels: by angle and speed of the joint, as a motor without elasticity turns."""
+
+    law: Law
+
+    def begin(self, step_s: float) -> None:
+        """Begin as the law does."""
+        self.law.begin(step_s)
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the joint."""
+        turns = 1.0 / at.gear_ratio
+        friction, _ = self.law.torque(
+            replace(at, motor=turns * at.joint, motor_speed=turns * at.joint_speed)
+        )
+        return 0.0, turns * friction

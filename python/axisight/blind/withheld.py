@@ -8,13 +8,14 @@ to three samples; of other arms the same in the units of their motors and gears 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from axisight.blind import friction_laws, joint_laws, laws
 from axisight.blind.arm_mjcf import STEPS_PER_SAMPLE
-from axisight.blind.machine import Ends, Native
+from axisight.blind.machine import NOTHING, Ends, Native
 from axisight.blind.scene import (
     Draw,
     Drawn,
@@ -41,6 +42,33 @@ def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     values = {"coulomb_nm": dry, "exponential_excess_nm": excess, "decay_speed_rad_s": speed}
     law = laws.ExponentialStribeck(dry, dry + excess, speed, 0.05)
     return Drawn("stribeck_friction", axis, values, laws=[law])
+
+
+BEHIND = "arm_share"
+"""Parameter of a friction that acts behind the gear."""
+
+# Of so many draws of dry friction one does.
+_BEHIND_ONE_IN = 3
+
+
+def behind(kind: Kind, moved: Callable[[Drawn], Sequence[object]]) -> Kind:
+    """Return a kind of friction that the arm feels in some draws, by the laws that ``moved`` makes of one."""
+
+    def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
+        drawn = kind.draw(rng, scene, axis)
+        if rng.random() >= 1 / _BEHIND_ONE_IN:
+            return drawn
+        values = {**drawn.parameters, BEHIND: 1.0}
+        return replace(drawn, parameters=values, laws=moved(drawn), native=NOTHING)
+
+    return replace(kind, draw=draw)
+
+
+def _behind(drawn: Drawn) -> list[friction_laws.BehindGear]:
+    """Return the laws of a friction behind the gear; what MuJoCo makes by itself is one with a corner."""
+    size = drawn.native.friction_nm
+    there = [laws.OneSidedFriction(size, size, 0.05)] if size else drawn.laws
+    return [friction_laws.BehindGear(law) for law in there if isinstance(law, laws.Law)]
 
 
 def _bristles(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -425,13 +453,13 @@ def _cubic_damper(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 KINDS: Mapping[str, Kind] = {
-    "coulomb_friction": Kind(_coulomb),
-    "stribeck_friction": Kind(_stribeck),
+    "coulomb_friction": behind(Kind(_coulomb), _behind),
+    "stribeck_friction": behind(Kind(_stribeck), _behind),
     "presliding_friction": Kind(_bristles),
     "position_dependent_friction": Kind(_uneven, axes=turning),
     "viscous_friction": Kind(_viscous),
     "load_dependent_friction": Kind(_load_friction),
-    "asymmetric_friction": Kind(_asymmetric),
+    "asymmetric_friction": behind(Kind(_asymmetric), _behind),
     "quadratic_drag": Kind(_drag),
     "gravity_compensation": Kind(_balancer, axes=turning),
     "cable_stiffness": Kind(_cable),

@@ -11,7 +11,7 @@ from axisight.blind import formulas, friction_formulas, joint_formulas
 from axisight.blind.formulas import Formula
 from axisight.blind.machine import NOTHING, Native
 from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning, unloaded
-from axisight.blind.withheld import KINDS, on_joint, uneven, yielding
+from axisight.blind.withheld import BEHIND, KINDS, behind, on_joint, uneven, yielding
 
 # Angle of a motor over which dry friction comes after a reversal.
 _STRAIN_RAD = 2e-3
@@ -27,6 +27,8 @@ def _by(name: str, law: Law) -> Kind:
     def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
         drawn = kind.draw(rng, scene, axis)
         laws = [law(rng, scene, axis, drawn.parameters)]
+        if BEHIND in drawn.parameters:
+            laws = [friction_formulas.BehindGear(law) for law in laws]
         # What MuJoCo makes by itself, the law makes here.
         return replace(drawn, laws=laws, native=NOTHING)
 
@@ -81,6 +83,10 @@ def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     values = {"coulomb_nm": dry, "tanh_excess_nm": excess, "tanh_speed_rad_s": speed}
     law = formulas.TanhStribeck(dry, excess, speed, 0.1)
     return Drawn("stribeck_friction", axis, values, laws=[law])
+
+
+def _behind(drawn: Drawn) -> list[Formula]:
+    return [friction_formulas.BehindGear(law) for law in drawn.laws if isinstance(law, Formula)]
 
 
 def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -229,7 +235,7 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
     | {
         "presliding_friction": Kind(_elements),
         "position_dependent_friction": Kind(_uneven, axes=turning),
-        "stribeck_friction": Kind(_stribeck),
+        "stribeck_friction": behind(Kind(_stribeck), _behind),
         "quadratic_drag": Kind(_drag),
         "gravity_compensation": Kind(_balancer, axes=turning),
         "cable_stiffness": Kind(_hose),
