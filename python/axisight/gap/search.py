@@ -458,9 +458,15 @@ def _drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[st
         free = state.model.free
         gains = []
         for i, f in enumerate(free):
-            without = fitter.evaluate(
-                [*free[:i], *free[i + 1 :]], state.model, robot_values=state.model.robot_values
-            )
+            others = [*free[:i], *free[i + 1 :]]
+            try:
+                without = fitter.evaluate(
+                    others, state.model, robot_values=state.model.robot_values
+                )
+            except InputError:
+                # A loop that swings without end lacks it.
+                gains.append(np.inf)
+                continue
             left = without.total - linear_gain(without) - state.model.total
             worth = samples[f.effect.axis - 1] if f.effect.axis else samples.min()
             gains.append(left / float(worth))
