@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from axisight import Effect
+from axisight.gap.candidates import on_the_motor, one_sided
 from axisight.gap.dry_friction import excess_shown, held_to_dry_friction
+from axisight.gap.evidence import FreeEffect
+from axisight.gap.search import alike
+from axisight.robot import load_robot
 
 # A level of 0.5 Nm, and one Nm more at standstill that falls over 2 rad/s.
 FALLS = {"coulomb_nm": 0.5, "excess_nm": 1.0, "stribeck_speed_rad_s": 2.0}
@@ -43,3 +47,32 @@ def test_stribeck_friction_that_never_falls_is_dry_friction(corner, likelier):
 
 def test_what_is_less_likely_stays_as_it_is():
     assert held(stribeck(4.0, excess_nm=0.5), [0.0, 0.0, -9.0, 0.0])[2] == -9.0
+
+
+@pytest.mark.parametrize(
+    ("arm", "light"), [("irb6600_like", []), ("scara_like", []), ("cobot_like", [4, 5, 6])]
+)
+def test_on_which_side_is_asked_where_the_arm_is_no_light_one(arm: str, light: list[int]):
+    """Axes of a wrist move a tenth of their rotors and less, the others three quarters and more."""
+    robot = load_robot(arm)
+    assert one_sided(robot) == light
+    both = FreeEffect(
+        Effect(
+            "coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.1, "arm_share": 0.5}
+        ),
+        ("coulomb_nm", "smoothing_rad_s", "arm_share"),
+    )
+    motor = on_the_motor(both)
+    assert motor.free == ("coulomb_nm", "smoothing_rad_s")
+    assert motor.effect.parameters["arm_share"] == 0.0
+    # What has no side is left as it is.
+    plain = FreeEffect(Effect("viscous_friction", 1), ("viscous_nm_s_rad",))
+    assert on_the_motor(plain) is plain
+
+
+def test_a_second_law_of_one_dry_friction_mends_the_first():
+    assert alike(stribeck(0.1), Effect("position_dependent_friction", 1))
+    assert alike(Effect("backlash", 1), Effect("nonlinear_stiffness", 1))
+    # Friction that grows with speed is another friction.
+    assert not alike(stribeck(0.1), Effect("viscous_friction", 1))
+    assert not alike(stribeck(0.1), Effect("backlash", 1))

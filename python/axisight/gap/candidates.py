@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, EffectInfo, effect_info, effect_table
 from axisight.effects.stated import BEHIND_GEAR, BRISTLES
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.feedback import inertia_of_motors, rotors
 from axisight.gap.orders import Turning, turning
 from axisight.gap.situation import Place, Response, Situation, Trial
 from axisight.gap.starts import STARTS, TARGET_STARTS
@@ -71,31 +72,42 @@ def all_candidates(
         for place in _places(robot, info)
         if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
     ]
+    sides = robot.axis_numbers() if inverse_dynamics else one_sided(robot)
     with ThreadPoolExecutor(threads) as pool:
         starts = {**STARTS, **TARGET_STARTS} if by_targets else STARTS
         found = pool.map(lambda t: starts[t.info.name](t), trials)
-        out = [
-            _on_the_motor(c) if inverse_dynamics or _is_rigid(robot, c.effect) else c
-            for c in found
-            if c is not None
-        ]
+        out = [on_the_motor(c) if c.effect.axis in sides else c for c in found if c is not None]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
 
 
-def _is_rigid(robot: Robot, effect: Effect) -> bool:
-    """Whether the gear of the axis that an effect acts on is."""
-    return isinstance(effect.axis, int) and bool(robot.axis_is_rigid[effect.axis - 1])
+# Of a rotor's inertia: what a motor feels of its arm, from where it tells on which side friction acts.
+_HEAVY = 0.2
 
 
-def _on_the_motor(candidate: FreeEffect) -> FreeEffect:
+def one_sided(robot: Robot) -> list[int]:
+    """Return the axes (from 1) whose logs do not tell friction of the motor from friction behind its gear.
+
+    Gears that are rigid, and arms that are light: they follow their motors, and sharp friction on little
+    inertia is hard to integrate for nothing.
+    """
+    rotor = rotors(robot)
+    felt = np.diag(inertia_of_motors(robot)) - rotor
+    light = felt < _HEAVY * rotor
+    return [
+        axis for axis in robot.axis_numbers() if robot.axis_is_rigid[axis - 1] or light[axis - 1]
+    ]
+
+
+def on_the_motor(candidate: FreeEffect) -> FreeEffect:
     """Return a candidate without what tells friction of the motor from friction behind an elastic gear."""
     given = dict(candidate.effect.parameters or {})
     if BEHIND_GEAR not in given:
         return candidate
     effect = replace(candidate.effect, parameters={**given, BEHIND_GEAR: 0.0})
     free = tuple(name for name in candidate.free if name != BEHIND_GEAR)
-    return replace(candidate, effect=effect, free=free)
+    starts = tuple(start for start in candidate.starts if BEHIND_GEAR not in start)
+    return replace(candidate, effect=effect, free=free, starts=starts)
 
 
 def _in_torque(info: EffectInfo) -> bool:

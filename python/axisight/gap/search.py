@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
+from axisight.effects.stated import DRY_FRICTION
 from axisight.errors import InputError
 from axisight.gap.decide import (
     FORMULA_ERROR,
@@ -113,13 +114,15 @@ class Search:
         )
 
     def mends(self, one: Trial) -> bool:
-        """Whether a trial mends the formula of a cause: it is another law of the same gear.
+        """Whether a trial mends the formula of a cause: it is another law of the same gear, or of its dry friction.
 
         One that takes away no more on its own axis than what formulas may leave of what was removed there.
         """
         axis = one.candidate.effect.axis
-        laws = [e for e in self.model.effects if e.axis == axis and _in_a_gear(e)]
-        if self.adds_up or axis is None or not laws or not _in_a_gear(one.candidate.effect):
+        others = [
+            e for e in self.model.effects if e.axis == axis and alike(e, one.candidate.effect)
+        ]
+        if self.adds_up or axis is None or not others:
             return False
         fall = self.layout.by_axis(held_out_loss(self.model) - one.held_out)
         return bool(fall[axis - 1] < FORMULA_ERROR * self.removed()[axis - 1])
@@ -130,8 +133,11 @@ class Search:
         return float(self.removed().sum()) / total if total > 0 else 0.0
 
 
-def _in_a_gear(effect: Effect) -> bool:
-    return effect_info(effect.name).family == GEAR
+def alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects are laws of one gear, or of one dry friction."""
+    in_gear = all(effect_info(e.name).family == GEAR for e in (one, other))
+    dry = all(DRY_FRICTION[0] in {e.name, *effect_info(e.name).contains} for e in (one, other))
+    return in_gear or dry
 
 
 def search(

@@ -36,21 +36,16 @@ def _before_the_last(trial: Trial) -> FreeEffect | None:
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
 
 
-# Share of a friction behind the gear: from the middle a fit finds either side.
-_ON_BOTH_SIDES = 0.5
-
-
 def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
-    """Begin at neutral values; speeds that shape a friction law are shares of the speeds seen."""
+    """Begin at neutral values, and behind the gear; speeds that shape a friction law are shares of the speeds seen."""
 
     def start(trial: Trial) -> FreeEffect:
         top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
         found = {name: share * top for name, share in shares.items()}
         values = {p.name: p.neutral for p in trial.info.parameters} | found
-        if BEHIND_GEAR in values:
-            values[BEHIND_GEAR] = _ON_BOTH_SIDES
         bounds = {name: (0.1 * value, 10 * value) for name, value in found.items()}
-        return FreeEffect(trial.effect(values), tuple(values), bounds=bounds)
+        starts = ({BEHIND_GEAR: 1.0},) if BEHIND_GEAR in values else ()
+        return FreeEffect(trial.effect(values), tuple(values), bounds=bounds, starts=starts)
 
     return start
 
@@ -66,7 +61,11 @@ def _stribeck(trial: Trial) -> FreeEffect:
     name = "stribeck_speed_rad_s"
     begin = _law(smoothing_rad_s=_SMOOTHING, **{name: _STRIBECK})(trial)
     speed = float((begin.effect.parameters or {})[name])
-    starts = tuple({name: share / _STRIBECK * speed} for share in _STRIBECK_STARTS)
+    starts = tuple(
+        {name: share / _STRIBECK * speed, **side}
+        for share in _STRIBECK_STARTS
+        for side in ({}, *begin.starts)
+    )
     bounds = {**begin.bounds, name: (0.1 * starts[0][name], 10 * speed)}
     return replace(begin, bounds=bounds, starts=starts)
 
