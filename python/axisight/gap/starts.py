@@ -377,13 +377,17 @@ def _uneven(trial: Trial) -> FreeEffect | None:
     if wave is None:
         return None
     order, cosine, sine = wave
-    # An order has no slope where its wave is zero.
+    # An order has no slope where its wave is zero; from the middle a fit finds either side of the gear.
     begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at(
-        {"order": order, "cosine_nm": _BEGUN * cosine, "sine_nm": _BEGUN * sine}
+        {
+            "order": order,
+            "cosine_nm": _BEGUN * cosine,
+            "sine_nm": _BEGUN * sine,
+            BEHIND_GEAR: 0.5,
+        }
     )
-    return replace(
-        begin, bounds={**begin.bounds, "order": (max(order / _NEAR, 0.5 * ends[0]), order * _NEAR)}
-    )
+    bounds = {**begin.bounds, "order": (max(order / _NEAR, 0.5 * ends[0]), order * _NEAR)}
+    return replace(begin, bounds=bounds, starts=())
 
 
 # From the slowest swing that ten seconds show to those that gears have themselves; a swing is found
