@@ -74,7 +74,11 @@ def test_presets_state_their_effects() -> None:
     robot = load_robot("two_mass_axis")
     tables = tomllib.loads(robot.toml)["effect"]
     assert [e.label for e in robot.effects] == [f"{t['name']}@{t['axis']}" for t in tables]
-    assert robot.effects[1].parameters == {"coulomb_nm": 0.644, "smoothing_rad_s": 0.01}
+    assert robot.effects[1].parameters == {
+        "coulomb_nm": 0.644,
+        "smoothing_rad_s": 0.01,
+        "arm_share": 0.0,
+    }
 
 
 def test_parameters_left_out_have_their_neutral_values() -> None:
