@@ -163,10 +163,9 @@ def _from(own: Effect, candidate: FreeEffect) -> FreeEffect:
     terms = [t for t in info.terms().values() if t[0] in given and len(info.terms()) > 1]
     if terms:
         free = _merged_terms(values, given, terms)
-    # The simulator says on which side of the gear it acts.
-    starts = tuple(s for s in candidate.starts if BEHIND_GEAR in free or BEHIND_GEAR not in s)
-    begun = replace(candidate, bounds=bounds, free=free, stated=stated, starts=starts)
-    return replace(begun, effect=own.with_values(values))
+    return replace(
+        candidate, effect=own.with_values(values), bounds=bounds, free=free, stated=stated
+    )
 
 
 def _merged_terms(

@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 # Standard error of the way, of itself, above which it is not known: on machines of three engines up to 0.4, fits
 # that have not ended included, where friction yields; where it does not, the way is at its bound or the error two.
 _UNKNOWN = 0.5
-# By how much of itself friction is larger than at high speed, at some speed, where it has an excess: half a
-# tenth is what another rounding of the corner makes of it.
+# By how much of itself friction is larger at some speed than at high speed, where it has an excess: five per
+# cent is what another rounding of the corner makes of it.
 _RISES = 0.05
 # Speeds at which that is looked for, of the one over which an excess falls.
 _LOOKED_AT = np.geomspace(1e-3, 10.0, 200)

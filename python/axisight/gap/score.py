@@ -28,7 +28,7 @@ def held_out_loss(evidence: Evidence, like: Evidence | None = None) -> Array:
     out = np.zeros(len(evidence.loss))
     for group in np.unique(groups):
         inside = groups == group
-        step = step_without(evidence, inside)
+        step = straight_step_without(evidence, inside)
         out[inside] = predicted_loss(evidence, inside, step)
     return out
 
@@ -69,11 +69,44 @@ def _alone(evidence: Evidence, number: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
     """Return how a re-fit without the blocks ``inside`` moves the parameters, to first order."""
+    step = _least_squares(evidence, inside, np.full(len(evidence.parameters), np.inf))
+    return step / max(1.0, _prior_lengths(evidence, step))
+
+
+def straight_step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
+    """Return the same, no further than losses can be predicted to second order.
+
+    Each number that shapes a law moves by a tenth of itself at most, the others to what is best with that; and
+    no effect by more than it is large. The size of a number is that of the largest of its effect in the same unit.
+    """
+    reach, size = np.full((2, len(evidence.parameters)), np.inf)
+    for place, effect in enumerate(evidence.effects):
+        table = effect_info(effect.name).parameters
+        values = dict(zip((p.name for p in table), effect.values(), strict=True))
+        for p in table:
+            if (place, p.name) not in evidence.parameters:
+                continue
+            column = evidence.parameters.index((place, p.name))
+            if p.role == "shape":
+                reach[column] = _STRAIGHT * abs(values[p.name])
+            # One that is nothing, as all of its unit are, has no size to go by.
+            size[column] = max(abs(values[q.name]) for q in table if q.unit == p.unit) or np.inf
+    step = _least_squares(evidence, inside, reach)
+    lengths = float((np.abs(step) / size).max(initial=0.0))
+    return step / max(1.0, _prior_lengths(evidence, step), lengths)
+
+
+# Of a number that shapes a law, over which its law is about linear in it: waves over an angle are half a radian
+# out of phase after that, where they come round once.
+_STRAIGHT = 0.1
+
+
+def _least_squares(evidence: Evidence, inside: NDArray[np.bool_], reach: Array) -> Array:
+    """Return the step (n_parameters,) to the least without some blocks, each within its reach."""
     matrix = evidence.matrix[~inside].sum(axis=0) + evidence.prior_matrix
     gradient = evidence.gradient[~inside].sum(axis=0) + evidence.prior_gradient
     # Parameters this part of the data says nothing about stay where they are.
     matrix += np.diag(1e-9 * np.einsum("bii->i", evidence.matrix) + 1e-30)
-    reach = _reach_of_shapes(evidence)
     free = ~_pinned(evidence)
     step = np.zeros(len(gradient))
     while free.any():
@@ -84,49 +117,12 @@ def step_without(evidence: Evidence, inside: NDArray[np.bool_]) -> Array:
             break
         step[beyond] = np.clip(step, -reach, reach)[beyond]
         free &= ~beyond
-    return step / max(1.0, _prior_lengths(evidence, step), _effect_lengths(evidence, step))
-
-
-# Of a number that shapes a law, over which its law is about linear in it: waves over an angle are half a radian
-# out of phase after that, where they come round once.
-_STRAIGHT = 0.1
-
-
-def _reach_of_shapes(evidence: Evidence) -> Array:
-    """Return how far a linear step may take each parameter (n_parameters,) that shapes a law of an effect."""
-    reach = np.full(len(evidence.parameters), np.inf)
-    for i, (place, name) in enumerate(evidence.parameters):
-        if place is not None and place < len(evidence.effects):
-            effect = evidence.effects[place]
-            if any(
-                p.name == name and p.role == "shape" for p in effect_info(effect.name).parameters
-            ):
-                reach[i] = _STRAIGHT * abs((effect.parameters or {})[name])
-    return reach
+    return step
 
 
 def _prior_lengths(evidence: Evidence, step: Array) -> float:
     """Return the largest move in prior standard deviations: beyond one, a linear step is no guide."""
     return float(np.abs(step * np.sqrt(np.diag(evidence.prior_matrix))).max(initial=0.0))
-
-
-def _effect_lengths(evidence: Evidence, step: Array) -> float:
-    """Return the largest move of an effect in its own size: beyond one, a linear step is no guide.
-
-    The size of a number is that of the largest of its effect in the same unit.
-    """
-    longest = 0.0
-    for place, effect in enumerate(evidence.effects):
-        sizes: dict[str, float] = {}
-        units = {p.name: p.unit for p in effect_info(effect.name).parameters}
-        for name, value in (effect.parameters or {}).items():
-            sizes[units[name]] = max(sizes.get(units[name], 0.0), abs(value))
-        for name, unit in units.items():
-            key = (place, name)
-            if key in evidence.parameters and sizes.get(unit, 0.0) > 0:
-                moved = abs(step[evidence.parameters.index(key)])
-                longest = max(longest, float(moved) / sizes[unit])
-    return longest
 
 
 # Of its value: a number this near to a bound is at it.

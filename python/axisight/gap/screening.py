@@ -208,7 +208,7 @@ class Screen:
             known = best.sensitivity
             best = max((best, *starts), key=lambda start: start.gain)
             best = replace(best, sensitivity=known)
-        elif option.starts and all(option.free[0] in start for start in option.starts):
+        elif option.starts and len(option.free) == 1:
             found = self.best_of_starts(option)
             if found.gain > best.gain:
                 best = replace(found, sensitivity=best.sensitivity)
