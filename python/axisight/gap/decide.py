@@ -12,8 +12,8 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.stated import BEHIND_GEAR, LOOP_LIKE, ONE_FORMULA, PLAY, SPRING_CHANGES
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.apart import NEXT_TO_NOTHING, held_apart
-from axisight.gap.dry_friction import held_to_dry_friction
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.held import held_to_plainer
 from axisight.gap.layout import Layout
 from axisight.gap.score import held_out_loss
 from axisight.gap.terms import idle_numbers
@@ -284,7 +284,7 @@ def stand(
     )
     logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
     tried = [t.candidate.effect for t in mine]
-    logp = held_to_dry_friction(tried, [t.evidence for t in mine], logp, layout.stretch)
+    logp = held_to_plainer(tried, [t.evidence for t in mine], logp, layout.stretch)
     probability = np.exp(logp - logp.max())
     probability /= probability.sum()
     samples = float(layout.samples()[axis])

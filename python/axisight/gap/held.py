@@ -1,9 +1,10 @@
-"""Laws of friction that are held to plain dry friction, where what they add to it is not there.
+"""Laws that are held to a plainer one, where what they add to it is not there.
 
 Whoever writes dry friction rounds its corner otherwise, over speed or over a small way; a law with a way of its own
 takes up the difference, and predicts better by it, as does an excess at standstill that never shows, since the sign
-turns over a wider range of speeds. Where the way is real its size is sure, and where the excess is, friction falls
-with speed.
+turns over a wider range of speeds. A cable that hardly pulls harder as it is stretched, and is at rest far away,
+pulls like a constant. Where the way or the stiffness is real its size is sure, and where the excess is, friction
+falls with speed.
 """
 
 from __future__ import annotations
@@ -14,48 +15,56 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
-from axisight.effects.stated import BRISTLES, DRY_FRICTION, STRIBECK
+from axisight.effects.stated import BRISTLES, CONSTANT, DRY_FRICTION, JOINT_SPRING, STRIBECK
 from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
 
 Array = NDArray[np.float64]
 
-# Standard error of the way, of itself, above which it is not known: on machines of three engines up to 0.4, fits
-# that have not ended included, where friction yields; where it does not, the way is at its bound or the error two.
+# Standard error of a way or a stiffness, of itself, above which it is not known. Of ways, on machines of three
+# engines: up to 0.4, fits that have not ended included, where friction yields; where it does not, the way is at its
+# bound or the error two.
 _UNKNOWN = 0.5
 # By how much of itself friction is larger at some speed than at high speed, where it has an excess: five per
 # cent is what another rounding of the corner makes of it.
 _RISES = 0.05
 # Speeds at which that is looked for, of the one over which an excess falls.
 _LOOKED_AT = np.geomspace(1e-3, 10.0, 200)
-# By how many times the law without what it adds is likelier then.
-_USUAL = float(np.log(10.0))
+# What each law is without what it adds, and by how many times that is likelier then: friction has corners and ways
+# too small to show, a cable that pulls like a constant is none.
+_PLAINER = {
+    BRISTLES[0]: (DRY_FRICTION[0], 10.0),
+    STRIBECK[0]: (DRY_FRICTION[0], 10.0),
+    JOINT_SPRING[0]: (CONSTANT[0], 50.0),
+}
 
 
-def held_to_dry_friction(
+def held_to_plainer(
     effects: Sequence[Effect],
     fits: Sequence[Evidence],
     logp: Array,
     stretch: NDArray[np.int64],
 ) -> Array:
-    """Return log-probabilities (n_fits and others,), of laws that are no more than dry friction less than its own.
+    """Return log-probabilities (n_fits and others,), of laws that are no more than a plainer one less than its own.
 
     ``effects``: of candidates, and their ``fits``; ``stretch`` (n_blocks,): the stretch of time of each block.
     """
     out = logp.copy()
     places = {(effect.name, effect.axis): i for i, effect in enumerate(effects)}
     for (name, axis), i in places.items():
-        plain = places.get((DRY_FRICTION[0], axis))
+        plainer, likelier = _PLAINER.get(name, ("", 1.0))
+        plain = places.get((plainer, axis))
         if plain is not None and _is_plain(name, fits[i], stretch):
-            out[i] = min(out[i], out[plain] - _USUAL)
+            out[i] = min(out[i], out[plain] - np.log(likelier))
     return out
 
 
 def _is_plain(name: str, fit: Evidence, stretch: NDArray[np.int64]) -> bool:
-    """Whether a fitted law is no more than dry friction."""
-    if name == BRISTLES[0]:
-        return way_error(fit, stretch) > _UNKNOWN
-    return name == STRIBECK[0] and excess_shown(fit.effects[-1]) < _RISES
+    """Whether a fitted law is no more than its plainer one."""
+    if name == STRIBECK[0]:
+        return excess_shown(fit.effects[-1]) < _RISES
+    added = BRISTLES[1] if name == BRISTLES[0] else JOINT_SPRING[1]
+    return own_error(fit, added, stretch) > _UNKNOWN
 
 
 def excess_shown(effect: Effect) -> float:
@@ -68,16 +77,16 @@ def excess_shown(effect: Effect) -> float:
     return float(friction.max() / dry - 1.0)
 
 
-def way_error(evidence: Evidence, stretch: NDArray[np.int64]) -> float:
-    """Return the standard error of the way of the last effect, of itself: delete-one-stretch jackknife.
+def own_error(evidence: Evidence, name: str, stretch: NDArray[np.int64]) -> float:
+    """Return the standard error of a parameter of the last effect, of itself: delete-one-stretch jackknife.
 
     Infinite where it is not fitted, or stands at a bound.
     """
-    key = (len(evidence.effects) - 1, BRISTLES[1])
+    key = (len(evidence.effects) - 1, name)
     groups = np.unique(stretch)
     if key not in evidence.parameters or key in evidence.at_bound or len(groups) < 2:
         return float("inf")
     column = evidence.parameters.index(key)
     moved = np.array([step_without(evidence, stretch == g)[column] for g in groups])
     error = np.sqrt((len(groups) - 1) / len(groups) * float(moved @ moved))
-    return float(error / abs((evidence.effects[-1].parameters or {})[BRISTLES[1]]))
+    return float(error / abs((evidence.effects[-1].parameters or {})[name]))

@@ -7,8 +7,8 @@ import pytest
 
 from axisight import Effect
 from axisight.gap.candidates import on_the_motor, one_sided
-from axisight.gap.dry_friction import excess_shown, held_to_dry_friction
 from axisight.gap.evidence import FreeEffect
+from axisight.gap.held import excess_shown, held_to_plainer
 from axisight.gap.search import alike
 from axisight.robot import load_robot
 
@@ -25,7 +25,7 @@ def held(law: Effect, logp: list[float]) -> np.ndarray:
     effects = [Effect("coulomb_friction", axis, {"coulomb_nm": 0.5}) for axis in (2, 1)]
     tried = [*effects, law]
     fits = [SimpleNamespace(effects=[one]) for one in tried]
-    return held_to_dry_friction(tried, fits, np.array(logp), np.zeros(1, int))
+    return held_to_plainer(tried, fits, np.array(logp), np.zeros(1, int))
 
 
 def test_an_excess_shows_as_the_sign_turns():
@@ -76,3 +76,23 @@ def test_a_second_law_of_one_dry_friction_mends_the_first():
     # Friction that grows with speed is another friction.
     assert not alike(stribeck(0.1), Effect("viscous_friction", 1))
     assert not alike(stribeck(0.1), Effect("backlash", 1))
+
+
+@pytest.mark.parametrize("slack", [True, False])
+def test_a_cable_that_does_not_stretch_is_a_constant_torque(slack, monkeypatch):
+    """Its stiffness at its bound of zero is not known: a fiftieth of the constant's likelihood is left."""
+    tried = [Effect("torque_offset", 1, {"offset_nm": 0.3})]
+    tried.append(
+        Effect("cable_stiffness", 1, {"stiffness_nm_rad": 5.0 * (not slack), "at_zero_nm": 30.0})
+    )
+    stiffness = (0, "stiffness_nm_rad")
+    fits = [
+        SimpleNamespace(
+            effects=[e], parameters=(stiffness,), at_bound=(stiffness,) if slack else ()
+        )
+        for e in tried
+    ]
+    # A stretch left out takes a hundredth of the stiffness along.
+    monkeypatch.setattr("axisight.gap.held.step_without", lambda *_: np.array([0.05]))
+    found = held_to_plainer(tried, fits, np.array([0.0, 1.0, -9.0]), np.array([0, 0, 1]))
+    assert found == pytest.approx([0.0, -np.log(50.0) if slack else 1.0, -9.0])
