@@ -9,7 +9,7 @@ from axisight import Effect
 from axisight.gap.candidates import on_the_motor, one_sided
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.held import excess_shown, held_to_plainer
-from axisight.gap.search import alike
+from axisight.gap.swaps import alike
 from axisight.robot import load_robot
 
 # A level of 0.5 Nm, and one Nm more at standstill that falls over 2 rad/s.

@@ -11,7 +11,7 @@ from axisight.gap.decide import Ranked, Standing, Trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.swaps import straightened, weighed_again
+from axisight.gap.swaps import mending, nearly_as_good, straightened, weighed_again
 from gap_data import linear_evidence
 
 ROBOT = load_robot("irb6600_like").with_effects([])
@@ -160,7 +160,10 @@ def again(losses, rival_score=0.93):
         0.0,
         0.0,
     )
-    found = weighed_again(fitter, model, entered.best, entered, np.full(8, 100.0), LAYOUT, 0.6)
+    rivals = nearly_as_good(model, entered.best, entered)
+    found = weighed_again(
+        fitter, model, entered.best, entered, np.full(8, 100.0), LAYOUT, 0.6, rivals
+    )
     return found, fitter.asked
 
 
@@ -184,3 +187,23 @@ def test_a_cause_stays_where_its_rivals_are_no_likelier():
     found, asked = again({BOTH: 900.0, WITH_PLAY: 820.0}, rival_score=0.5)
     assert found is None and asked == []
     assert again({BOTH: 900.0, WITH_PLAY: None}, 0.93)[0] is None
+
+
+def standing_of(effect: Effect, axis: int = 0) -> Standing:
+    one = Trial(FreeEffect(effect, ()), Weighed({(): 800.0}).of([]), np.zeros(8))
+    return Standing(axis, (Ranked(one, 0.9, 1.0, 9.0, 1.0),), 0.0, 0.0)
+
+
+def test_another_law_of_the_same_dry_friction_or_gear_mends_a_cause():
+    """The first law may have come in by a better fit: what mends it is judged in its place."""
+    dry = standing_of(Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})).best
+    waves = Effect("position_dependent_friction", 1, {"cosine_nm": 0.3})
+    assert [r.trial.label for r in mending(dry, [standing_of(waves)])] == [waves.label]
+    # Elsewhere, of another axis, of something else, and the same again: no.
+    others = [
+        standing_of(waves, 1),
+        standing_of(Effect("position_dependent_friction", 2, {"cosine_nm": 0.3})),
+        standing_of(Effect("viscous_friction", 1, {"relative_change": 0.2})),
+        standing_of(Effect("coulomb_friction", 1, {"coulomb_nm": 0.2})),
+    ]
+    assert mending(dry, others) == []

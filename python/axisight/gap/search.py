@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import DRY_FRICTION
 from axisight.errors import InputError
 from axisight.gap.decide import (
     FORMULA_ERROR,
-    GEAR,
     Ranked,
     Standing,
     Trial,
@@ -33,7 +31,7 @@ from axisight.gap.score import held_out_loss, linear_gain, predictable
 from axisight.gap.screening import kept_beside
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
-from axisight.gap.swaps import straightened, weighed_again
+from axisight.gap.swaps import alike, mending, nearly_as_good, straightened, weighed_again
 from axisight.gap.trials import Progress, Trials, fresh, interact, settled
 from axisight.statistics.tails import normal_deviate
 
@@ -44,6 +42,10 @@ _OPEN = 1.0
 # Each round takes in a cause on every axis that has one; this many on top of one another are
 # no longer causes but a shape.
 _MOST_ROUNDS = 8
+
+
+# What a law that mends another one leaves at most, of what that one does, where it is the right one.
+_MENDED = 0.5
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,11 @@ class Search:
 
     def left(self) -> Array:
         """Return the held-out loss of the model above the floor, by axis (n_axes,)."""
-        return self.layout.by_axis(held_out_loss(self.model) - self.floor)
+        return self.left_by(self.model)
+
+    def left_by(self, model: Evidence) -> Array:
+        """Return the same of another model."""
+        return self.layout.by_axis(held_out_loss(model) - self.floor)
 
     def removed(self) -> Array:
         """Return how much of it the causes remove, by axis (n_axes,)."""
@@ -131,13 +137,6 @@ class Search:
         """Return the share of the explainable held-out error the model removes."""
         total = float(self.to_explain().sum())
         return float(self.removed().sum()) / total if total > 0 else 0.0
-
-
-def alike(one: Effect, other: Effect) -> bool:
-    """Whether two effects are laws of one gear, or of one dry friction."""
-    in_gear = all(effect_info(e.name).family == GEAR for e in (one, other))
-    dry = all(DRY_FRICTION[0] in {e.name, *effect_info(e.name).contains} for e in (one, other))
-    return in_gear or dry
 
 
 def search(
@@ -436,11 +435,14 @@ def _finish(fitter: ModelFitter, state: Search) -> None:
 
 
 def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:
-    """Judge causes anew that came in beside others which turned out to be none."""
+    """Judge causes anew that came in beside others which turned out to be none, or that another law mends."""
     final = {f.effect.label for f in state.model.free}
+    last = state.rounds[-1].standings
     for cause, standing in state.accepted:
         if {f.effect.label for f in cause.trial.evidence.free} <= final:
-            continue
+            least, rivals = _MENDED, mending(cause, last)
+        else:
+            least, rivals = np.inf, nearly_as_good(state.model, cause, standing)
         found = weighed_again(
             fitter,
             state.model,
@@ -449,9 +451,13 @@ def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None
             state.floor,
             state.layout,
             settings.explained_share,
+            rivals,
         )
-        if found is not None:
-            left = state.left()
+        left = state.left()
+        if (
+            found is not None
+            and state.left_by(found[0])[standing.axis] < least * left[standing.axis]
+        ):
             state.model, taken = found
             state.rounds.append(Round((taken[1],), (taken,), left))
 

@@ -12,8 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect, effect_info
+from axisight.effects.stated import DRY_FRICTION
 from axisight.errors import InputError
-from axisight.gap.decide import Ranked, Standing, stand, trial
+from axisight.gap.decide import GEAR, Ranked, Standing, stand, trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence
 from axisight.gap.layout import Layout
@@ -51,6 +53,43 @@ def straightened(
     return best
 
 
+def nearly_as_good(model: Evidence, cause: Ranked, entered: Standing) -> list[Ranked]:
+    """Return what explained nearly as much as a cause of its axis, as it entered.
+
+    A cause is judged beside what was in the model then: where that turned out to be none, anew.
+    """
+    others = {f.effect.label for f in model.free} - {cause.trial.label}
+    return [
+        r
+        for r in entered.ranked
+        if r is not cause
+        and r.score >= _NEARLY * cause.score
+        and r.trial.candidate.effect.axis == cause.trial.candidate.effect.axis
+        and r.trial.label not in others
+    ][:_AGAIN]
+
+
+def alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects are laws of one gear, or of one dry friction."""
+    in_gear = all(effect_info(e.name).family == GEAR for e in (one, other))
+    dry = all(DRY_FRICTION[0] in {e.name, *effect_info(e.name).contains} for e in (one, other))
+    return in_gear or dry
+
+
+def mending(cause: Ranked, standings: Sequence[Standing]) -> list[Ranked]:
+    """Return the laws of the gear or the dry friction of a cause that lead its axis beside it.
+
+    Such a law is no second cause. It may be the right one, whose first fit had not come far.
+    """
+    first = cause.trial.candidate.effect
+    laws = [(s.best, s.best.trial.candidate.effect) for s in standings if s.axis + 1 == first.axis]
+    return [
+        r
+        for r, law in laws
+        if law.axis == first.axis and law.label != first.label and alike(law, first)
+    ]
+
+
 def weighed_again(
     fitter: ModelFitter,
     model: Evidence,
@@ -59,22 +98,11 @@ def weighed_again(
     floor: Array,
     layout: Layout,
     explained_share: float,
+    rivals: Sequence[Ranked],
 ) -> tuple[Evidence, Found] | None:
-    """Return a model with a rival in the place of a cause, where beside the others it is likelier.
-
-    A cause is judged beside what was in the model then. Where that turned out to be none, those
-    that explained nearly as much are judged anew.
-    """
+    """Return a model with one of ``rivals`` in the place of a cause, where beside the others it is likelier."""
     free, label = model.free, cause.trial.label
     rest = [f for f in free if f.effect.label != label]
-    rivals = [
-        r
-        for r in entered.ranked
-        if r is not cause
-        and r.score >= _NEARLY * cause.score
-        and r.trial.candidate.effect.axis == cause.trial.candidate.effect.axis
-        and all(r.trial.label != f.effect.label for f in rest)
-    ][:_AGAIN]
     if not rivals:
         return None
     mine = next(f for f in free if f.effect.label == label)
