@@ -203,7 +203,7 @@ def test_another_law_of_the_same_dry_friction_or_gear_mends_a_cause():
     others = [
         standing_of(waves, 1),
         standing_of(Effect("position_dependent_friction", 2, {"cosine_nm": 0.3})),
-        standing_of(Effect("viscous_friction", 1, {"relative_change": 0.2})),
+        standing_of(Effect("viscous_friction", 1, {"viscous_nm_s_rad": 0.2})),
         standing_of(Effect("coulomb_friction", 1, {"coulomb_nm": 0.2})),
     ]
     assert mending(dry, others) == []
