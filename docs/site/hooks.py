@@ -20,6 +20,17 @@ ROOT = Path(__file__).resolve().parents[2]
 OUTSIDE = "repository/"
 # Of these only what pages link to; text that a browser shows keeps its name with ``.txt`` behind it.
 SHOWN_AS_TEXT = {".py", ".toml", ".yml"}
+# What the search puts first of equals: the page of questions, then what answers them. What changed is
+# no answer.
+FIRST = {
+    "index.md": 4,
+    "start_diagnose.md": 2,
+    "ten_minutes.md": 2,
+    "undecidable.md": 2,
+    "robot_files.md": 2,
+    OUTSIDE + "CONTRIBUTING.md": 2,
+}
+NOT_SEARCHED = {OUTSIDE + "CHANGELOG.md"}
 LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\[\]]*\])*\]\()([^)#\s]+)([^)]*\))")
 CODE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)
 
@@ -97,6 +108,7 @@ def modules(nav: Any) -> list[str]:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links that leave docs/, or begin outside of it, into links of the site."""
     here = page.file.src_uri
+    page.meta["search"] = {"boost": FIRST.get(here, 1), "exclude": here in NOT_SEARCHED}
 
     def moved(match: re.Match[str]) -> str:
         before, target, rest = match.groups()
