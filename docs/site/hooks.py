@@ -7,6 +7,8 @@ their README. The Python reference has a page a module, under ``python/``.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 import posixpath
 import re
@@ -32,6 +34,9 @@ FIRST = {
 }
 NOT_SEARCHED = {OUTSIDE + "CHANGELOG.md"}
 LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\[\]]*\])*\]\()([^)#\s]+)([^)]*\))")
+SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+# What a page may load: what the site has, from a server or from a folder.
+OWN = "'self' file:"
 CODE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)
 
 
@@ -122,3 +127,26 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     parts = CODE.split(markdown)
     parts[::2] = [LINK.sub(moved, part) for part in parts[::2]]
     return "".join(parts)
+
+
+def policy(page: str) -> str:
+    """The content policy of a page: the site's own files, and scripts within the page by their hash."""
+    digests = (hashlib.sha256(text.encode()).digest() for text in SCRIPT.findall(page))
+    scripts = dict.fromkeys(f"'sha256-{base64.b64encode(d).decode()}'" for d in digests)
+    rules = [f"{kind}-src {OWN}" for kind in ("style", "font", "connect", "worker")]
+    rules += [f"img-src {OWN} data:", " ".join([f"script-src {OWN}", *scripts])]
+    return "; ".join(["default-src 'none'", "base-uri 'none'", "form-action 'none'", *rules])
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Give a page its content policy, first thing after its encoding."""
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy(output)}">'
+    before, encoding, after = output.partition('<meta charset="utf-8">')
+    if not encoding:
+        raise ValueError("expected a page that states its encoding")
+    return before + encoding + meta + after
+
+
+def on_post_template(output_content: str, template_name: str, **_: Any) -> str:
+    """Give the page of what is not there its content policy."""
+    return on_post_page(output_content) if template_name.endswith(".html") else output_content
