@@ -62,7 +62,8 @@ test: test-rust test-python
 test-rust:
 	$(CARGO) test --release --locked --no-fail-fast $(RUST_TESTS)
 
-test-python: $(STAMPS)/test-tools
+# What the site needs is installed for its tests, which are skipped without.
+test-python: $(STAMPS)/test-tools $(STAMPS)/docs-tools
 	$(BIN)/python -m mypy.stubtest axisight._core
 	$(BIN)/pytest --numprocesses $(JOBS) --dist loadfile
 

@@ -4,12 +4,15 @@ Usage: python tests/wheel_smoke.py FILE_OR_FOLDER
 Nothing but what the package itself asks for is installed.
 """
 
+import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
 import venv
+import zipfile
 from pathlib import Path
 
 
@@ -21,6 +24,20 @@ def the_file(place: Path) -> Path:
     if len(found) != 1:
         raise SystemExit(f"{place}: expected one distribution, got {len(found)}")
     return found[0]
+
+
+def built_by(wheel: Path) -> tuple[str, str, int]:
+    """What built a wheel, as it says itself: the builder, the revision of rustc, how many crates are listed."""
+    with zipfile.ZipFile(wheel) as file:
+        (about,) = (name for name in file.namelist() if name.endswith(".dist-info/WHEEL"))
+        (core,) = (name for name in file.namelist() if re.search(r"/_core\.[^/]*(so|pyd)$", name))
+        listed = [name for name in file.namelist() if name.endswith(".cyclonedx.json")]
+        builder = re.search(r"^Generator: (.+?)\r?$", file.read(about).decode(), re.M)
+        compiler = re.search(rb"/rustc/([0-9a-f]{40})[/\\]", file.read(core))
+        crates = sum(len(json.loads(file.read(name)).get("components", ())) for name in listed)
+    if builder is None or compiler is None or not crates:
+        raise SystemExit(f"{wheel.name}: expected its builder, compiler and crates on record")
+    return builder[1], compiler[1].decode(), crates
 
 
 def timed(what: str, command: list[str], folder: Path) -> str:
@@ -40,6 +57,9 @@ def timed(what: str, command: list[str], folder: Path) -> str:
 def main(place: Path) -> None:
     """Install and run."""
     distribution = the_file(place.resolve())
+    print(f"{distribution.name}: {distribution.stat().st_size / 1e6:.1f} MB")
+    if distribution.suffix == ".whl":
+        print("built by {}, rustc {:.9}, {} crates listed".format(*built_by(distribution)))
     version = distribution.name.split("-")[1].removesuffix(".tar.gz")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

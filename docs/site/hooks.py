@@ -7,6 +7,8 @@ their README. The Python reference has a page a module, under ``python/``.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 import posixpath
 import re
@@ -20,7 +22,21 @@ ROOT = Path(__file__).resolve().parents[2]
 OUTSIDE = "repository/"
 # Of these only what pages link to; text that a browser shows keeps its name with ``.txt`` behind it.
 SHOWN_AS_TEXT = {".py", ".toml", ".yml"}
+# What the search puts first of equals: the page of questions, then what answers them. What changed is
+# no answer.
+FIRST = {
+    "index.md": 4,
+    "start_diagnose.md": 2,
+    "ten_minutes.md": 2,
+    "undecidable.md": 2,
+    "robot_files.md": 2,
+    OUTSIDE + "CONTRIBUTING.md": 2,
+}
+NOT_SEARCHED = {OUTSIDE + "CHANGELOG.md"}
 LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\[\]]*\])*\]\()([^)#\s]+)([^)]*\))")
+SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+# What a page may load: what the site has, from a server or from a folder.
+OWN = "'self' file:"
 CODE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)
 
 
@@ -97,6 +113,7 @@ def modules(nav: Any) -> list[str]:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links that leave docs/, or begin outside of it, into links of the site."""
     here = page.file.src_uri
+    page.meta["search"] = {"boost": FIRST.get(here, 1), "exclude": here in NOT_SEARCHED}
 
     def moved(match: re.Match[str]) -> str:
         before, target, rest = match.groups()
@@ -110,3 +127,26 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     parts = CODE.split(markdown)
     parts[::2] = [LINK.sub(moved, part) for part in parts[::2]]
     return "".join(parts)
+
+
+def policy(page: str) -> str:
+    """The content policy of a page: the site's own files, and scripts within the page by their hash."""
+    digests = (hashlib.sha256(text.encode()).digest() for text in SCRIPT.findall(page))
+    scripts = dict.fromkeys(f"'sha256-{base64.b64encode(d).decode()}'" for d in digests)
+    rules = [f"{kind}-src {OWN}" for kind in ("style", "font", "connect", "worker")]
+    rules += [f"img-src {OWN} data:", " ".join([f"script-src {OWN}", *scripts])]
+    return "; ".join(["default-src 'none'", "base-uri 'none'", "form-action 'none'", *rules])
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Give a page its content policy, first thing after its encoding."""
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy(output)}">'
+    before, encoding, after = output.partition('<meta charset="utf-8">')
+    if not encoding:
+        raise ValueError("expected a page that states its encoding")
+    return before + encoding + meta + after
+
+
+def on_post_template(output_content: str, template_name: str, **_: Any) -> str:
+    """Give the page of what is not there its content policy."""
+    return on_post_page(output_content) if template_name.endswith(".html") else output_content

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
 from axisight.arguments import short
@@ -14,6 +16,15 @@ _MOST_PARTS = 32
 # Keys of many parts cost the square of their number, or worse: a key part, a dot, and so on.
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}){{{_MOST_PARTS}}}")
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a document; raises OSError for one that is too long, as a device may be without end."""
+    with path.open(encoding="utf-8") as file:
+        text = file.read(_LONGEST + 1)
+    if len(text) > _LONGEST:
+        raise OSError(errno.EFBIG, f"expected at most {_LONGEST} characters")
+    return text
 
 
 def parse_toml(text: str) -> dict[str, Any]:

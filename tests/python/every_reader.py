@@ -33,6 +33,7 @@ READERS = {
     ),
     "columns": load_column_map,
     "case": case,
+    "folder": read_case,
     "robot": load_robot,
     "study": read_study,
     "design": lambda path: read_design(load_design(path), str(path)),

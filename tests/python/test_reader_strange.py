@@ -2,6 +2,7 @@
 
 import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from axisight.montecarlo.study import read_study
 from axisight.robot import load_robot
 from axisight.robot_import.drives import read_drives
 from logs_data import native_columns, write
+from reading_children import read_in_child
 
 DOCUMENTS = {
     "brackets": "a = " + "[" * 100_000,
@@ -78,6 +80,33 @@ def test_json_of_a_folder_of_lerobot(tmp_path):
         with pytest.raises(LogError, match=r"info\.json") as caught:
             read_log(tmp_path / "set")
         assert len(str(caught.value)) < 1000
+
+
+WITHOUT_END = {
+    "columns": "a.toml",
+    "case": "case.toml",
+    "robot": "a.toml",
+    "study": "a.toml",
+    "design": "a.toml",
+    "drives": "a.toml",
+    "verdict": "a.json",
+    "sidecar": "a.json",
+    "models": "a.urdf",
+    "logs": "a.csv",
+}
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs a device without an end")
+@pytest.mark.parametrize("reader", WITHOUT_END)
+def test_documents_of_a_device_without_end(tmp_path, reader):
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / WITHOUT_END[reader]
+    path.symlink_to("/dev/zero")
+    if reader == "case":  # read from a folder of its own
+        path, reader = tmp_path / "in", "folder"
+    ((said, used),) = read_in_child([path], reader=reader, limit=3 * 10**9)
+    assert said.startswith("refused"), said
+    assert used < 500
 
 
 NAMES = ["a\0b.csv", "n" * 300 + ".csv", "d/" * 3000 + "a.csv", "e" * 5000]

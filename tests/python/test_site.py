@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -63,6 +63,23 @@ def test_links_that_leave_docs_lead_to_copies(hooks: ModuleType) -> None:
     assert hooks.in_site(hooks.target_of(readme, "docs/logs.md")) == "logs.md"
     text = "[a](../CONTRIBUTING.md#rules) `b`\n```sh\n[c](../d.md)\n```\n[`e`](../thesis)"
     assert list(hooks.links(text)) == ["../CONTRIBUTING.md", "../thesis"]
+
+
+def test_what_answers_questions_is_found_before_what_changed(
+    hooks: ModuleType, repository: Path
+) -> None:
+    def found(page: str) -> dict[str, object]:
+        asked = SimpleNamespace(file=SimpleNamespace(src_uri=page), meta={})
+        hooks.on_page_markdown("text", page=asked)
+        return asked.meta["search"]
+
+    assert (
+        found("index.md")["boost"] > found("undecidable.md")["boost"] > found("gallery.md")["boost"]
+    )
+    assert found("repository/CHANGELOG.md")["exclude"] is True
+    assert found("index.md")["exclude"] is False
+    for page in (*hooks.FIRST, *hooks.NOT_SEARCHED):
+        assert (repository / hooks.in_repository(page)).is_file()
 
 
 def test_docstrings_become_lists(repository: Path) -> None:

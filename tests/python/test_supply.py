@@ -1,10 +1,14 @@
-"""Rust dependencies against `deny.toml`, also where `cargo deny` is not installed: licences, doubles, sources."""
+"""Rust dependencies against `deny.toml`, also where `cargo deny` is not installed: licences, doubles, sources.
+
+And what built a wheel: named in the recipe of a release, and on record in the wheel."""
 
 import re
 import shutil
 import subprocess
 import tomllib
+import zipfile
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -80,3 +84,32 @@ def test_sources():
         "registry+https://github.com/rust-lang/crates.io-index"
     }
     assert all(re.fullmatch("[0-9a-f]{64}", p["checksum"]) for p in fetched)
+
+
+def test_a_release_names_its_compiler():
+    recipe = (ROOT / ".github" / "workflows" / "release.yml").read_text("utf-8")
+    (named,) = re.findall(r'^ +rust-toolchain: "(\d+)\.(\d+)\.\d+"$', recipe, re.M)
+    lowest = tomllib.loads((ROOT / "Cargo.toml").read_text("utf-8"))["workspace"]["package"]
+    assert [int(n) for n in named] >= [int(n) for n in lowest["rust-version"].split(".")]
+
+
+RECORD = {
+    "axisight-0.1.0.dist-info/WHEEL": b"Wheel-Version: 1.0\nGenerator: maturin (1.2.3)\n",
+    "axisight-0.1.0.dist-info/sboms/a.cyclonedx.json": b'{"components": [{}, {}]}',
+    "axisight/_core.pyd": b"\0/rustc/" + b"0a" * 20 + b"\\library\0",
+}
+
+
+@pytest.mark.parametrize("lacks", [None, *RECORD])
+def test_wheels_say_what_built_them(tmp_path, monkeypatch, lacks):
+    monkeypatch.syspath_prepend(ROOT / "tests")
+    built_by = import_module("wheel_smoke").built_by
+    wheel = tmp_path / "axisight.whl"
+    with zipfile.ZipFile(wheel, "w") as file:
+        for name, data in RECORD.items():
+            file.writestr(name, b"{}" if name == lacks else data)
+    if lacks is None:
+        assert built_by(wheel) == ("maturin (1.2.3)", "0a" * 20, 2)
+    else:
+        with pytest.raises(SystemExit, match="on record"):
+            built_by(wheel)

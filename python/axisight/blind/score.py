@@ -12,7 +12,7 @@ import scipy
 
 from axisight.arguments import short
 from axisight.blind.sealed import SEAL, seal_of
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.effects import effect_table
 from axisight.errors import InputError
 from axisight.gap.twins import TWIN_SHARE, twins_of
@@ -135,7 +135,7 @@ def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
 
 def _read(path: Path, what: str) -> str:
     try:
-        return path.read_text("utf-8")
+        return read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected {what}: {error}") from error
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import instance, path_of, shown
-from axisight.documents import parse_toml
+from axisight.documents import parse_toml, read_text
 from axisight.errors import InputError
 from axisight.excitation.crest import CrestSearch, optimize_crest_factor
 from axisight.excitation.limits import LimitReport, Limits, check_limits
@@ -134,7 +134,7 @@ def load_design(path: Path | str) -> dict[str, Any]:
     """Return the design in a TOML file, not yet checked; a robot file lies next to it."""
     source = path_of("path", path)
     try:
-        data = parse_toml(source.read_text("utf-8"))
+        data = parse_toml(read_text(source))
     except (OSError, ValueError) as error:
         raise InputError(f"{source}: expected a design in TOML: {error}") from None
     robot = data.get("robot")

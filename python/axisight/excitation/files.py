@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import scipy.io
 
 from axisight.arguments import instance, path_of, short, shown
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.errors import InputError, LogError
 from axisight.excitation.references import References
 from axisight.logs.budget import Budget
@@ -138,7 +138,7 @@ def _content(source: Path) -> tuple[str, np.ndarray[Any, np.dtype[np.float64]]]:
         arrays = load_arrays(source)
         columns = [arrays[name] for name in list(arrays)[2:]]
         return text, np.column_stack(columns).astype(np.float64)
-    text = _beside(source).read_text("utf-8")
+    text = read_text(_beside(source))
     budget = Budget()
     budget.grow([source])
     table = load_csv(source, budget, CsvOptions(), exact=True)

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import shown, usable_path
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.explore.choices import Place, at_place
@@ -96,7 +96,7 @@ def read_said(path: Path | str) -> Said:
     try:
         if file.stat().st_size > _LARGEST:
             raise InputError(f"{file}: expected a verdict of at most {_LARGEST} bytes")
-        document = parse_json(file.read_text(encoding="utf-8"))
+        document = parse_json(read_text(file))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: cannot be read: {error}") from error
     except InputError:

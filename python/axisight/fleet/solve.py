@@ -14,7 +14,7 @@ from typing import Any
 
 from axisight.cluster import on_cluster
 from axisight.cluster.workers import each_done
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.errors import AxisightError
 from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
 from axisight.gap import Settings, diagnose
@@ -102,7 +102,7 @@ def _path(verdicts: Path, case: FleetCase) -> Path:
 def _known(path: Path, wanted: str) -> dict[str, Any] | None:
     """Return the verdict in a file if it is that of the fingerprint, as it was written."""
     try:
-        found = parse_json(path.read_text("utf-8"))
+        found = parse_json(read_text(path))
     except (OSError, ValueError):
         return None
     same = (

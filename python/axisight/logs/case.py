@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import shown, usable_path
 from axisight.display import html
-from axisight.documents import parse_toml
+from axisight.documents import parse_toml, read_text
 from axisight.errors import CaseError
 from axisight.logs.columns import describe_validation
 from axisight.logs.log import Log
@@ -160,7 +160,7 @@ def _check_names(path: Path, content: _CaseFile) -> None:
 
 def _parse(path: Path) -> _CaseFile:
     try:
-        return _CaseFile.model_validate(parse_toml(path.read_text(encoding="utf-8")))
+        return _CaseFile.model_validate(parse_toml(read_text(path)))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(f"{path}: cannot be read: {error}") from error
     except ValidationError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from axisight.arguments import shown, usable_path
-from axisight.documents import parse_toml
+from axisight.documents import parse_toml, read_text
 from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap, describe_validation
 from axisight.logs.maps import MAPS
@@ -48,7 +48,7 @@ def load_column_map(path: Path | str) -> AnyMap:
         return parse_column_map(named_map_text(str(path)), where=str(path))
     path = usable_path(path, LogError)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(
             f"{path}: column map cannot be read: expected a file or one of {', '.join(MAPS)}: {error}"

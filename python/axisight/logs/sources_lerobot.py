@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from axisight.documents import read_text
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
 from axisight.logs.columns import describe_validation
@@ -87,7 +88,7 @@ def _joined(readers: list[Reader]) -> Reader:
 
 def _info(path: Path) -> _Info:
     try:
-        return _Info.model_validate_json(path.read_text("utf-8"))
+        return _Info.model_validate_json(read_text(path))
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read: {error}") from error
     except ValidationError as error:

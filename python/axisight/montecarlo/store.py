@@ -28,7 +28,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from axisight.arguments import short, shown
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.errors import StoreError, StudyError
 from axisight.montecarlo.design import Arrays, differences, digest, settings_of
 
@@ -183,7 +183,7 @@ def _opened(path: Path) -> zarr.Group:
 
 
 def _described(path: Path, kind: str) -> dict[str, Any]:
-    found = parse_json((path / "zarr.json").read_text("utf-8"))
+    found = parse_json(read_text(path / "zarr.json"))
     if not isinstance(found, dict) or (found.get("zarr_format"), found.get("node_type")) != (
         3,
         kind,

@@ -9,7 +9,7 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.display import html
-from axisight.documents import parse_toml
+from axisight.documents import parse_toml, read_text
 from axisight.errors import StudyError
 from axisight.robot.presets import PRESETS
 from axisight.simulation import Method
@@ -206,7 +206,7 @@ def read_study(source: Path | str) -> Study:
     """
     path = Path(source)
     try:
-        data = parse_toml(path.read_text("utf-8"))
+        data = parse_toml(read_text(path))
     except (OSError, ValueError) as error:
         raise StudyError(f"{path}: expected a study in TOML: {error}") from None
     robot = data.get("robot")

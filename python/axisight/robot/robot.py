@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from axisight import _core
 from axisight.arguments import usable_path
 from axisight.display import html
+from axisight.documents import read_text
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
@@ -425,7 +426,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         )
         return found
     try:
-        text = path.read_text("utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         known = ", ".join(PRESETS)
         raise RobotError(

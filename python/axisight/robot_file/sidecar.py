@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from axisight.documents import parse_json
+from axisight.documents import parse_json, read_text
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file.identified import Identified
@@ -116,7 +116,7 @@ def sidecar_path(robot_file: Path | str) -> Path:
 def read_sidecar(path: Path) -> Sidecar | Earlier:
     """Return the content of a sidecar; raises InputError naming file and field."""
     try:
-        text = path.read_text("utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"path: expected the sidecar {path}: {error}") from error
     kind = Earlier if _is_earlier(text) else Sidecar

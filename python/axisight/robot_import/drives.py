@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from axisight.documents import parse_toml
+from axisight.documents import parse_toml, read_text
 from axisight.errors import RobotError
 
 
@@ -78,7 +78,7 @@ class DriveData(_Strict):
 def read_drives(path: Path) -> DriveData:
     """Return the drive data of a TOML file; raises RobotError naming file and key."""
     try:
-        content = parse_toml(path.read_text("utf-8"))
+        content = parse_toml(read_text(path))
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f"{path}: expected a readable file of drive data: {error}") from error
     except ValueError as error:

@@ -91,11 +91,12 @@ def read_xml(path: Path) -> Element:
     type: entities are never expanded and nothing outside is read, so it says what it means itself.
     """
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise RobotError(f"{path}: expected at most {_MOST_BYTES // 1_000_000} MB")
-        text = path.read_bytes()
+        with path.open("rb") as file:
+            text = file.read(_MOST_BYTES + 1)
     except OSError as error:
         raise RobotError(f"{path}: expected a readable file: {error}") from error
+    if len(text) > _MOST_BYTES:
+        raise RobotError(f"{path}: expected at most {_MOST_BYTES // 1_000_000} MB")
     return parse_xml(text, str(path))
 
 
