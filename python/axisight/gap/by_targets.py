@@ -230,7 +230,7 @@ def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
             np.ascontiguousarray(x, np.float64)
             for x in (log.velocity_ref_rad_s, log.position_rad + off)
         )
-        out.append((reference, position, np.ones_like(position), log.start_rad))
+        out.append((reference, position, np.ones_like(position), log.start_rad, 0))
     return out
 
 

@@ -201,7 +201,7 @@ class _Inputs:
 
     def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
         """Return what is to be known of the logs."""
-        own_poses = any(log.start_rad is not None for log in self.estimation)
+        own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
         said = [
             "" if self.simulator is None else own_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
