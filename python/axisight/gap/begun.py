@@ -5,7 +5,7 @@ A simulation of the loop begins at rest. What a controller had summed up before 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.closed_loop import TRACKING_SPEED
-from axisight.gap.faults import Finding
+from axisight.gap.faults import Finding, flagged
+from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.in_motion import FORGOTTEN, RUN_UP_S, NotRunUpError, run_up_to
 from axisight.gap.noise import position_noise_std
 from axisight.logs import Log
@@ -47,14 +48,19 @@ class Begun:
 
 
 def from_rest(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], simulated: Sequence[Log]
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    simulated: Sequence[Log],
+    despite: Collection[str] = (),
 ) -> Begun:
     """Return logs along which the loop can be simulated, each from where it begins.
 
     Those that begin in motion are cut where they first stand. One that never does is cut where a simulation
     that is run up to its first motion has forgotten how it began, what is before it in its run-up; where
     that is not to be had of one, all are without references. ``simulated``: of the user's own simulator, one
-    for each log or none; they are cut alike. Unchanged where the loop is not simulated along the logs.
+    for each log or none; they are cut alike. ``despite`` as in `Settings`. Unchanged where the loop is not
+    simulated along the logs.
     """
     logs = [*estimation, *validation]
     given = Begun(list(estimation), list(validation), list(simulated))
@@ -72,7 +78,7 @@ def from_rest(
         # The commands along them are not known: refused where they are made.
         return given
     try:
-        parts = [_from_start(robot, log, s) for log, s in zip(logs, starts, strict=True)]
+        parts = [_from_start(robot, log, s, despite) for log, s in zip(logs, starts, strict=True)]
     except NotRunUpError as error:
         bare = [replace(log, velocity_ref_rad_s=None) for log in logs]
         never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
@@ -81,14 +87,17 @@ def from_rest(
     return _taken(given, parts)
 
 
-def _from_start(robot: Robot, log: Log, start_s: float | None) -> Log:
+def _from_start(robot: Robot, log: Log, start_s: float | None, despite: Collection[str]) -> Log:
     """Return a log from where it stands, at ``start_s``, or with a run-up where it never does.
 
-    Raises NotRunUpError.
+    Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
     """
-    if start_s is None:
-        return run_up_to(robot, robot.with_controller_speed(TRACKING_SPEED), log)
-    return log.part(start_s) if start_s else log
+    if start_s is not None:
+        return log.part(start_s) if start_s else log
+    for fault in flagged(check_log_alone(log), despite):
+        if fault.severity == "refuse":
+            raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
+    return run_up_to(robot, robot.with_controller_speed(TRACKING_SPEED), log)
 
 
 def _taken(given: Begun, parts: Sequence[Log]) -> Begun:

@@ -48,6 +48,9 @@ def run_up_to(robot: Robot, tracking: Robot, log: Log) -> Log:
     off the log is simulated with the run-up. Raises NotRunUpError where too little is left, a
     loop does not settle or the arm does not.
     """
+    signals = (log.led(name) for name in ("position_rad", "torque_nm", "velocity_ref_rad_s"))
+    if not all(np.isfinite(signal).all() for signal in signals):
+        raise NotRunUpError(f"{log.name}: signals that are not finite")
     position = _first(log.position_rad, log.sample_time_s, 2)[0]
     try:
         pose = start_of(robot, position)

@@ -221,7 +221,7 @@ def behind_gate(
 
     ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
     """
-    begun = from_rest(robot, estimation, validation, simulated)
+    begun = from_rest(robot, estimation, validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
     commanded = with_commands(robot, logs)
     if commanded is not None:
