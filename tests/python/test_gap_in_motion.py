@@ -79,7 +79,7 @@ def logs_in_motion(robot: Robot, effects: list[Effect]) -> list[Log]:
 
 
 def run_up(robot: Robot, log: Log) -> Log:
-    return run_up_to(robot, robot.with_controller_speed(TRACKING_SPEED), log)
+    return run_up_to(robot, (robot, robot.with_controller_speed(TRACKING_SPEED)), log)
 
 
 def test_the_slowest_mode_is_that_of_a_run() -> None:
@@ -213,7 +213,7 @@ def test_a_loop_that_does_not_settle_is_not_run_up_to() -> None:
     loose = robot.with_controller_speed(1e3)
     assert slowest_decay_1_s(loose, np.zeros(1)) < 0
     with pytest.raises(NotRunUpError, match="does not settle"):
-        run_up_to(robot, loose, log)
+        run_up_to(robot, (robot, loose), log)
 
 
 def test_the_users_own_simulation_is_cut_alike() -> None:

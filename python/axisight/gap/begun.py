@@ -17,7 +17,7 @@ from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.closed_loop import TRACKING_SPEED
 from axisight.gap.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
-from axisight.gap.in_motion import FORGOTTEN, RUN_UP_S, NotRunUpError, run_up_to
+from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -75,7 +75,7 @@ def from_rest(
         return given
     starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
     if targets and any(s is None for s in starts):
-        # The commands along them are not known: refused where they are made.
+        # The commands along them are not known yet: they are run up to where these are made, or refused.
         return given
     try:
         parts = [_from_start(robot, log, s, despite) for log, s in zip(logs, starts, strict=True)]
@@ -97,7 +97,7 @@ def _from_start(robot: Robot, log: Log, start_s: float | None, despite: Collecti
     for fault in flagged(check_log_alone(log), despite):
         if fault.severity == "refuse":
             raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
-    return run_up_to(robot, robot.with_controller_speed(TRACKING_SPEED), log)
+    return run_up_to(robot, (robot, robot.with_controller_speed(TRACKING_SPEED)), log)
 
 
 def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
@@ -163,16 +163,12 @@ def _speeds(log: Log, n: int) -> Array:
 
 
 def _from(log: Log, start_s: float) -> Finding:
-    expected = "expected a start at rest, where a simulation of the loop begins, got one in motion"
-    if log.run_up is None:
-        message = f"{expected}: taken from {start_s:.4g} s, where all axes first stand"
-    else:
-        message = (
-            f"{expected} and no rest of {_REST_S:g} s in the first half: simulated from an estimated beginning, "
-            f"run up from rest within {RUN_UP_S:g} s to the position, speed and reference measured there, and "
-            f"compared from {start_s:.4g} s, where the loop has forgotten all but {100 * FORGOTTEN:g} % of what "
-            f"is wrong of it"
-        )
+    if log.run_up is not None:
+        return begins_in_motion(log, start_s)
+    message = (
+        f"expected a start at rest, where a simulation of the loop begins, got one in motion: taken from "
+        f"{start_s:.4g} s, where all axes first stand"
+    )
     return Finding("begins_in_motion", "flag", message, log.name, None, "position")
 
 

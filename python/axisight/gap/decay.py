@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from axisight.gap.feedback import inertia_of_motors
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -17,18 +18,29 @@ _AT_ONCE = 1e-12
 def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
     """Return the rate [1/s] with which the slowest mode of the loop decays, at rest at a pose (n_axes,) [rad].
 
-    Not above zero where the loop does not settle. Linear, without delays and limits; the plant is
+    Not above zero where the loop does not settle. Linear, without delays and limits. The plant is
     propagated exactly from sample to sample (zero-order hold; Astrom and Wittenmark, *Computer-Controlled
-    Systems*, 1997, ch. 2).
+    Systems*, 1997, ch. 2); a law of targets, which may hold between samples, is taken as continuous.
     """
-    loop = _loop(robot, joint_angle_rad)
-    sizes = np.abs(scipy.linalg.eigvals(loop))
+    plant = robot.linearize(joint_angle_rad.tolist())
+    gains = robot.controller_gains
+    if "kd" in gains:
+        return float(-scipy.linalg.eigvals(_continuous(robot, *plant)).real.max())
+    sizes = np.abs(scipy.linalg.eigvals(_sampled(robot, *plant)))
     return float(-np.log(max(float(sizes.max()), _AT_ONCE)) / robot.sample_time_s)
 
 
-def _loop(robot: Robot, joint_angle_rad: Array) -> Array:
+def _continuous(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
+    """Return the rates of a plant whose motors are told their torque by position and speed."""
+    gains = robot.controller_gains
+    command = np.diag(gains["kp"]) @ outputs + np.diag(gains["kd"]) @ outputs @ states
+    if robot.computed_torque:
+        command = inertia_of_motors(robot) @ command
+    return np.asarray(states - inputs @ command)
+
+
+def _sampled(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
     """Return the transition of plant, last measured angles and sums of the controller over a sample."""
-    states, inputs, outputs = robot.linearize(joint_angle_rad.tolist())
     n, m = inputs.shape
     time = robot.sample_time_s
     both = np.block([[states, inputs], [np.zeros((m, n + m))]])
@@ -39,9 +51,7 @@ def _loop(robot: Robot, joint_angle_rad: Array) -> Array:
     angle = np.hstack([-outputs, none, none])
     sums = np.hstack([np.zeros((m, n + m)), one])
     kp, ki = gains["kp"], gains.get("ki", none)
-    if "kd" in gains:
-        command, summed = gains["kd"] @ speed + kp @ angle, none @ angle
-    elif "kv" in gains:
+    if "kv" in gains:
         error = speed + gains["kv"] @ angle
         command, summed = kp @ error + ki @ sums, sums + time * error
     else:

@@ -12,16 +12,20 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from axisight.gap.compared import Compared
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
 
-# Changes of an axis' reference: differences of neighbouring cubic B-splines, whose knots are so far apart [s]
-# and which end where the log begins. They make modes up to half the rate of the knots, and move no sum.
+# Changes of an axis' reference: differences of neighbouring cubic B-splines, whose knots are so far apart [s],
+# a sample at least, and which end where the log begins. They make modes up to half the rate of the knots, and
+# move no sum.
 _KNOT_S = 0.02
 _SHAPES = 10
+LEAST_SAMPLES = _SHAPES + 4
+"""Samples of a run-up that all changes find room in."""
 # Of the rms of the references, with which each is tried; and of the strongest combination, below which one is
 # left alone.
 _TRIED = 0.05
@@ -30,17 +34,23 @@ _STEPS = 2
 
 
 def with_first_state(
-    robot: Robot, log: Log, references: Array, start_rad: Array, seconds: float
+    robot: Robot,
+    log: Log,
+    references: Array,
+    start_rad: Array,
+    seconds: float,
+    compared: Compared = "torques",
 ) -> Array:
-    """Return references (m, n_axes) [rad/s] before a log that leave least of its torque over its first ``seconds``.
+    """Return references (m, n_axes) [rad/s] before a log that leave least of its first ``seconds``.
 
-    Gauss-Newton, by simulations with each change of ``references``, from rest at the joint angles ``start_rad``;
+    Of its torque or, without its mean, its position, as ``compared`` says. Gauss-Newton, by simulations with
+    each change of ``references``, from rest at the joint angles ``start_rad``;
     unchanged where nothing is gained.
     """
     n = round(seconds / log.sample_time_s)
 
     def missed(tried: Array) -> Array:
-        return _missed(robot, log, tried, start_rad, n)
+        return _missed(robot, log, tried, start_rad, n, compared)
 
     moves = _moves(log, len(references))
     best = references
@@ -72,13 +82,16 @@ def _moves(log: Log, lead: int) -> Array:
 def _shapes(lead: int, step_s: float) -> Array:
     """Return changes (n_shapes, lead) of equal size, up and down, just before a log."""
     before_s = step_s * (np.arange(lead) - lead)
+    knot_s = max(_KNOT_S, step_s)
     spline = scipy.interpolate.BSpline.basis_element(np.arange(-2.0, 3.0), extrapolate=False)
-    at = [np.nan_to_num(spline(before_s / _KNOT_S + 2 + i)) for i in range(_SHAPES + 1)]
+    at = [np.nan_to_num(spline(before_s / knot_s + 2 + i)) for i in range(_SHAPES + 1)]
     return np.asarray(np.diff(at, axis=0))
 
 
-def _missed(robot: Robot, log: Log, tried: Array, start_rad: Array, n: int) -> Array:
-    """Return what simulations are off the torque of the first ``n`` samples, relative to its rms (n_tried, ...).
+def _missed(
+    robot: Robot, log: Log, tried: Array, start_rad: Array, n: int, compared: Compared
+) -> Array:
+    """Return what simulations are off the first ``n`` samples of a log, relative to its rms (n_tried, ...).
 
     ``tried`` (n_tried, lead, n_axes) [rad/s]: references before those of the log.
     """
@@ -88,5 +101,12 @@ def _missed(robot: Robot, log: Log, tried: Array, start_rad: Array, n: int) -> A
     run = simulate_batch(
         robot, np.concatenate([tried, behind], axis=1), method="rk4", start_rad=start_rad
     )
-    off = run["torque_cmd_nm"].values[:, lead:] - log.torque_nm[:n]
-    return np.asarray((off / np.maximum(log.torque_nm.std(axis=0), 1e-300)).reshape(len(tried), -1))
+    if compared == "torques":
+        measured, off = log.torque_nm, run["torque_cmd_nm"].values[:, lead:] - log.torque_nm[:n]
+    else:
+        measured, off = (
+            log.position_rad,
+            run["position_rad"].values[:, lead:] - log.position_rad[:n],
+        )
+        off = off - off.mean(axis=1, keepdims=True)
+    return np.asarray((off / np.maximum(measured.std(axis=0), 1e-300)).reshape(len(tried), -1))

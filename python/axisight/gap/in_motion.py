@@ -7,15 +7,18 @@ from rest, smoothly, and the loop forgets what was different about the machine a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
+from axisight.gap.compared import Compared
 from axisight.gap.decay import slowest_decay_1_s
+from axisight.gap.faults import Finding
 from axisight.gap.feedback import before, feedback
-from axisight.gap.first_state import with_first_state
+from axisight.gap.first_state import LEAST_SAMPLES, with_first_state
 from axisight.gap.poses import start_of
 from axisight.logs import Log, RunUp
 from axisight.robot import Robot
@@ -23,11 +26,13 @@ from axisight.simulation import simulate
 
 Array = NDArray[np.float64]
 
-# Seconds in which a simulation comes from rest to the first motion of a log, and those over which that is
-# estimated, at least so many samples.
+# Seconds in which a simulation comes from rest to the first motion of a log (`LEAST_SAMPLES` at least), and
+# those over which that is estimated, at least so many samples.
 RUN_UP_S = 0.5
 _SEEN_S = 0.02
 _SEEN_SAMPLES = 8
+# Of a log whose samples are so many of the simulation, at least so many of its own.
+_SEEN_STEPS = 4
 # Share of what differs at the beginning that may be left where a comparison begins: that of the errors of
 # formulas in the torque (`Settings.model_error`).
 FORGOTTEN = 0.01
@@ -41,23 +46,26 @@ class NotRunUpError(InputError):
     """A log that begins in motion and that no simulation can be run up to; says why."""
 
 
-def run_up_to(robot: Robot, tracking: Robot, log: Log) -> Log:
+def run_up_to(
+    robot: Robot, loops: Sequence[Robot], log: Log, *, compared: Compared = "torques", step: int = 1
+) -> Log:
     """Return a log from where a simulation that is run up to its first motion has forgotten how it began.
 
-    ``tracking``: the robot with the loop that keeps it on a log. Both loops have to forget: what is cut
-    off the log is simulated with the run-up. Raises NotRunUpError where too little is left, a
-    loop does not settle or the arm does not.
+    ``loops``: the robot as it is simulated, with one controller or another: all have to forget; what is cut
+    off the log, a whole number of ``step`` samples, is simulated with the run-up. ``compared``: what the state
+    is estimated by. Raises NotRunUpError where too little is left, a loop does not settle or the arm does not.
     """
     signals = (log.led(name) for name in ("position_rad", "torque_nm", "velocity_ref_rad_s"))
     if not all(np.isfinite(signal).all() for signal in signals):
         raise NotRunUpError(f"{log.name}: signals that are not finite")
-    position = _first(log.position_rad, log.sample_time_s, 2)[0]
+    seen = max(_SEEN_SAMPLES, round(_SEEN_S / log.sample_time_s), _SEEN_STEPS * step)
+    position = _first(log.position_rad, log.sample_time_s, seen, 2)[0]
     try:
         pose = start_of(robot, position)
-        burn_s = _burn_in_s(log, min(slowest_decay_1_s(r, pose) for r in (robot, tracking)))
-        references = _references(log)
+        burn_s = _burn_in_s(log, min(slowest_decay_1_s(r, pose) for r in loops), step)
+        references = _references(log, seen)
         start_rad = _start_rad(robot, log, position, references, burn_s)
-        references = with_first_state(robot, log, references, start_rad, burn_s)
+        references = with_first_state(robot, log, references, start_rad, burn_s, compared)
         run_up = _run_up(robot, log, position, references, start_rad)
     except NotRunUpError:
         raise
@@ -66,14 +74,14 @@ def run_up_to(robot: Robot, tracking: Robot, log: Log) -> Log:
     return _behind(replace(log, run_up=run_up, start_rad=start_rad), burn_s)
 
 
-def _first(signal: Array, step_s: float, order: int) -> Array:
-    """Return the polynomial through the beginning of a signal (n, n_axes), (order + 1, n_axes), constant first."""
-    n = min(max(_SEEN_SAMPLES, round(_SEEN_S / step_s)), len(signal))
+def _first(signal: Array, step_s: float, seen: int, order: int) -> Array:
+    """Return the polynomial through the first ``seen`` samples of a signal, (order + 1, n_axes), constant first."""
+    n = min(seen, len(signal))
     return np.polynomial.polynomial.polyfit(step_s * np.arange(n), signal[:n], order)
 
 
-def _burn_in_s(log: Log, decay_1_s: float) -> float:
-    """Return after which time [s] of a log a loop has forgotten its beginning, a whole number of samples."""
+def _burn_in_s(log: Log, decay_1_s: float, step: int) -> float:
+    """Return after which time [s] of a log a loop has forgotten its beginning, in whole steps of samples."""
     if not decay_1_s > 0:
         raise NotRunUpError(f"{log.name}: the loop does not settle where the log begins")
     seconds = -np.log(FORGOTTEN) / decay_1_s
@@ -82,17 +90,18 @@ def _burn_in_s(log: Log, decay_1_s: float) -> float:
             f"{log.name}: the loop takes {seconds:.3g} s to forget how it began, more than half of "
             f"{log.duration_s:.3g} s"
         )
-    return float(np.ceil(seconds / log.sample_time_s) * log.sample_time_s)
+    whole = step * log.sample_time_s
+    return float(np.ceil(seconds / whole) * whole)
 
 
-def _references(log: Log) -> Array:
+def _references(log: Log, seen: int) -> Array:
     """Return references (m, n_axes) [rad/s] from rest to just before the first of a log: cubic in time."""
     assert log.velocity_ref_rad_s is not None  # closed loop only
-    m = round(RUN_UP_S / log.sample_time_s)
+    time = log.sample_time_s
+    m = max(round(RUN_UP_S / time), LEAST_SAMPLES)
     s = (np.arange(m) / m)[:, None]
-    rate = _first(log.velocity_ref_rad_s, log.sample_time_s, 1)[1]
-    first = log.velocity_ref_rad_s[0]
-    return np.asarray(first * s**2 * (3 - 2 * s) - rate * RUN_UP_S * s**2 * (1 - s))
+    first, rate = _first(log.velocity_ref_rad_s, time, seen, 1)
+    return np.asarray(first * s**2 * (3 - 2 * s) - rate * m * time * s**2 * (1 - s))
 
 
 def _start_rad(robot: Robot, log: Log, position: Array, references: Array, burn_s: float) -> Array:
@@ -112,11 +121,16 @@ def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array
     """Return by how much the controller's summed reference is ahead of the motors where a log begins (n_axes,) [rad].
 
     By its law: what is constant of the torque beyond that which holds the robot, or, of a cascade, what grows
-    with time. Zero where the law does not depend on it.
+    with time. Zero where the law does not depend on it. Targets are ahead of positions by what the log says,
+    but for what gravity makes constant of it.
     """
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
     gains = robot.controller_gains
+    if "kd" in gains:
+        assert log.position_ref_rad is not None  # a controller of targets
+        ahead = log.position_ref_rad - log.position_rad
+        return np.asarray(ahead[0] - ahead.mean(axis=0))
     ki = np.asarray(gains.get("ki", np.zeros(log.n_axes)))
     position = log.position_rad - log.position_rad[0]
     speed = np.gradient(position, time, axis=0)
@@ -145,7 +159,7 @@ def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_ra
         raise NotRunUpError(f"{log.name}: the simulator is unstable where the log begins")
     made = RunUp(position_rad=moved, torque_nm=torque, velocity_ref_rad_s=references)
     next_position = 2 * moved[-1] - moved[-2]
-    next_torque = _first(log.torque_nm, log.sample_time_s, 0)[0]
+    next_torque = log.torque_nm[:_SEEN_SAMPLES].mean(axis=0)
     return made.less(next_position - position, torque[-1] - next_torque)
 
 
@@ -159,3 +173,14 @@ def _behind(log: Log, burn_s: float) -> Log:
         velocity_ref_rad_s=log.led("velocity_ref_rad_s")[:n],
     )
     return replace(rest, run_up=run_up, start_rad=log.start_rad)
+
+
+def begins_in_motion(log: Log, start_s: float) -> Finding:
+    """Return what is to be said of a log with a run-up that is compared from ``start_s`` of what was logged."""
+    message = (
+        f"expected a start at rest, where a simulation of the loop begins, got one in motion, and no rest in the "
+        f"first half: simulated from an estimated beginning, run up from rest to the position, speed and "
+        f"reference measured there, and compared from {start_s:.4g} s, where the loop has forgotten all but "
+        f"{100 * FORGOTTEN:g} % of what is wrong of it"
+    )
+    return Finding("begins_in_motion", "flag", message, log.name, None, "position")

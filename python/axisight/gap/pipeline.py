@@ -223,19 +223,21 @@ def behind_gate(
     """
     begun = from_rest(robot, estimation, validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
+    found, beside = begun.findings, begun.simulated
     commanded = with_commands(robot, logs)
     if commanded is not None:
         logged = commanded.as_logged()
         noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:], despite)
         robot, logs = commanded.robot, list(commanded.logs)
+        found, beside = (*found, *commanded.findings()), commanded.taken(beside)
     else:
         logs = at_their_poses(robot, logs)
         noted = pass_gate(robot, logs[:n], logs[n:], despite)
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
-    noted, beside = (*begun.findings, *noted), tuple(begun.simulated)
+    noted = (*found, *noted)
     return _Inputs(
-        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=beside
+        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=tuple(beside)
     )
 
 
