@@ -195,11 +195,18 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
     return out
 
 
+# Beginning of a log with a run-up that does not count [s]. Weights mirror an error there: of a log that
+# begins at rest it is none, in motion it is noise in mid-course, and counts twice.
+_MIRRORED_S = 0.1
+
+
 def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
     """Return what a simulator that is kept on logs is compared with."""
     certain = certainties(tracking, logs, weighting)
     out = []
     for log, c in zip(logs, certain, strict=True):
+        if log.run_up is not None:
+            c[: round(_MIRRORED_S / log.sample_time_s)] = 0.0
         position, torque = (_contiguous(log.led(x)) for x in ("position_rad", "torque_nm"))
         out.append((position, torque, c, log.start_rad, log.lead))
     return out
