@@ -58,6 +58,14 @@ def test_few_stretches_that_agree_are_enough_and_one_is_not():
     assert amplitude_significance(viscous(one, one + noise), STRETCH) < 1
 
 
+def test_an_amplitude_that_no_stretch_tells_of_is_not_sure():
+    """Where its fit began it is left: no stretch moves it."""
+    nowhere = viscous(np.zeros(N_BLOCKS * BLOCK), in_stretches(6))
+    left = Effect("viscous_friction", 1, {"viscous_nm_s_rad": 1.0})
+    found = replace(nowhere, effects=(left,), free=(FreeEffect(left, ("viscous_nm_s_rad",)),))
+    assert amplitude_significance(found, STRETCH) == 0.0
+
+
 def test_false_alarms_are_as_rare_as_the_deviate_says():
     # 2,000 draws of noise alone: 2.3 % above 2, with a standard error of 0.33 %; the jackknife's
     # variance is on the large side, so fewer are allowed.

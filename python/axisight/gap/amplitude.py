@@ -34,6 +34,9 @@ def amplitude_significance(evidence: Evidence, stretch: NDArray[np.int64]) -> fl
     size = np.array([_change(evidence, i) for i in columns])
     moved = np.array([step_without(evidence, stretch == g)[columns] for g in groups])
     scatter = (len(groups) - 1) / len(groups) * moved.T @ moved
+    if np.any(np.diag(scatter) < 1e-300):
+        # No stretch tells of an amplitude that none moves.
+        return 0.0
     freedom = min(_freedom(evidence, stretch, columns), len(groups) - 1)
     left = freedom - len(columns) + 1
     # With fewer than two to spare, one stretch may be all there is.
