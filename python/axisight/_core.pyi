@@ -742,7 +742,7 @@ def fit_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -754,11 +754,12 @@ def fit_simulation(
 ) -> FitResult:
     """Fit a free-running simulation to logs.
 
-    ``records`` are (input, target, certainty, start), the first three of shape (n_samples, n_axes), one
+    ``records`` are (input, target, certainty, start, lead), the first three of shape (n_samples, n_axes), one
     per log: a velocity reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or
     measured motor position [rad], as ``input`` and ``output`` say; the certainty, from 0 to 1, is a
-    factor on the weighted error of its sample, None for one everywhere. Every log begins at rest, at
-    ``start`` (n_axes,) [rad], None for the operating point. ``weighting`` has one entry per axis.
+    factor on the weighted error of its sample, None for one everywhere. Every run begins at rest, at
+    ``start`` (n_axes,) [rad], None for the operating point; the first ``lead`` samples of input and target,
+    of which the certainty has none, are simulated and not compared. ``weighting`` has one entry per axis.
     ``warm`` gives Jacobian columns (n_residuals,) of nuisance parameters from an earlier fit, by
     parameter index (from 0).
     """
@@ -787,7 +788,7 @@ def evaluate_simulation(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,
@@ -806,7 +807,7 @@ def courses(
     robot: Robot,
     effects: _Effects,
     parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None]],
+    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
     weighting: Sequence[_Weighting],
     options: OptionSpec,
     *,

@@ -30,7 +30,7 @@ def record(robot: Robot) -> tuple[np.ndarray, np.ndarray, None, None]:
     time = np.arange(1500) * robot.sample_time_s
     reference = (5.0 * np.sin(2 * np.pi * 3.0 * time))[:, None]
     run = simulate(robot, reference, noise_seed=1)
-    return reference, run["torque_cmd_nm"].values, None, None
+    return reference, run["torque_cmd_nm"].values, None, None, 0
 
 
 def parameters(robot: Robot) -> list[Parameter]:
@@ -89,7 +89,7 @@ LOOP = Weighting(np.array([0.0, 20.0, 80.0]), np.array([[0.5, 2.0, 0.1]]), decim
 def test_certainty_is_a_factor_on_the_weighted_error_and_its_slopes(robot, record):
     certainty = np.linspace(0.0, 1.0, 1500)[:, None]
     whole = weighted(robot, record, LOOP)
-    part = weighted(robot, (*record[:2], certainty, None), LOOP)
+    part = weighted(robot, (*record[:2], certainty, None, 0), LOOP)
     kept = certainty[: 1500 // 7 * 7 : 7, 0]
     np.testing.assert_array_equal(part.residual, whole.residual * kept)
     np.testing.assert_array_equal(part.jacobian, whole.jacobian * kept)
@@ -113,7 +113,7 @@ def test_certainty_is_a_factor_on_the_weighted_error_of_a_predicted_torque(robot
 )
 def test_what_is_no_certainty_is_refused(robot, record, certainty):
     with pytest.raises(InputError, match="certainty: expected"):
-        weighted(robot, (*record[:2], certainty, None), LOOP)
+        weighted(robot, (*record[:2], certainty, None, 0), LOOP)
 
 
 @pytest.mark.parametrize("weighting", [LOOP, replace(LOOP, decimation=1)])

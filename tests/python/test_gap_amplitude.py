@@ -11,6 +11,7 @@ from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.by_axis import OwnAxes
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.howfar import Stage
+from axisight.gap.score import step_without as _step
 from gap_data import linear_evidence
 
 BLOCK = 20
@@ -56,6 +57,18 @@ def test_few_stretches_that_agree_are_enough_and_one_is_not():
     six, one = in_stretches(6), in_stretches(1)
     assert amplitude_significance(viscous(six, six + noise), STRETCH) > 5
     assert amplitude_significance(viscous(one, one + noise), STRETCH) < 1
+
+
+def test_an_amplitude_that_no_stretch_moves_is_left_out(monkeypatch):
+    """As one on a bound is: numbers next to one are held there, and no stretch tells of them."""
+    noise = 0.1 * np.random.default_rng(2).normal(size=N_BLOCKS * BLOCK)
+    column = in_stretches(8)
+    alone = viscous(column, column + noise)
+    want = amplitude_significance(alone, STRETCH)
+    monkeypatch.setattr(
+        "axisight.gap.amplitude.step_without", lambda found, inside: 0.0 * _step(found, inside)
+    )
+    assert want > 5 and amplitude_significance(alone, STRETCH) == 0.0
 
 
 def test_false_alarms_are_as_rare_as_the_deviate_says():

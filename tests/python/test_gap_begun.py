@@ -70,11 +70,12 @@ def test_the_users_own_simulation_is_cut_alike(machine_logs):
         assert log.n_samples < cut[0].n_samples
 
 
-def test_where_nothing_rests_torques_are_predicted_from_the_motion():
+def test_where_nothing_rests_and_too_little_is_left_torques_are_predicted_from_the_motion():
     machine = scattered(bare_axis(), 4)
     plan = {"one": ("multisine", 1), "two": ("multisine", 2), "three": ("multisine", 3)}
-    logs = [log.part(1.3) for log in logs_of(machine, [FRICTION], plan)]
+    logs = [log.part(1.3, 4.8) for log in logs_of(machine, [FRICTION], plan)]
     found = diagnose(robot=bare_axis(), estimation=logs[:2], validation=logs[2:], settings=QUICK)
     assert found.mode == "inverse_dynamics"
     (said,) = [f for f in found.findings if f.name == "begins_in_motion"]
     assert "one, two, three" in said.message
+    assert "takes 1.89 s to forget how it began, more than half of 3.5 s" in said.message

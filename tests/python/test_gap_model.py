@@ -404,7 +404,9 @@ def test_the_beginnings_of_logs_screen_as_the_whole():
     # Short logs are not cut.
     assert view.fitter.part([0]).begun(whole.part([0])) is not None
     short = copy(view.fitter)
-    short.records = [(p[:8000], t[:8000], c[:8000], at) for p, t, c, at in view.fitter.records]
+    short.records = [
+        (p[:8000], t[:8000], c[:8000], *begun) for p, t, c, *begun in view.fitter.records
+    ]
     assert short.begun(whole) is None
 
 

@@ -114,15 +114,17 @@ def test_residuals_are_those_of_a_robot_that_starts_there(robot: Robot) -> None:
         ref = reference(robot, i, 0.5)
         records.append((ref, simulate(at, ref, method="rk4")["torque_cmd_nm"].values * 1.01, None))
 
-    def residual(machine: Robot, which: list[tuple[Array, Array, None, Array | None]]) -> Array:
+    def residual(
+        machine: Robot, which: list[tuple[Array, Array, None, Array | None, int]]
+    ) -> Array:
         at = _core.evaluate_simulation(
             machine.core, core_effects([]), specs, which, flat, FitOptions(block_s=0.1)
         )
         return np.concatenate([at.residual, at.jacobian.ravel()])
 
-    both = residual(robot, [(*r, pose) for r, pose in zip(records, POSES, strict=False)])
+    both = residual(robot, [(*r, pose, 0) for r, pose in zip(records, POSES, strict=False)])
     first, second = (
-        residual(robot.with_operating_point(pose), [(*r, None)])
+        residual(robot.with_operating_point(pose), [(*r, None, 0)])
         for r, pose in zip(records, POSES, strict=False)
     )
     n = len(first) // 2

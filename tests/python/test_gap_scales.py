@@ -105,7 +105,7 @@ def test_a_simulator_that_cannot_follow_as_it_is_does_not_end_a_diagnosis(small:
     base = view.fitter.fit([])
     logs = view.fitter.records
     # Angles as of a loop that swings up without end.
-    wild = [(p * 1e9 * np.arange(len(p))[:, None] ** 2, t, c, at) for p, t, c, at in logs]
+    wild = [(p * 1e9 * np.arange(len(p))[:, None] ** 2, t, c, *at) for p, t, c, *at in logs]
     bench = Bench(view.fitter.along(wild), base)
     bench.begin_nominal()
     assert bench.near_nominal is None

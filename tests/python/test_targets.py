@@ -186,6 +186,33 @@ def test_slow_logs_of_a_complete_simulator_name_nothing(tmp_path: Path) -> None:
     assert not found.findings
 
 
+@pytest.mark.parametrize("lacks", ["coulomb_friction@2", "payload", None])
+def test_logs_that_begin_in_motion_are_run_up_to(robot: Robot, lacks: str | None) -> None:
+    """Cut where all axes move: named as from rest, of the same size."""
+    machine = NOMINAL if lacks is None else MACHINES[lacks]
+    logs = [machine.log(run).part(6.5) for run in (1, 2, 3)]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    assert found.verdict == ("none" if lacks is None else "explained")
+    assert [c.effect for c in found.causes] == ([lacks.split("@")[0]] if lacks else [])
+    for cause, name, value in zip(found.causes, NAMES[lacks], VALUES[lacks], strict=True):
+        assert cause.parameters[name].value == pytest.approx(value, rel=0.05)
+    assert [f.name for f in found.findings] == ["begins_in_motion"] * 3
+    assert "run up from rest" in found.findings[0].message
+    # One that begins at rest beside it has no run-up.
+    told = with_commands(robot, [machine.log(1), logs[1]])
+    assert told is not None and told.logs[0].run_up is None and told.logs[1].run_up is not None
+    whole, cut = told.from_s
+    assert whole == 0.0 < cut and told.logs[1].lead > round(cut / robot.sample_time_s)
+    assert [log.run_up for log in told.as_logged()] == [None, None]
+    own = told.taken([machine.log(1), logs[1]])
+    assert [x.n_samples for x in own] == [x.n_samples for x in told.as_logged()]
+    assert told.of(own)[1].run_up is told.logs[1].run_up
+
+
+NAMES = {"coulomb_friction@2": ["coulomb_nm"], "payload": ["mass_kg"], None: []}
+VALUES = {"coulomb_friction@2": [2.5], "payload": [0.8], None: []}
+
+
 def test_positions_between_samples_lie_on_a_cubic() -> None:
     k = np.arange(12.0)
     fine = np.arange(0, 11.01, 0.25)
@@ -204,9 +231,9 @@ def test_logs_that_tell_no_command_are_refused(robot: Robot) -> None:
         with_commands(robot, [good, log_of(still(), None, time, "bare")])
     with pytest.raises(InputError, match="multiple of the controller's"):
         with_commands(robot, [log_of(still(), still(), 0.003)])
-    moving = still() + 0.1 * time * np.arange(100)[:, None]
-    with pytest.raises(InputError, match=r"at rest.*--from"):
-        with_commands(robot, [log_of(moving, still(), time)])
+    moving = still(60) + 0.1 * time * np.arange(60)[:, None]
+    with pytest.raises(InputError, match=r"at rest.*takes .* s to forget.*--from"):
+        with_commands(robot, [log_of(moving, still(60), time)])
     with pytest.raises(InputError, match="in all logs or in none"):
         with_commands(robot, [good, replace(good, torque_nm=np.zeros((100, 3)))])
     with pytest.raises(InputError, match="pd_position"):

@@ -171,13 +171,14 @@ fn linearize<P: Problem + Send>(
     })
 }
 
-/// Input, target and certainty of a record, arrays `(n, n_axes)`, and driven joint angles where it
-/// begins.
+/// Input, target and certainty of a record, arrays `(n, n_axes)`, driven joint angles where it begins,
+/// and how many samples of input and target lead to what is compared.
 type RecordTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     Option<PyReadonlyArray2<'py, f64>>,
     Option<Vec<f64>>,
+    usize,
 );
 
 /// What an error of simulation is made of, as Python hands it over.
@@ -204,13 +205,14 @@ impl SimulationSpec<'_, '_> {
     fn problem(self, cancel: &Arc<AtomicBool>) -> PyResult<SimulationErrorProblem> {
         let (robot, options) = (&self.robot.description, self.options);
         let n_axes = robot.n_axes();
-        let record = |(i, t, c, start): &RecordTuple<'_>| {
+        let record = |(i, t, c, start, lead): &RecordTuple<'_>| {
             let certainty = c.as_ref().map(|c| rows(c, "certainty", n_axes));
             Ok(Record {
                 input: rows(i, "input", n_axes)?,
                 target: rows(t, "target", n_axes)?,
                 certainty: certainty.transpose()?,
                 start: start.clone(),
+                lead: *lead,
             })
         };
         let problem = SimulationErrorProblem {
@@ -246,7 +248,8 @@ impl SimulationSpec<'_, '_> {
     }
 }
 
-/// Fit the simulation of logs. `records` are (input, target, certainty or None) of `(n, n_axes)` arrays.
+/// Fit the simulation of logs. `records` are (input, target, certainty or None) of `(n, n_axes)` arrays,
+/// where each starts, and its lead.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding

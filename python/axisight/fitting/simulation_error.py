@@ -297,8 +297,10 @@ def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
     )
 
 
-def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, None, Array | None]]:
-    """Return (input, target, no certainty, start) of logs, in closed loop or driven by torque."""
+def records(
+    logs: Sequence[Log], *, closed: bool
+) -> list[tuple[Array, Array, None, Array | None, int]]:
+    """Return (input, target, no certainty, start, lead) of logs, in closed loop or driven by torque."""
     out = []
     for log in logs:
         reference = log.velocity_ref_rad_s
@@ -306,9 +308,12 @@ def records(logs: Sequence[Log], *, closed: bool) -> list[tuple[Array, Array, No
             raise InputError(
                 f"log {log.name!r}: expected velocity references for a closed-loop fit"
             )
-        pair = (reference, log.torque_nm) if closed else (log.torque_nm, log.position_rad)
+        torque = log.led("torque_nm")
+        pair = (
+            (log.led("velocity_ref_rad_s"), torque) if closed else (torque, log.led("position_rad"))
+        )
         first, second = (np.ascontiguousarray(x, dtype=np.float64) for x in pair)
-        out.append((first, second, None, log.start_rad))
+        out.append((first, second, None, log.start_rad, log.lead))
     return out
 
 

@@ -31,8 +31,13 @@ def amplitude_significance(evidence: Evidence, stretch: NDArray[np.int64]) -> fl
     groups = np.unique(stretch)
     if not columns or len(groups) < 2:
         return 0.0
-    size = np.array([_change(evidence, i) for i in columns])
     moved = np.array([step_without(evidence, stretch == g)[columns] for g in groups])
+    # One that no stretch moves is held next to a bound, as those on one are left out.
+    free = np.any(moved != 0.0, axis=0)
+    if not free.any():
+        return 0.0
+    columns, moved = [i for i, moves in zip(columns, free, strict=True) if moves], moved[:, free]
+    size = np.array([_change(evidence, i) for i in columns])
     scatter = (len(groups) - 1) / len(groups) * moved.T @ moved
     freedom = min(_freedom(evidence, stretch, columns), len(groups) - 1)
     left = freedom - len(columns) + 1

@@ -1,11 +1,11 @@
-"""Logs of a loop that begin in motion: taken from where they stand, or without their references.
+"""Logs of a loop that begin in motion: taken from where they stand, run up to, or without their references.
 
 A simulation of the loop begins at rest. What a controller had summed up before a log is in no log.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
-from axisight.gap.faults import Finding
+from axisight.gap.closed_loop import TRACKING_SPEED
+from axisight.gap.faults import Finding, flagged
+from axisight.gap.gate.log_only import check_log_alone
+from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -45,12 +48,19 @@ class Begun:
 
 
 def from_rest(
-    robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], simulated: Sequence[Log]
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    simulated: Sequence[Log],
+    despite: Collection[str] = (),
 ) -> Begun:
-    """Return logs that begin at rest, cut where they first stand; where one never does, all without references.
+    """Return logs along which the loop can be simulated, each from where it begins.
 
-    ``simulated``: of the user's own simulator, one for each log or none; they are cut alike. Unchanged
-    where the loop is not simulated along the logs.
+    Those that begin in motion are cut where they first stand. One that never does is cut where a simulation
+    that is run up to its first motion has forgotten how it began, what is before it in its run-up; where
+    that is not to be had of one, all are without references. ``simulated``: of the user's own simulator, one
+    for each log or none; they are cut alike. ``despite`` as in `Settings`. Unchanged where the loop is not
+    simulated along the logs.
     """
     logs = [*estimation, *validation]
     given = Begun(list(estimation), list(validation), list(simulated))
@@ -65,26 +75,50 @@ def from_rest(
         return given
     starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
     if targets and any(s is None for s in starts):
-        # The commands along them are not known: refused where they are made.
+        # The commands along them are not known yet: they are run up to where these are made, or refused.
         return given
-    never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
-    if never:
+    try:
+        parts = [_from_start(robot, log, s, despite) for log, s in zip(logs, starts, strict=True)]
+    except NotRunUpError as error:
         bare = [replace(log, velocity_ref_rad_s=None) for log in logs]
+        never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
         n = len(estimation)
-        return Begun(bare[:n], bare[n:], list(simulated), (_without_references(never),))
-    return _cut(given, [0.0 if s is None else s for s in starts])
+        return Begun(bare[:n], bare[n:], list(simulated), (_without_references(never, error),))
+    return _taken(given, parts)
 
 
-def _cut(given: Begun, starts: Sequence[float]) -> Begun:
+def _from_start(robot: Robot, log: Log, start_s: float | None, despite: Collection[str]) -> Log:
+    """Return a log from where it stands, at ``start_s``, or with a run-up where it never does.
+
+    Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
+    """
+    if start_s is not None:
+        return log.part(start_s) if start_s else log
+    for fault in flagged(check_log_alone(log), despite):
+        if fault.severity == "refuse":
+            raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
+    return run_up_to(robot, (robot, robot.with_controller_speed(TRACKING_SPEED)), log)
+
+
+def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
+    """Return the parts in the place of their logs, and what is to be said of them."""
     logs = [*given.estimation, *given.validation]
-    paired = len(given.simulated) == len(logs)
-    parts = [log.part(s) if s else log for log, s in zip(logs, starts, strict=True)]
     sims = given.simulated
-    if paired:
-        sims = [log.part(s) if s else log for log, s in zip(sims, starts, strict=True)]
-    said = tuple(_from(log, s) for log, s in zip(logs, starts, strict=True) if s)
+    if len(sims) == len(logs):
+        pairs = zip(sims, logs, parts, strict=True)
+        sims = [sim if part is log else sim.part(_first_s(log, part)) for sim, log, part in pairs]
+    said = tuple(
+        _from(part, _first_s(log, part))
+        for log, part in zip(logs, parts, strict=True)
+        if part is not log
+    )
     n = len(given.estimation)
-    return Begun(parts[:n], parts[n:], sims, said)
+    return Begun(list(parts[:n]), list(parts[n:]), sims, said)
+
+
+def _first_s(log: Log, part: Log) -> float:
+    """Return where [s] in a log its last part begins."""
+    return (log.n_samples - part.n_samples) * log.sample_time_s
 
 
 def begins_at_rest(log: Log, noise_std: float) -> bool:
@@ -129,6 +163,8 @@ def _speeds(log: Log, n: int) -> Array:
 
 
 def _from(log: Log, start_s: float) -> Finding:
+    if log.run_up is not None:
+        return begins_in_motion(log, start_s)
     message = (
         f"expected a start at rest, where a simulation of the loop begins, got one in motion: taken from "
         f"{start_s:.4g} s, where all axes first stand"
@@ -136,10 +172,11 @@ def _from(log: Log, start_s: float) -> Finding:
     return Finding("begins_in_motion", "flag", message, log.name, None, "position")
 
 
-def _without_references(names: Sequence[str]) -> Finding:
+def _without_references(names: Sequence[str], why: NotRunUpError) -> Finding:
     message = (
-        f"expected starts at rest, where a simulation of the loop begins, got starts in motion and "
-        f"no rest of {_REST_S:g} s in the first half of {', '.join(names)}: torques are predicted from the "
-        f"measured motion instead, without the references; log from rest, or leave these logs out"
+        f"expected starts at rest, where a simulation of the loop begins, got starts in motion, "
+        f"no rest of {_REST_S:g} s in the first half of {', '.join(names)}, and no beginning to simulate from "
+        f"({why}): torques are predicted from the measured motion instead, without the references; log from "
+        f"rest, log longer, or leave these logs out"
     )
     return Finding("begins_in_motion", "flag", message, names[0], None, "position")

@@ -30,7 +30,8 @@ def look_beside(robot: Robot, log: Log) -> Beside:
     """
     commanded = with_commands(robot, [log])
     if commanded is not None:
-        findings = check_by_targets(commanded.robot, commanded.as_logged(), [])
+        alone = check_by_targets(commanded.robot, commanded.as_logged(), [])
+        findings = (*commanded.findings(), *alone)
         compared = what_is_compared(log.sample_rate_hz)
     else:
         begun = from_rest(robot, [log], [], [])

@@ -225,12 +225,15 @@ def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
     """
     out = []
     for log, off in zip(logs, between, strict=True):
-        assert log.velocity_ref_rad_s is not None  # logs with commands have them
+        before = np.zeros((log.lead, log.n_axes))
         reference, position = (
             np.ascontiguousarray(x, np.float64)
-            for x in (log.velocity_ref_rad_s, log.position_rad + off)
+            for x in (
+                log.led("velocity_ref_rad_s"),
+                log.led("position_rad") + np.concatenate([before, off]),
+            )
         )
-        out.append((reference, position, np.ones_like(position), log.start_rad))
+        out.append((reference, position, np.ones_like(off), log.start_rad, log.lead))
     return out
 
 

@@ -44,9 +44,9 @@ Complex = NDArray[np.complex128]
 # the log by more than waves of a ripple are long.
 TRACKING_SPEED = 1 / 3
 
-# Position [rad], torque [Nm] and certainty of a log, (n, n_axes), and the joint angles where it
-# begins [rad], (n_axes,); None at the operating point.
-Record = tuple[Array, Array, Array, Array | None]
+# Position [rad] and torque [Nm] of a log (lead + n, n_axes), its certainty (n, n_axes), the joint angles
+# where its run begins [rad], (n_axes,), None at the operating point, and how many samples lead to it.
+Record = tuple[Array, Array, Array, Array | None, int]
 # Robot, effects, parameters, records and weights, as the core takes them.
 _Problem = tuple[
     _core.Robot,
@@ -195,13 +195,21 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
     return out
 
 
+# Beginning of a log with a run-up that does not count [s]. Weights mirror an error there: of a log that
+# begins at rest it is none, in motion it is noise in mid-course, and counts twice.
+_MIRRORED_S = 0.1
+
+
 def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
     """Return what a simulator that is kept on logs is compared with."""
     certain = certainties(tracking, logs, weighting)
-    return [
-        (_contiguous(log.position_rad), _contiguous(log.torque_nm), c, log.start_rad)
-        for log, c in zip(logs, certain, strict=True)
-    ]
+    out = []
+    for log, c in zip(logs, certain, strict=True):
+        if log.run_up is not None:
+            c[: round(_MIRRORED_S / log.sample_time_s)] = 0.0
+        position, torque = (_contiguous(log.led(x)) for x in ("position_rad", "torque_nm"))
+        out.append((position, torque, c, log.start_rad, log.lead))
+    return out
 
 
 # Seconds that a log is not cut below.
@@ -216,7 +224,7 @@ class ClosedLoopFitter(ModelFitter):
     log, without which lost motion and stiction have no smooth error to fit. The controller is
     that of ``robot``, which need not be the machine's.
     ``records``: position [rad] and torque [Nm] of each log, and how far a simulator can be asked to
-    follow it, (n, n_axes), and where it begins.
+    follow it, (n, n_axes), where its run begins, and how many samples lead to it.
     """
 
     driven_by: ClassVar[Literal["tracking", "reference"]] = "tracking"
@@ -246,7 +254,7 @@ class ClosedLoopFitter(ModelFitter):
 
     def _counted_by_log(self) -> list[Array]:
         step = self.weighting.decimation
-        return [c[: len(c) // step * step : step] ** 2 for _, _, c, _ in self.records]
+        return [c[: len(c) // step * step : step] ** 2 for _, _, c, _, _ in self.records]
 
     def along(self, records: list[Record]) -> ClosedLoopFitter:
         """Return the same for other runs, as ``records`` are."""
@@ -256,13 +264,13 @@ class ClosedLoopFitter(ModelFitter):
 
     def beginnings(self) -> ModelFitter | None:
         """Return the same for the first halves of the logs, if they are long enough."""
-        halves = [len(p) // 2 for p, *_ in self.records]
+        halves = [len(c) // 2 for _, _, c, _, _ in self.records]
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None
         return self.along(
             [
-                (p[:n], t[:n], c[:n], start)
-                for n, (p, t, c, start) in zip(halves, self.records, strict=True)
+                (p[: lead + n], t[: lead + n], c[:n], start, lead)
+                for n, (p, t, c, start, lead) in zip(halves, self.records, strict=True)
             ]
         )
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.frf.errors import reference_to_input
+from axisight.logs import Log
 from axisight.logs.frozen import runs
 from axisight.robot import Robot
 
@@ -21,6 +22,22 @@ _FLAT_SAMPLES = 3
 def before(x: Array) -> Array:
     """Return the sum over all earlier samples (n, ...)."""
     return np.asarray(np.cumsum(x, axis=0) - x)
+
+
+def as_taken(log: Log) -> tuple[Array, Array]:
+    """Return positions of motors [rad] and their speeds [rad/s] as a controller takes them, (n, n_axes) each.
+
+    Positions are counted from where its summed reference is at the first sample. Of a log that begins at
+    rest that is the first position, and the first speed is none.
+    """
+    position = log.position_rad - log.position_rad[0]
+    ahead, last = 0.0, position[:1]
+    if log.run_up is not None:
+        told = log.run_up.velocity_ref_rad_s.sum(axis=0) * log.sample_time_s
+        ahead = told - (log.position_rad[0] - log.run_up.position_rad[0])
+        last = log.run_up.position_rad[-1:] - log.position_rad[0]
+    speed = np.diff(position, axis=0, prepend=last) / log.sample_time_s
+    return position - ahead, np.asarray(speed)
 
 
 def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.effects.stated import TORQUE_LIMIT
-from axisight.gap.feedback import before, feedback
+from axisight.gap.feedback import as_taken, before, feedback
 from axisight.gap.result import Interval
 from axisight.gap.shown import ShownCause
 from axisight.logs import Log
@@ -72,8 +72,7 @@ def _command(robot: Robot, log: Log) -> Array:
     """Return what the controller commands before any limit, but for a constant, (n, n_axes) [Nm]."""
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
-    position = log.position_rad - log.position_rad[0]
-    speed = np.diff(position, axis=0, prepend=position[:1]) / time
+    position, speed = as_taken(log)
     return feedback(robot, reference - speed, before(reference) * time - position)
 
 

@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.effects.stated import CLOCK, FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
-from axisight.gap.feedback import before, free_of_limits, gain_shares
+from axisight.gap.feedback import as_taken, before, free_of_limits, gain_shares
 from axisight.gap.own_clock import drifting_clock
 from axisight.gap.result import Interval
 from axisight.gap.shown import ShownCause
@@ -52,8 +52,8 @@ class _Piece:
         self._robot, self._axis, self._time = robot, axis, time
         self._band_hz = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
         self._reference = reference[:, axis]
-        position = log.position_rad[:, axis] - log.position_rad[0, axis]
-        self._speed = np.diff(position, prepend=position[:1]) / time
+        position, speed = (x[:, axis] for x in as_taken(log))
+        self._speed = speed
         self._angle = before(self._reference) * time - position
         torque = np.ascontiguousarray(log.torque_nm[:, axis])
         period = int(1.0 / (self._band_hz * time))

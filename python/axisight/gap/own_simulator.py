@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ def _paired(log: Log, own: Log) -> Log:
             f"{field}: expected a sample time of {log.sample_time_s:g} s as in log {log.name!r}, "
             f"got {own.sample_time_s:g} s"
         )
-    given = {}
+    given: dict[str, Any] = {}
     for name in ("velocity_ref_rad_s", "position_ref_rad"):
         real, mine = getattr(log, name), getattr(own, name)
         if real is not None and mine is not None:
@@ -103,7 +104,8 @@ def _paired(log: Log, own: Log) -> Log:
                     f"{axis + 1} (by up to {off[axis]:.3g} {'rad/s' if 'velocity' in name else 'rad'})"
                 )
         given[name] = real
-    return replace(own, **given, sample_time_s=log.sample_time_s, start_rad=log.start_rad)
+    given |= {"start_rad": log.start_rad, "run_up": log.run_up}
+    return replace(own, **given, sample_time_s=log.sample_time_s)
 
 
 @dataclass(frozen=True)
@@ -124,10 +126,17 @@ class Difference:
         To first order of the difference, for the loop of the machine answers to both.
         """
         each = zip(logs, self.torques_nm, self.positions_rad, strict=True)
-        return [
-            replace(log, torque_nm=log.torque_nm - u, position_rad=log.position_rad - x)
-            for log, u, x in each
-        ]
+        return [_less(log, u, x) for log, u, x in each]
+
+
+def _less(log: Log, torque_nm: Array, position_rad: Array) -> Log:
+    run_up = None if log.run_up is None else log.run_up.less(position_rad[0], torque_nm[0])
+    return replace(
+        log,
+        torque_nm=log.torque_nm - torque_nm,
+        position_rad=log.position_rad - position_rad,
+        run_up=run_up,
+    )
 
 
 def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:

@@ -201,7 +201,7 @@ class _Inputs:
 
     def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
         """Return what is to be known of the logs."""
-        own_poses = any(log.start_rad is not None for log in self.estimation)
+        own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
         said = [
             "" if self.simulator is None else own_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
@@ -221,21 +221,23 @@ def behind_gate(
 
     ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
     """
-    begun = from_rest(robot, estimation, validation, simulated)
+    begun = from_rest(robot, estimation, validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
+    found, beside = begun.findings, begun.simulated
     commanded = with_commands(robot, logs)
     if commanded is not None:
         logged = commanded.as_logged()
         noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:], despite)
         robot, logs = commanded.robot, list(commanded.logs)
+        found, beside = (*found, *commanded.findings()), commanded.taken(beside)
     else:
         logs = at_their_poses(robot, logs)
         noted = pass_gate(robot, logs[:n], logs[n:], despite)
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
-    noted, beside = (*begun.findings, *noted), tuple(begun.simulated)
+    noted = (*found, *noted)
     return _Inputs(
-        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=beside
+        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=tuple(beside)
     )
 
 

@@ -28,16 +28,21 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
 
     Logs that all begin at one pose are returned as they are: beside the operating point that is a
     finding; so are those of a robot without a controller, which is not simulated along them. Positions
-    are those of motors at rest.
+    are those of motors at rest. One with a run-up has its own.
     """
     if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
         # Logs of another robot are refused, by name, where all faults are looked for.
         return list(logs)
-    begins = np.array([log.position_rad[0] for log in logs])
-    apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio)
+    begins = np.array([log.position_rad[0] for log in logs if log.run_up is None])
+    apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if len(begins) else np.zeros(1)
     if not np.any(apart > OFFSET_RAD):
         return list(logs)
-    return [replace(log, start_rad=start_of(robot, log.position_rad[0])) for log in logs]
+    return [
+        log
+        if log.run_up is not None
+        else replace(log, start_rad=start_of(robot, log.position_rad[0]))
+        for log in logs
+    ]
 
 
 def start_of(robot: Robot, position_rad: Array) -> Array:

@@ -42,8 +42,8 @@ def simulated_positions(
 def simulated_run(robot: Robot, variant: Variant, log: Log) -> tuple[Array, Array]:
     """Return torque [Nm] and motor position [rad] of one run along a log's references, (n, n_axes) each."""
     changed = robot.with_parameters(variant.robot_values)
-    out = _runs(changed, [log], 1, variant.effects)
-    return out["torque_cmd_nm"].values[0], out["position_rad"].values[0]
+    out, lead = _runs(changed, [log], 1, variant.effects), log.lead
+    return out["torque_cmd_nm"].values[0, lead:], out["position_rad"].values[0, lead:]
 
 
 def _along(
@@ -57,7 +57,7 @@ def _along(
 ) -> list[Array]:
     """Return a signal along the references of logs, which may differ in length."""
     values = _runs(robot, logs, threads, effects, noise)[signal].values
-    return [values[i, : log.n_samples] for i, log in enumerate(logs)]
+    return [values[i, log.lead : log.lead + log.n_samples] for i, log in enumerate(logs)]
 
 
 def _runs(
@@ -67,7 +67,7 @@ def _runs(
     effects: Sequence[Effect],
     noise: Sequence[Array] | None = None,
 ) -> xr.Dataset:
-    """Return all signals along the references of logs, one run for each."""
+    """Return all signals along the references of logs, one run for each, what leads to them first."""
     return simulate_batch(
         robot,
         _padded([_reference(log) for log in logs]),
@@ -88,7 +88,7 @@ def _padded(rows: Sequence[Array]) -> Array:
 def _reference(log: Log) -> Array:
     if log.velocity_ref_rad_s is None:
         raise InputError(f"log {log.name!r}: expected velocity references")
-    return log.velocity_ref_rad_s
+    return log.led("velocity_ref_rad_s")
 
 
 def noise_torques(
@@ -106,7 +106,7 @@ def noise_torques(
     ``step_rad`` (n_axes,): what positions with the noise are rounded to, zero where they are not.
     """
     noise = [
-        white_noise(seed, first_run + i, log.n_samples, robot.n_axes) * std_rad
+        white_noise(seed, first_run + i, log.lead + log.n_samples, robot.n_axes) * std_rad
         for i, log in enumerate(logs)
     ]
     if step_rad is not None and step_rad.any():

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from axisight.errors import InputError
+from axisight.gap.faults import Finding
 from axisight.gap.feedback import feedback, rotors
+from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
 from axisight.gap.poses import at_their_poses
 from axisight.logs import Log
@@ -36,21 +38,36 @@ class Commanded:
 
     ``robot``: at rest where the logs begin, its controller with the references that they have;
     ``step``: samples of the controller per sample that was logged; ``short_of_inertia``: axes (from 1)
-    of which the simulator's steps take more inertia than the motor has.
+    of which the simulator's steps take more inertia than the motor has; ``from_s``: where each log is
+    taken from, not zero of one that begins in motion, which has a run-up.
     """
 
     robot: Robot
     logs: tuple[Log, ...]
     step: int
     short_of_inertia: tuple[int, ...] = ()
+    from_s: tuple[float, ...] = ()
 
     def as_logged(self) -> list[Log]:
         """Return the logs at their own rate."""
         return [_every(log, self.step) for log in self.logs]
 
     def of(self, logs: Sequence[Log]) -> list[Log]:
-        """Return other logs of the logs' own rate as these are."""
-        return [_commanded(self.robot, log, self.step) for log in logs]
+        """Return other logs of the logs' own rate, one for each, as these are."""
+        told = [_commanded(self.robot, log, self.step) for log in logs]
+        return [replace(log, run_up=own.run_up) for log, own in zip(told, self.logs, strict=True)]
+
+    def taken(self, logs: Sequence[Log]) -> list[Log]:
+        """Return other logs, one for each, from where these are taken; as they are where there are not as many."""
+        if len(logs) != len(self.from_s):
+            return list(logs)
+        pairs = zip(logs, self.from_s, strict=True)
+        return [log.part(start_s) if start_s else log for log, start_s in pairs]
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what is to be said of logs that begin in motion."""
+        pairs = zip(self.logs, self.from_s, strict=True)
+        return tuple(begins_in_motion(log, start_s) for log, start_s in pairs if start_s)
 
     def along(self, logs: Sequence[Log]) -> Commanded:
         """Return the same along the positions of other logs at the controller's rate, where they were logged."""
@@ -75,7 +92,7 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
 
     Raises InputError where only some logs have torque, where the robot has no controller of targets or a
     log no targets, for sample times that are no multiple of the controller's, and for logs that
-    begin in motion.
+    begin in motion and that no simulation can be run up to.
     """
     if all(log.has_torque for log in logs):
         return None
@@ -89,8 +106,30 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     at_start = robot.with_operating_point(start * robot.gear_ratio)
     machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
     begun = at_their_poses(machine, logs)
-    told = tuple(_commanded(machine, log, step) for log in begun)
-    return Commanded(machine, told, step, tuple(short_of_inertia(robot)))
+    whole = [_commanded(machine, log, step) for log in begun]
+    told = [_from_start(machine, fine, log, step) for fine, log in zip(whole, logs, strict=True)]
+    from_s = [
+        (a.n_samples - b.n_samples) * a.sample_time_s for a, b in zip(whole, told, strict=True)
+    ]
+    return Commanded(machine, tuple(told), step, tuple(short_of_inertia(robot)), tuple(from_s))
+
+
+def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
+    """Return a log with commands as it is, or with a run-up where it begins in motion.
+
+    Raises InputError for one that no simulation can be run up to.
+    """
+    moving = _moving(log)
+    if not moving.any():
+        return told
+    try:
+        return run_up_to(machine, (machine,), told, compared="positions", step=step)
+    except NotRunUpError as error:
+        axis = int(np.flatnonzero(moving)[0])
+        raise InputError(
+            f"log {log.name!r}: expected a start at rest, or one to simulate from, got axis {axis + 1} in motion "
+            f"({error}): cut it with --from, or log longer"
+        ) from error
 
 
 def _as_its_steps_make_it(robot: Robot) -> Robot:
@@ -164,21 +203,14 @@ def _check(robot: Robot, logs: Sequence[Log]) -> None:
                 f"sample_time: expected a multiple of the controller's {robot.sample_time_s:g} s, got "
                 f"{log.sample_time_s:g} s in log {log.name!r}"
             )
-        _check_rest(log)
 
 
-def _check_rest(log: Log) -> None:
-    """Refuse a log that begins in motion."""
+def _moving(log: Log) -> NDArray[np.bool_]:
+    """Return which axes (n_axes,) move where a log begins."""
     speed = np.gradient(log.position_rad, log.sample_time_s, axis=0)
     noise = position_noise_std([log]) / log.sample_time_s
     allowed = _AT_REST * np.abs(speed).max(axis=0) + _NOISES * noise
-    moving = np.abs(speed[0]) > allowed
-    if moving.any():
-        axis = int(np.flatnonzero(moving)[0])
-        raise InputError(
-            f"log {log.name!r}: expected a start at rest, got axis {axis + 1} at {speed[0, axis]:.3g} rad/s: "
-            f"cut it with --from"
-        )
+    return np.asarray(np.abs(speed[0]) > allowed)
 
 
 def _speed(robot: Robot, angle: Array) -> Array:
@@ -241,4 +273,5 @@ def _every(log: Log, step: int) -> Log:
         torque_nm=log.torque_nm[::step],
         position_ref_rad=None if target is None else target[::step],
         velocity_ref_rad_s=None if reference is None else reference[::step],
+        run_up=None,
     )

@@ -20,6 +20,7 @@ from axisight.logs.maps import MAPS
 from axisight.logs.patterns import AxisPattern, ColumnPattern
 from axisight.logs.reading import read_log
 from axisight.logs.render import render
+from axisight.logs.run_up import RunUp
 from axisight.logs.validate import check_same_rate
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Log",
     "LogReport",
     "PositionColumn",
+    "RunUp",
     "TemperatureColumn",
     "TimeColumn",
     "TorqueColumn",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from axisight.arguments import not_negative, positive
 from axisight.display import html
 from axisight.errors import InputError
+from axisight.logs.run_up import RunUp
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -54,7 +55,8 @@ class Log:
     reads m and Nm reads N.
 
     `start_rad` (axes,) (rad) are the driven joint angles at which a simulation of this run starts, at
-    rest; None is the robot's operating point.
+    rest; None is the robot's operating point. `run_up` is what a simulation goes through before this
+    run where that begins in motion; None where it begins at rest.
 
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
     (time grid replaced, resampled). Raises InputError when shapes disagree.
@@ -72,6 +74,7 @@ class Log:
     joint_position_rad: Floats | None = None
     temperature_c: Floats | None = None
     start_rad: Floats | None = None
+    run_up: RunUp | None = None
     excitation: str | None = None
     period_s: float | None = None
     axis_kinds: tuple[AxisKind, ...] = ()
@@ -92,6 +95,9 @@ class Log:
                 raise InputError(f"{field}: expected shape {shape}, got {values.shape}")
         if self.start_rad is not None and self.start_rad.shape != shape[1:]:
             raise InputError(f"start_rad: expected shape {shape[1:]}, got {self.start_rad.shape}")
+        if self.run_up is not None and self.run_up.position_rad.shape[1:] != shape[1:]:
+            got = self.run_up.position_rad.shape
+            raise InputError(f"run_up: expected shape (m, {shape[1]}), got {got}")
         if not self.axis_kinds:
             object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
         if len(self.axis_kinds) != shape[1]:
@@ -138,6 +144,24 @@ class Log:
         return 1.0 / self.sample_time_s
 
     @property
+    def lead(self) -> int:
+        """Number of samples of the run-up."""
+        return 0 if self.run_up is None else self.run_up.n_samples
+
+    def led(self, field: Literal["position_rad", "torque_nm", "velocity_ref_rad_s"]) -> Floats:
+        """Return a signal of the run-up and the run (lead + n, axes).
+
+        Raises InputError where the log has none.
+        """
+        own: Floats | None = getattr(self, field)
+        if own is None:
+            raise InputError(f"log {self.name!r}: expected {field}, got none")
+        if self.run_up is None:
+            return own
+        before: Floats = getattr(self.run_up, field)
+        return np.concatenate([before, own])
+
+    @property
     def is_resampled(self) -> bool:
         """Whether reading interpolated irregular stamps: rows are not those that were recorded."""
         return any(note.startswith(RESAMPLED) for note in self.notes)
@@ -179,6 +203,7 @@ class Log:
             **kept,
             time_s=self.time_s[: last - first],
             start_rad=self.start_rad if first == 0 else None,
+            run_up=self.run_up if first == 0 else None,
             period_s=self.period_s if periodic else None,
             notes=(*self.notes, note),
         )

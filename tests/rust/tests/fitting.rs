@@ -208,6 +208,30 @@ fn logs_of_different_length_do_not_disturb_each_other() {
     assert_eq!(start, together.residual.len());
 }
 
+/// Its residuals and derivatives are those of the whole log less the lead, beside another log in
+/// lock-step that has none; with few columns and, along a run of its own, with many.
+#[test]
+fn what_leads_to_a_log_is_simulated_and_not_compared() {
+    let whole = arm_problem(3, SIGMA);
+    let mut led = whole.clone();
+    let lead = 150;
+    led.records[0].lead = lead;
+    led.validate().expect("valid");
+    let theta: Vec<f64> = whole.parameters.iter().map(|p| p.initial).collect();
+    for columns in [&[0, 3][..], &[0, 1, 2, 3]] {
+        let all = whole.evaluate(&theta, columns).expect("whole");
+        let found = led.evaluate(&theta, columns).expect("led");
+        assert_eq!(found.residual.len() + lead, all.residual.len());
+        assert!(largest(&all.residual[..lead]) > 0.0);
+        // Flat weights give a series back but for rounding.
+        assert!(relative(&found.residual, &all.residual[lead..]) < 1e-12);
+        for (a, b) in found.columns.iter().zip(&all.columns) {
+            assert!(relative(a, &b[lead..]) < 1e-12);
+        }
+    }
+    assert!(led.blocks().len() < whole.blocks().len());
+}
+
 /// Lanes that logs leave carry derivatives by other parameters: the same numbers, but for rounding.
 #[test]
 fn derivatives_do_not_depend_on_how_many_logs_share_the_lanes() {
@@ -458,6 +482,12 @@ fn misuse_names_the_field() {
     assert_eq!(field(&bad), "records[1]");
     bad.records[1].target.pop();
     assert_eq!(field(&bad), "records[1]");
+    let mut bad = good.clone();
+    bad.records[0].lead = SAMPLES;
+    assert_eq!(field(&bad), "records[0].lead");
+    bad.records[0].lead = 10;
+    bad.records[0].certainty = Some(vec![1.0; SAMPLES]);
+    assert_eq!(field(&bad), "records[0].certainty");
     let mut bad = good.clone();
     bad.parameters[2].scale = 0.0;
     let error = fit(&good, &bad.parameters, FitOptions::default(), &[]).expect_err("scale");

@@ -33,8 +33,11 @@ pub struct Record {
     /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
     /// follow there. `None`: one everywhere.
     pub certainty: Option<Vec<f64>>,
-    /// Driven joint angles where the log begins, at rest [rad]. `None`: the operating point.
+    /// Driven joint angles where the run begins, at rest [rad]. `None`: the operating point.
     pub start: Option<Vec<f64>>,
+    /// Samples at the beginning of input and target that are simulated and not compared: how a run
+    /// comes into the motion that its log begins with. `certainty` has none of them.
+    pub lead: usize,
 }
 
 impl Record {
@@ -45,6 +48,7 @@ impl Record {
             target,
             certainty: None,
             start: None,
+            lead: 0,
         }
     }
 }
@@ -139,8 +143,13 @@ impl SimulationErrorProblem {
                     format!("{n} and {m} numbers"),
                 ));
             }
+            if record.lead >= n / n_axes {
+                let expected = format!("less than {} samples", n / n_axes);
+                let field = format!("records[{i}].lead");
+                return Err(invalid(field, expected, record.lead.to_string()));
+            }
             if let Some(certainty) = &record.certainty {
-                check_certainty(i, certainty, n)?;
+                check_certainty(i, certainty, n - record.lead * n_axes)?;
             }
             if let Some(k) = record.target.iter().position(|v| !v.is_finite()) {
                 let got = format!("{} at sample {}", record.target[k], k / n_axes);
@@ -154,8 +163,10 @@ impl SimulationErrorProblem {
         Ok(())
     }
 
+    /// Samples of a log that are compared.
     fn n_samples(&self, record: usize) -> usize {
-        self.records[record].input.len() / self.robot.n_axes()
+        let record = &self.records[record];
+        record.input.len() / self.robot.n_axes() - record.lead
     }
 
     /// Logs that run in lock-step.
@@ -259,7 +270,10 @@ impl SimulationErrorProblem {
                 SimulationOutput::Position => sample.measured,
             };
             for (axis, y) in output.iter().enumerate() {
-                for lane in 0..records.len() {
+                for (lane, record) in records.iter().enumerate() {
+                    if sample.index < self.records[*record].lead {
+                        continue;
+                    }
                     let slot = lane * n_axes + axis;
                     traces[0][slot].push(y.lane(lane));
                     for seed in 0..n_seeds {
@@ -314,7 +328,8 @@ impl SimulationErrorProblem {
     fn whiten(&self, records: &[usize], mut traces: Traces) -> Vec<Vec<Vec<f64>>> {
         let n_axes = self.robot.n_axes();
         for (lane, record) in records.iter().enumerate() {
-            let target = &self.records[*record].target;
+            let record = &self.records[*record];
+            let target = &record.target[record.lead * n_axes..];
             for axis in 0..n_axes {
                 let model = &mut traces[0][lane * n_axes + axis];
                 for (k, y) in model.iter_mut().enumerate() {

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.feedback import before, feedback, free_of_limits
+from axisight.gap.feedback import as_taken, before, feedback, free_of_limits
 from axisight.logs import Log, lowpass
 from axisight.robot import Robot
 
@@ -63,8 +63,7 @@ class ControlLaw:
         self.sample_time_s = time
         self._band_hz = band
         self._robot = robot
-        position = log.position_rad - log.position_rad[0]
-        speed = np.diff(position, axis=0, prepend=position[:1]) / time
+        position, speed = as_taken(log)
         self._errors = {
             "reference": (reference, before(reference) * time),
             "position": (-speed, -position),

@@ -39,8 +39,9 @@ def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 def _gravity(robot: Robot, log: Log) -> list[Finding]:
     """Compare mean torques: friction and motion leave little in a mean, gravity all it has."""
-    run = simulate(robot, log.velocity_ref_rad_s, method="rk4", start_rad=log.start_rad)
-    simulated = run["torque_cmd_nm"].values
+    references = log.led("velocity_ref_rad_s")
+    run = simulate(robot, references, method="rk4", start_rad=log.start_rad)
+    simulated = run["torque_cmd_nm"].values[log.lead :]
     if len(simulated) < log.n_samples or not np.isfinite(simulated).all():
         return []
     mean, expected = log.torque_nm.mean(axis=0), simulated.mean(axis=0)

@@ -131,7 +131,7 @@ def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most
     # One that broke off is NaN, and larger than anything.
     size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
     records: list[Record] = [
-        (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u), None)
+        (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u), None, 0)
         for q, u in zip(angle, torque, strict=True)
     ]
     return _Runs(records, (size <= _MARGIN * most).all(axis=1))

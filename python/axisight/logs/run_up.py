@@ -1,0 +1,55 @@
+"""How a simulation comes from rest into the motion that a log begins with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunUp:
+    """Samples before a log, which are simulated and not compared; the first is at rest.
+
+    Motor-side `position_rad` (m, axes) (rad), `torque_nm` (Nm) and `velocity_ref_rad_s` (rad/s), at the
+    sample time of the log; the sample behind the last is the first of the log. Raises InputError when
+    shapes disagree.
+    """
+
+    position_rad: Floats
+    torque_nm: Floats
+    velocity_ref_rad_s: Floats
+
+    def __post_init__(self) -> None:
+        """Check the shapes."""
+        shape = self.position_rad.shape
+        if len(shape) != 2 or shape[0] < 1:
+            raise InputError(f"run_up.position_rad: expected shape (m, axes), got {shape}")
+        for field in ("torque_nm", "velocity_ref_rad_s"):
+            got = getattr(self, field).shape
+            if got != shape:
+                raise InputError(f"run_up.{field}: expected shape {shape}, got {got}")
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return int(self.position_rad.shape[0])
+
+    def less(self, position_rad: Floats, torque_nm: Floats) -> RunUp:
+        """Return the same with so much (axes,) taken off where the log begins, and smoothly less before."""
+        share = eased(np.linspace(0.0, 1.0, self.n_samples + 1)[:-1])[:, None]
+        return RunUp(
+            position_rad=self.position_rad - share * position_rad,
+            torque_nm=self.torque_nm - share * torque_nm,
+            velocity_ref_rad_s=self.velocity_ref_rad_s,
+        )
+
+
+def eased(share: Floats) -> Floats:
+    """Return a share from 0 to 1 with its first two rates zero at both ends."""
+    return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
