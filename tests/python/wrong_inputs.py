@@ -465,6 +465,27 @@ def gear_ratio_upside_down(case: Case) -> Case:
     return edited(case, lambda t: each_line(t, "gear_ratio", lambda v: repr(1 / float(v))))
 
 
+def second_turned(text: str) -> str:
+    """Return a robot file with the gear ratio of its second axis times -1."""
+    lines, seen = text.splitlines(), 0
+    for i, line in enumerate(lines):
+        name, equals, value = line.partition("=")
+        if equals and name.strip() == "gear_ratio":
+            seen += 1
+            lines[i] = f"gear_ratio = {-float(value)!r}" if seen == 2 else line
+    return "\n".join(lines)
+
+
+@mistake("axis_turned", axis=2)
+def axis_turns_the_other_way(case: Case) -> Case:
+    return edited(case, second_turned)
+
+
+@mistake("axis_turned", kind="arm", axis=2)
+def axis_of_arm_turns_the_other_way(case: Case) -> Case:
+    return edited(case, second_turned)
+
+
 @mistake("gravity_flipped", kind="arm")
 def gravity_upwards_arm(case: Case) -> Case:
     text = arm_toml().replace("-9.81", "9.81")

@@ -18,6 +18,7 @@ MEANINGS: dict[str, str] = {
     "time_in_ms": "time in ms instead of s",
     "time_in_us": "time in us instead of s",
     "gear_ratio_inverted": "motor angle per joint angle instead of joint angle per motor angle",
+    "axis_turned": "an axis that turns the other way in the simulator",
     "file_unreadable": "truncated, corrupt or of another format",
     "log_too_short": "no or too few samples",
     "not_finite": "NaN or infinities",

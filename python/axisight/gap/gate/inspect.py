@@ -15,6 +15,7 @@ from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.gate.machine import check_machine
 from axisight.gap.gate.noise_level import check_noise
 from axisight.gap.gate.start import check_start
+from axisight.gap.gate.turned_axes import check_turned_axes
 from axisight.gap.own_clock import with_drift
 from axisight.gap.own_controller import clock_drift
 from axisight.logs import Log
@@ -100,10 +101,11 @@ def _logs(_robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
 def _against_simulator(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
     logs = [*estimation, *validation]
     closed = is_closed_loop(robot, logs)
-    return [
-        *_references(robot, logs),
-        *(_closed_loop(robot, logs) if closed else check_inverse(robot, logs)),
-    ]
+    found = _closed_loop(robot, logs) if closed else check_inverse(robot, logs)
+    if not closed or not refused(found):
+        # What turns the other way may look like another mistake.
+        found = check_turned_axes(robot, logs) or found
+    return [*_references(robot, logs), *found]
 
 
 def _at_last(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:

@@ -44,7 +44,7 @@ _FASTEST_RAD_S = 3000.0
 
 def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     """Return findings about logs whose torques the simulator's inverse dynamics should explain."""
-    motions = [_thinned(log) for log in logs]
+    motions = [thinned(log) for log in logs]
     out = []
     for log, (_, at) in zip(logs, motions, strict=True):
         out += _one_log(robot, log, at)
@@ -53,8 +53,8 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     return out if refused(out) else [*out, *check_small_errors(robot, motions)]
 
 
-def _thinned(log: Log) -> tuple[float, Motion]:
-    """Return sample time [s] and motion of a log, low-passed and thinned as that allows."""
+def thinned(log: Log) -> tuple[float, Motion]:
+    """Return sample time [s] and motion of a log, low-passed at 10 Hz and thinned as that allows."""
     band = min(_BAND_HZ, highest_cutoff_hz(log.sample_time_s))
     step = max(1, int(1.0 / (_SAMPLES_PER_BAND * band * log.sample_time_s)))
     position, speed, acceleration, torque = (x[::step] for x in motion(log, band))
