@@ -108,6 +108,21 @@ def test_an_mjcf_says_drives(tmp_path: Path):
     assert robot.effects[0].values() == pytest.approx([3.0, 0.6])
 
 
+def test_a_spring_of_a_slide_rests_where_mujoco_has_it(tmp_path: Path):
+    """A spring counts in metres from its rest, where MuJoCo's own passive force is none."""
+    text = changed(MJCF, 'name="slide"', 'name="slide" stiffness="40" springref="0.05"')
+    path = written(tmp_path, text, "arm.xml")
+    spring = next(e for e in import_robot(path).effects if e.label == "cable_stiffness@3")
+    stiffness, at_zero = spring.values()
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for place in (0.0, 0.05, 0.2):
+        data.joint("slide").qpos = place
+        mujoco.mj_forward(model, data)
+        force = data.joint("slide").qfrc_passive
+        assert at_zero - stiffness * place == pytest.approx(float(force[0]), abs=1e-12)
+
+
 def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
     more = """</actuator><equality><joint joint1="elbow"/></equality></mujoco>"""
     text = changed(MJCF, "</actuator>\n</mujoco>", more)
