@@ -16,6 +16,7 @@ from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import Variant
 from axisight.write_back import write_model
 from import_data import MJCF, URDF, changed, written
+from servo_arm import NOMINAL
 
 UNITS = {"coulomb_nm": "Nm", "viscous_nm_s_rad": "Nm s/rad", "half_width_rad": "rad"}
 
@@ -246,6 +247,43 @@ def test_a_motor_of_an_mjcf_has_limits_delays_and_lags(tmp_path: Path):
             source, load_robot(source), [cause], tmp_path / "one.xml", overwrite=True
         )
         assert f'<motor joint="shoulder" {attributes}' in alone.path.read_text()
+
+
+def test_an_actuator_that_is_told_positions_has_gains_and_late_targets(tmp_path: Path):
+    """MuJoCo reads them as the law that the effects make of the stated one, and they are read again."""
+    mujoco = pytest.importorskip("mujoco", minversion="4.0")
+    source = written(tmp_path, NOMINAL.mjcf(), "servo.xml")
+    causes = [
+        several("controller_gain", 1, relative_proportional=0.25, relative_integral=-0.1),
+        several("torque_constant", 2, relative_error=-0.2),
+        several("input_delay", 3, delay_s=0.0101),
+        several("torque_saturation", 3, limit_nm=30.0),
+    ]
+    made = write_model(source, load_robot(source), causes, tmp_path / "new.xml")
+    assert made.left_out == ("torque_saturation@3",)
+    model = mujoco.MjModel.from_xml_path(str(made.path))
+    kp, kd = np.array(NOMINAL.kp), np.array(NOMINAL.kd)
+    kp[0], kd[0] = 1.25 * kp[0], 0.9 * kd[0]
+    kp[1], kd[1] = 0.8 * kp[1], 0.8 * kd[1]
+    np.testing.assert_allclose(model.actuator_gainprm[:, 0], kp)
+    np.testing.assert_allclose(model.actuator_biasprm[:, 1:3], -np.transpose([kp, kd]))
+    np.testing.assert_allclose(model.actuator_delay, [0.0, 0.0, 0.0101])
+    again = load_robot(made.path)
+    assert [(e.label, e.values()) for e in again.effects] == [
+        ("input_delay@3", pytest.approx([0.0101]))
+    ]
+    gains = load_robot(source).controller_gains
+    for key, factors in (("kp", [1.25, 0.8, 1.0]), ("kd", [0.9, 0.8, 1.0])):
+        np.testing.assert_allclose(again.controller_gains[key], gains[key] * np.array(factors))
+
+
+def test_gains_that_stand_in_defaults_are_left_alone(tmp_path: Path):
+    text = NOMINAL.mjcf().replace(f'kp="{NOMINAL.kp[0]}" ', "")
+    text = text.replace("<worldbody>", '<default><position kp="1500"/></default><worldbody>')
+    source = written(tmp_path, text, "servo.xml")
+    gain = several("controller_gain", 1, relative_proportional=0.25, relative_integral=0.0)
+    made = write_model(source, load_robot(source), [gain], tmp_path / "new.xml")
+    assert "expected kp of the <position>" in made.why[gain.label]
 
 
 def test_a_lag_does_not_take_gains_of_defaults(tmp_path: Path):

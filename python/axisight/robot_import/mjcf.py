@@ -186,10 +186,10 @@ class _Compiled:
         return {j: 1.0 / g for j, g in found.items() if g != 0}
 
     def _torque_path(self, j: int) -> tuple[float, float, float, float]:
-        """Return gain, limit [Nm], delay [s] and lag [s] of a joint that one motor drives, else none of them."""
+        """Return gain, limit [Nm], delay [s] and lag [s] of a joint that one motor drives; of a servo its delay."""
         model, plain = self.model, (1.0, math.inf, 0.0, 0.0)
         if j in self.servos:
-            return plain
+            return (*plain[:2], self._of_one(_delays(model))[j], plain[3])
         every = (
             model.actuator_gainprm[:, 0],
             np.where(_is_limited(model), model.actuator_ctrlrange[:, 1], math.inf),
@@ -243,8 +243,6 @@ class _Compiled:
                 )
             if model.actuator_forcelimited[i]:
                 out.append(f"actuator {self._name('actuator', i)!r}: limits of its force left out")
-            if is_servo and _delays(model)[i] > 0:
-                out.append(f"actuator {self._name('actuator', i)!r}: delay left out")
         counts = {
             "equality constraints": model.neq,
             "tendons": model.ntendon,

@@ -10,6 +10,7 @@ from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPOR
 from axisight.robot_import.mjcf import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
+from axisight.write_back.servos import SERVO, SERVO_EFFECTS, write_servo
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbe
     LAG[0]: (LAG[1], _lag),
     TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], _delay),
 }
-DRIVE_EFFECTS = tuple(_ATTRIBUTES)
+DRIVE_EFFECTS = tuple({*_ATTRIBUTES, *SERVO_EFFECTS})
 
 
 def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]) -> Placed:
@@ -60,6 +61,18 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     placed = Placed()
     holders = [e for e in root.walk() if e.tag == "actuator"]
     mine = [e for h in holders for e in h.children if e.attributes.get("joint") == joint]
+    if len(mine) == 1 and mine[0].tag == SERVO:
+        late = [
+            c.parameters[TRANSPORT_DELAY[1]].value for c in causes if c.effect == TRANSPORT_DELAY[0]
+        ]
+        return write_servo(
+            edits, mine[0], causes, dict(_delay(late[-1], _step_s(root))) if late else {}
+        )
+    stated = [cause for cause in causes if cause.effect not in _ATTRIBUTES]
+    placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
+    causes = [cause for cause in causes if cause.effect in _ATTRIBUTES]
+    if not causes:
+        return placed
     defaults = any(e.tag in ("default", "include") for e in root.walk())
     if len(mine) != 1 or mine[0].children or not _is_motor(mine[0], defaults):
         got = "none" if not mine else ", ".join(f"<{e.tag}>" for e in mine)

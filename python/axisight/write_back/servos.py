@@ -1,0 +1,61 @@
+"""Actuators of an MJCF that are told positions: other gains, less torque than they should give, late targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TRANSPORT_DELAY
+from axisight.robot_import.xml_tree import Element
+from axisight.write_back.placed import Placed, said
+from axisight.write_back.xml_edits import Edits, Numbers
+
+if TYPE_CHECKING:
+    from axisight.gap.result import Cause
+
+SERVO = "position"
+"""Tag of such an actuator."""
+
+SERVO_EFFECTS = (OTHER_GAINS[0], TORQUE_CONSTANT[0], TRANSPORT_DELAY[0])
+"""What its attributes say: ``kp`` and ``kv`` times what is found, ``delay`` of its targets."""
+
+
+def write_servo(
+    edits: Edits, actuator: Element, causes: Sequence[Cause], late: dict[str, Numbers]
+) -> Placed:
+    """Write what causes of one joint make of its only actuator, which is told positions.
+
+    ``late``: attributes of a delay, of which there is one at most.
+    """
+    placed = Placed()
+    other = [cause for cause in causes if cause.effect not in SERVO_EFFECTS]
+    placed.refuse(other, f"expected a motor, <{SERVO}> has gains and a delay")
+    mine = [cause for cause in causes if cause.effect in SERVO_EFFECTS]
+    gains = [cause for cause in mine if cause.effect != TRANSPORT_DELAY[0]]
+    if gains and ("kp" not in actuator.attributes or "dampratio" in actuator.attributes):
+        placed.refuse(gains, f"expected kp of the <{SERVO}>, and kv if any, instead of defaults")
+        mine = [cause for cause in mine if cause not in gains]
+        gains = []
+    made: dict[str, Numbers] = dict(late) if len(mine) > len(gains) else {}
+    for key, factor in zip(("kp", "kv"), _factors(gains), strict=True):
+        if gains and key in actuator.attributes:
+            made[key] = float(actuator.attributes[key]) * factor
+    if mine:
+        edits.set(actuator, made, said(mine))
+        placed.take(mine)
+    return placed
+
+
+def _factors(causes: Sequence[Cause]) -> tuple[float, float]:
+    """Return what gains of position and of speed are times those that the file says."""
+    position = speed = 1.0
+    for cause in causes:
+        found = {name: value.value for name, value in cause.parameters.items()}
+        if cause.effect == OTHER_GAINS[0]:
+            # Of a law of targets the second gain is that of the speed.
+            position *= 1 + found.get(OTHER_GAINS[1][0], 0.0)
+            speed *= 1 + found.get(OTHER_GAINS[1][1], 0.0)
+        else:
+            both = 1 + found[TORQUE_CONSTANT[1]]
+            position, speed = position * both, speed * both
+    return position, speed
