@@ -51,7 +51,7 @@ def _default(field: FieldInfo) -> str:
         return f"`{str(value).lower()}`"
     if isinstance(value, list):
         return f"`{value}`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+    return f"`{value:g}`".replace("e-0", "e-") if isinstance(value, float) else f"`{value}`"
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
