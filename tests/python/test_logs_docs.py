@@ -8,6 +8,19 @@ import numpy as np
 import pytest
 
 from axisight.logs import MAPS
+from axisight.logs.case import _CaseFile
+from axisight.logs.columns import (
+    Address,
+    AxisColumns,
+    ColumnMap,
+    PositionColumn,
+    TemperatureColumn,
+    TimeColumn,
+    TorqueColumn,
+    VelocityColumn,
+)
+from axisight.logs.patterns import AxisPattern, ColumnPattern
+from key_tables import keys, same, told
 
 
 @pytest.fixture
@@ -29,7 +42,40 @@ def test_the_examples(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert [a.velocity.unit for a in guess.axis] == ["rpm", "rpm"]
     assert '# torque = { name = "i_2", unit = "A", scale = ... }' in names["guess"].text
     assert np.isfinite(names["log"].torque_nm).all()
+    case = names["case"]
+    assert case.roles == ("estimation", "validation")
+    assert case.estimation[0].period_s == 10.0
 
 
 def test_the_table_has_every_map(page: str) -> None:
     assert set(re.findall(r"^\| `([a-z-]+)` \| [^|]+ \| [^|]+ \|$", page, flags=re.M)) >= set(MAPS)
+
+
+def test_the_table_has_every_key_of_a_map(page: str) -> None:
+    section = page.split("\n## Column maps\n")[1].split("\n## ", maxsplit=1)[0]
+    maps, signals = section.split("\nA signal is a table")
+    known = keys(ColumnMap, leaves=(Address,))
+    # Stamps have a table of their own, and stand in this one with what is more than an address.
+    assert set(TimeColumn.model_fields) - set(Address.model_fields) == {"unit", "resample_hz"}
+    known |= {"time.unit": "`s`", "time.resample_hz": "none"}
+    # Those of any number of axes.
+    assert set(ColumnPattern.model_fields) - set(ColumnMap.model_fields) == {"axes", "every_axis"}
+    assert set(AxisPattern.model_fields) == set(AxisColumns.model_fields)
+    known |= {"every_axis": "needed without `[[axis]]`", "axes": "none"}
+    same(told(maps), known)
+    kinds = (PositionColumn, VelocityColumn, TorqueColumn, TemperatureColumn)
+    assert {frozenset(keys(kind)) for kind in kinds} == {frozenset(keys(PositionColumn))}
+    same(told(signals), keys(PositionColumn))
+    assert keys(TemperatureColumn)["unit"] == "`degC`"
+    units = {
+        unit
+        for kind in (*kinds, TimeColumn)
+        for unit in kind.model_fields["unit"].annotation.__args__
+    }
+    assert units <= set(re.findall(r"`([^`\n]+)`", maps))
+
+
+def test_the_table_has_every_key_of_a_case(page: str) -> None:
+    section = page.split("\n## Cases\n")[1]
+    # Without a log a case is refused, in words of its own.
+    same(told(section), keys(_CaseFile) | {"log": "needed"})

@@ -5,10 +5,17 @@ from pathlib import Path
 
 import pytest
 
+from axisight.robot_import.dh import _OPTIONAL, COLUMNS
+from key_tables import same, told
+
 
 @pytest.fixture(scope="module")
-def blocks(repository: Path) -> list[str]:
-    page = (repository / "docs" / "models.md").read_text(encoding="utf-8")
+def page(repository: Path) -> str:
+    return (repository / "docs" / "models.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def blocks(page: str) -> list[str]:
     return re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
 
 
@@ -33,3 +40,10 @@ def test_snippets_run(
     assert blocks
     for text in blocks:
         run(text, capsys)
+
+
+def test_every_column_of_a_table_of_joints_is_told(page: str) -> None:
+    section = page.split("\n## Tables of Denavit and Hartenberg\n")[1]
+    defaults = {name: f"`{value}`" for name, value in _OPTIONAL.items()}
+    known = {name: defaults.get(name, "needed") for name in COLUMNS}
+    same(told(section.split("\n## ", maxsplit=1)[0]), known)

@@ -201,6 +201,32 @@ def test_a_spring_rests_where_it_was_found_to(tmp_path: Path, unit: str, at_zero
     assert load_robot(made.path).effects[0].values() == pytest.approx([4.0, at_zero_nm])
 
 
+@pytest.mark.parametrize("unit", ["radian", "degree"])
+@pytest.mark.parametrize("at_zero_n", [0.0, 1.2])
+def test_a_spring_of_a_slide_rests_where_it_was_found_to(
+    tmp_path: Path, unit: str, at_zero_n: float
+):
+    """In metres, whatever the file's unit of angles: MuJoCo's own passive force is that of the cause."""
+    mujoco = pytest.importorskip("mujoco")
+    text = changed(MJCF, 'angle="radian"', f'angle="{unit}"')
+    text = changed(text, 'type="slide"', 'type="slide" stiffness="40" springref="0.05"')
+    source = written(tmp_path, text, "arm.xml")
+    before = load_robot(source)
+    assert next(e for e in before.effects if e.axis == 3).values() == pytest.approx([40.0, 2.0])
+    cause = several("cable_stiffness", 3, stiffness_nm_rad=60.0, at_zero_nm=at_zero_n)
+    made = write_model(source, before, [cause], tmp_path / "new.xml")
+    assert made.left_out == ()
+    again = next(e for e in load_robot(made.path).effects if e.axis == 3)
+    assert (again.name, again.values()) == ("cable_stiffness", pytest.approx([60.0, at_zero_n]))
+    model = mujoco.MjModel.from_xml_path(str(made.path))
+    data = mujoco.MjData(model)
+    for place_m in (0.0, 0.05, 0.2):
+        data.joint("slide").qpos = place_m
+        mujoco.mj_forward(model, data)
+        (force,) = data.joint("slide").qfrc_passive
+        assert force == pytest.approx(at_zero_n - 60.0 * place_m, abs=1e-12)
+
+
 DRIVE = [
     several("torque_saturation", 1, limit_nm=3.0),
     several("input_delay", 1, delay_s=0.007),
