@@ -14,6 +14,7 @@ import typer
 import axisight
 from axisight import report as pages
 from axisight.cli.common import (
+    AtRests,
     Columns,
     CutoffHz,
     Despite,
@@ -21,6 +22,7 @@ from axisight.cli.common import (
     From,
     MaxBytes,
     Model,
+    Moving,
     Simulated,
     To,
     Untrusted,
@@ -42,6 +44,7 @@ from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
+from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
 
@@ -150,6 +153,8 @@ def diagnose_command(
     max_bytes: MaxBytes = None,
     start_s: From = 0.0,
     stop_s: To = None,
+    moving: Moving = False,
+    cut_at_rests: AtRests = False,
     fleet: Annotated[
         Path | None,
         typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
@@ -187,6 +192,8 @@ def diagnose_command(
             "--max-bytes": max_bytes,
             "--from": start_s,
             "--to": stop_s,
+            "--moving": moving,
+            "--cut-at-rests": cut_at_rests,
         }
         settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
         # Brings what tables and schedulers need: only for those who have a fleet.
@@ -202,14 +209,13 @@ def diagnose_command(
         if out or workers or scheduler:
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
         load = partial(load_simulator, given=parse_effects(effect))
-        part = (start_s, stop_s)
         inputs = read_inputs(
             case_or_logs,
             model,
             validation or [],
             columns,
             load,
-            part,
+            Used(start_s, stop_s, moving, cut_at_rests),
             simulated or [],
             untrusted=untrusted,
             max_bytes=max_bytes,
