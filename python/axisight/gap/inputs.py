@@ -50,10 +50,11 @@ def read_inputs(
     used: Used = WHOLE,
     simulated: Sequence[Path] = (),
     *,
+    bare: Callable[..., Robot] = load_robot,
     untrusted: bool = False,
     max_bytes: int | None = None,
 ) -> Inputs:
-    """Read a case folder, or logs with a model, which ``load`` turns into a robot.
+    """Read a case folder, or logs with a model, which ``load`` turns into a robot, ``bare`` into one to read by.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
     ``used``: what is used of each log; of one log, its last run is held out; ``simulated``: logs of
@@ -65,7 +66,9 @@ def read_inputs(
     for path in (*paths, *validation, *simulated) if untrusted else ():
         if not path.is_dir() or is_folder_log(path):
             check_log_inside(path)
-    read = _read(paths, model, validation, columns, load, untrusted, max_bytes, runs=used.runs)
+    read = _read(
+        paths, model, validation, columns, (load, bare), untrusted, max_bytes, runs=used.runs
+    )
     sims = [read_log(p, columns, robot=read.robot, max_bytes=max_bytes) for p in simulated]
     read = replace(read, simulated=tuple(sims))
     return read if used.whole else _used(read, used)
@@ -91,14 +94,15 @@ def read_beside(
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
     *,
+    bare: Callable[..., Robot] = load_robot,
     max_bytes: int | None = None,
 ) -> tuple[Robot, list[Log]]:
-    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it.
+    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it, read by ``bare``'s.
 
     ``columns`` and ``max_bytes`` as in `read_log`. Raises LogError for a log that is none of this robot.
     """
     # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
-    robot = load_robot(model) if is_model_file(model) else load(model)
+    robot = bare(model) if is_model_file(model) else load(model)
     logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in paths]
     return _loaded(load, model, logs) if is_model_file(model) else robot, logs
 
@@ -115,18 +119,20 @@ def _read(
     model: str | None,
     validation: Sequence[Path],
     columns: Path | None,
-    load: Callable[..., Robot],
+    loads: tuple[Callable[..., Robot], Callable[..., Robot]],
     untrusted: bool,
     max_bytes: int | None,
     *,
     runs: bool,
 ) -> Inputs:
+    load, bare = loads
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
-        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes)
+        own = bare if model is None else load_robot
+        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes, load=own)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
         extra = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in validation]
@@ -137,7 +143,9 @@ def _read(
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
-    robot, read = read_beside(model, [*paths, *validation], columns, load, max_bytes=max_bytes)
+    robot, read = read_beside(
+        model, [*paths, *validation], columns, load, bare=bare, max_bytes=max_bytes
+    )
     logs, held = read[: len(paths)], read[len(paths) :]
     if not held:
         if len(logs) < 2 and not runs:
