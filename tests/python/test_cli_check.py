@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from typer.testing import CliRunner
 from axisight import load_robot
 from axisight.cli import app
 from axisight.cli.demo import write_demo_case
+from axisight.errors import LogError
+from axisight.logs import read_log
 from import_data import URDF, written
 from model_logs import sines, written_log, written_table
 
@@ -110,3 +113,50 @@ def test_positions_and_targets(tmp_path: Path) -> None:
     (tmp_path / "arm.drives.toml").write_text(HELD)
     said = run("check", log, "--robot", model, status=0)
     assert "positions are compared under the same targets, up to 10 Hz" in said
+
+
+def uneven(folder: Path) -> Path:
+    """Write a CSV of 2 axes at 250 Hz whose stamps are off by up to a fifth of a sample."""
+    time = 0.004 * (np.arange(2000) + np.random.default_rng(0).uniform(-0.2, 0.2, 2000))
+    angle, _, _ = sines(0, 2, 2000)
+    columns = {"time_s": time - time[0]}
+    for i in range(2):
+        columns |= {f"position_{i + 1}": angle[:, i], f"torque_cmd_{i + 1}": 3 * angle[:, i]}
+    path = folder / "a run.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    return path
+
+
+def test_uneven_stamps_are_refused_with_the_command_that_helps(tmp_path: Path) -> None:
+    log, columns = uneven(tmp_path), tmp_path / "columns.toml"
+    with pytest.raises(LogError, match="resample_hz = 250 in ") as refused:
+        read_log(log)
+    # The words between backticks, as a shell would read them.
+    (command,) = re.findall("`axisight (.*?)`", str(refused.value))
+    words = [columns if word == "columns.toml" else word for word in shlex.split(command)]
+    assert words[:3] == ["columns", "guess", str(log)]
+    assert "resample_hz = 250" in run("check", log, status=1)
+    run(*words, status=0)
+    assert read_log(log, columns).sample_rate_hz == pytest.approx(250.0)
+    assert "0 errors" in run("check", log, "--columns", columns, status=0)
+
+
+def test_uneven_stamps_in_a_map_are_refused_with_its_line(tmp_path: Path) -> None:
+    log, columns = uneven(tmp_path), tmp_path / "columns.toml"
+    axes = [
+        f'[[axis]]\nposition = {{ name = "position_{k}", unit = "rad" }}\n'
+        f'torque = {{ name = "torque_cmd_{k}", unit = "Nm" }}'
+        for k in (1, 2)
+    ]
+    lines = ['schema = "axisight.columns/1"', '[time]\nname = "time_s"\nunit = "s"', *axes]
+    columns.write_text("\n".join(lines))
+    said = run("check", log, "--columns", columns, status=1)
+    assert "columns guess" not in said
+    (line,) = re.findall(r"by the line (resample_hz = \S+) in \[time\]", said)
+    lines.insert(2, line)
+    columns.write_text("\n".join(lines))
+    assert "0 errors" in run("check", log, "--columns", columns, status=0)
+    # Said of samples that are uniform in truth: the rate alone.
+    (rate,) = re.findall(r"by (sample_rate_hz = \S+) at its top instead of \[time\]", said)
+    columns.write_text("\n".join([lines[0], rate, *axes]))
+    assert "0 errors" in run("check", log, "--columns", columns, status=0)

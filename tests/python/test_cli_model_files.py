@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from axisight import load_robot
+from axisight import Robot, load_robot
 from axisight.cli import app
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import DriveData
@@ -136,3 +137,81 @@ def test_causes_without_a_number_are_told_why(tmp_path: Path):
         "every step"
     ) in said
     assert new.read_text() == bare
+
+
+# A gripper beside the chain, and a tip beyond the flange.
+FINGER = """<link name="finger"><inertial><mass value="0.3"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>
+  <joint name="grip" type="prismatic"><parent link="upper"/><child link="finger"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="0.1" effort="10" velocity="1"/></joint>
+</robot>"""
+
+
+def branched(folder: Path) -> Path:
+    """Write an arm with two moving branches, without friction and gears."""
+    bare = URDF.replace('<dynamics damping="0.7" friction="1.5"/>', "")
+    return written(folder, bare[: bare.index("  <transmission")] + FINGER)
+
+
+def with_load(path: Path, mass_kg: float) -> Robot:
+    """Return the arm with a load in the frame of its flange."""
+    load = DriveData.model_validate({"payload": {"mass": mass_kg}})
+    return import_robot(path, tip="flange", drives=load)
+
+
+def test_a_diagnosis_takes_tip_and_payload(tmp_path: Path):
+    path = branched(tmp_path)
+    machine = with_load(path, 0.8)
+    logs = [written_log(tmp_path, k, machine, lambda q, _: 0 * q) for k in range(3)]
+    new, verdict = tmp_path / "new.urdf", tmp_path / "verdict.json"
+    status, said = run("diagnose", path, *logs, "--max-causes", 1)
+    assert status == 2 and "got 2 moving branches" in said and "--tip" in said
+    given = ("--tip", "flange", "--max-causes", 1)
+    status, said = run("diagnose", path, *logs, *given, "--payload", 0.8, "--json", verdict)
+    assert status == 0, said
+    assert json.loads(verdict.read_text())["verdict"] == "none"
+    # Without the load it is missing; the file that gets it is read with the tip too.
+    status, said = run("diagnose", path, *logs, *given, "--write-model", new)
+    assert status == 0, said
+    assert f"model: {new}, with payload" in said
+    loaded, q = import_robot(new, tip="flange"), np.array([0.4, -0.7])
+    assert loaded.gravity(q) == pytest.approx(machine.gravity(q), rel=0.02)
+
+
+def test_the_chain_may_begin_further_up(tmp_path: Path):
+    path = written(tmp_path, URDF)
+    machine = import_robot(path, base="upper")
+    assert machine.n_axes == 1
+    log = written_log(tmp_path, 0, machine, lambda q, _: 0 * q)
+    status, said = run("check", log, "--robot", path, "--base", "upper")
+    assert status == 0, said
+    status, said = run("check", log, "--robot", path)
+    assert status == 1 and "refused" in said
+
+
+def test_a_check_takes_tip_and_payload(tmp_path: Path):
+    path = branched(tmp_path)
+    log = written_log(tmp_path, 0, with_load(path, 20.0), lambda q, _: 0 * q)
+    assert run("check", log, "--robot", path)[0] == 2
+    given = ("--robot", path, "--tip", "flange")
+    status, said = run("check", log, *given)
+    assert status == 1 and "refused: torque_scaled" in said
+    status, said = run("check", log, *given, "--payload", "20,0,0,0")
+    assert status == 0, said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--tip", "flange"], "--tip: expected --robot MODEL beside it"),
+        (["--robot", "two_mass_axis", "--payload", "3"], "--payload: expected a model file (URDF"),
+        (["--robot", "ARM", "--tip", "hand"], "--tip: expected a link"),
+        (["--robot", "ARM", "--payload", "1,2"], "--payload: expected KG or KG,X,Y,Z"),
+    ],
+)
+def test_options_of_a_model_are_named(tmp_path: Path, arguments: list[str], message: str):
+    path = written(tmp_path, URDF)
+    log = written_log(tmp_path, 0, import_robot(path), lambda q, _: 0 * q)
+    status, said = run("check", log, *(str(path) if a == "ARM" else a for a in arguments))
+    assert status == 2, said
+    assert message in said

@@ -39,8 +39,11 @@ def test_references_are_simulated_period_after_period(tmp_path: Path, ending: st
         ([], "--experiment: expected one of 1 to 3"),
         (["--experiment", "4"], "--experiment: expected one of 1 to 3"),
         (["--experiment", "1", "--periods", "0"], "--periods: expected a positive number, got 0"),
-        (["--experiment", "1", "--torque"], "--from, --to, --torque: expected a log"),
-        (["--experiment", "1", "--from", "0.1"], "--from, --to, --torque: expected a log"),
+        (["--experiment", "1", "--torque"], "--from, --to, --moving, --torque: expected a log"),
+        (
+            ["--experiment", "1", "--from", "0.1"],
+            "--from, --to, --moving, --torque: expected a log",
+        ),
     ],
 )
 def test_what_references_have_not_is_refused(tmp_path: Path, more: list[str], words: str):

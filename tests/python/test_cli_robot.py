@@ -268,6 +268,52 @@ def test_diagnose_uses_the_part_asked_for(axis: Path, log: Path, monkeypatch) ->
     assert len(seen) == 2
 
 
+def moves_and_rests(path: Path, *starts_s: float) -> Path:
+    """Write a log of 12 s at 250 Hz that turns for two seconds from each start on, and rests between."""
+    time = 0.004 * np.arange(3000)
+    turns = [np.clip(time - start, 0.0, 2.0) for start in starts_s]
+    angle = sum(1.0 - np.cos(np.pi * turn) for turn in turns)
+    angle = angle + 1e-5 * np.random.default_rng(0).normal(size=time.size)
+    frame = {"time_s": time, "position_1": angle, "torque_cmd_1": 0.1 * time}
+    pd.DataFrame(frame).to_parquet(path, index=False)
+    return path
+
+
+def test_logs_are_used_while_they_move(axis: Path, tmp_path: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    log = moves_and_rests(tmp_path / "moves.parquet", 3.0, 7.0)
+    run("diagnose", log, log, "--model", axis, "--moving", code=2)
+    for used in (*seen[0]["estimation"], *seen[0]["validation"]):
+        (note,) = used.notes
+        _, start, _, _, stop, _ = note.split()
+        # Rest before, from which a simulation begins, and after; torques tell the time.
+        assert 2.6 < float(start) < 2.9 and 9.1 < float(stop) < 9.4
+        assert used.torque_nm[0, 0] == pytest.approx(0.1 * float(start))
+    run("diagnose", log, log, "--model", axis, "--moving", "--from", 6, code=2)
+    assert seen[1]["estimation"][0].duration_s == pytest.approx(2.5, abs=0.2)
+    still = moves_and_rests(tmp_path / "still.parquet", 20.0)
+    said = run("diagnose", still, still, "--model", axis, "--moving", code=2)
+    assert "still.parquet: --moving: expected an axis that moves, got none" in said
+
+
+def test_one_log_is_cut_into_runs(axis: Path, tmp_path: Path, monkeypatch) -> None:
+    seen = stopped(monkeypatch, "all")
+    log = moves_and_rests(tmp_path / "moves.parquet", 1.0, 3.4, 8.0)
+    run("diagnose", log, "--model", axis, "--cut-at-rests", "--simulated", log, code=2)
+    # Four tenths of a second between two motions are no rest; the last run is held out.
+    (one,), (two,) = seen[0]["estimation"], seen[0]["validation"]
+    assert [one.name, two.name] == ["moves#1", "moves#2"]
+    assert [s.notes for s in seen[0]["simulated"]] == [one.notes, two.notes]
+    assert one.duration_s == pytest.approx(4.9, abs=0.3)
+    assert two.torque_nm[0, 0] == pytest.approx(0.77, abs=0.03)
+    single = moves_and_rests(tmp_path / "single.parquet", 3.0)
+    said = run("diagnose", single, "--model", axis, "--cut-at-rests", code=2)
+    assert "--validation: expected a log to hold out" in said
+    # Of several logs all runs of the last are held out.
+    run("diagnose", log, log, "--model", axis, "--cut-at-rests", code=2)
+    assert [len(seen[1][role]) for role in ("estimation", "validation")] == [2, 2]
+
+
 def test_options_of_the_search_arrive(axis: Path, log: Path, monkeypatch) -> None:
     seen = stopped(monkeypatch, "settings")
     options = ("--cutoff-hz", 12.5, "--max-causes", 2, "--threads", 1, "--seed", 3)

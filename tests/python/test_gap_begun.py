@@ -7,6 +7,7 @@ import pytest
 
 from axisight import Effect, Log, Settings, diagnose
 from axisight.gap.begun import begins_at_rest, first_rest_s, from_rest
+from axisight.gap.used import Used
 from gap_data import bare_axis, log_of, logs_of, scattered
 
 QUICK = Settings(bootstrap=50)
@@ -44,6 +45,20 @@ def test_a_start_at_rest_is_told_from_one_in_motion(machine_logs):
         assert REST_S[0] + 0.09 - 0.7 <= rest <= REST_S[1] - 0.7
     # None is left where the rest lies behind the middle.
     assert first_rest_s(machine_logs[0].part(0.7, 3.3)) is None
+
+
+def test_what_is_used_while_a_log_moves_begins_at_rest():
+    still = np.zeros((int(1.5 / STEP_S), 1))
+    reference = np.concatenate([still, moves(), still])
+    log = log_of(scattered(bare_axis(), 3), [FRICTION], reference, 0)
+    (moving,) = Used(moving=True).of(log)
+    # A second before and after the motion is left out.
+    assert moving.duration_s == pytest.approx(8.0 + 0.6, abs=0.25)
+    one, two = Used(runs=True).of(log)
+    assert two.duration_s == pytest.approx(5.0 + 0.6, abs=0.25)
+    assert all(begins_at_rest(part, NOISE_RAD) for part in (moving, one, two))
+    given = from_rest(bare_axis(), [one], [two], [])
+    assert (given.estimation, given.validation, given.findings) == ([one], [two], ())
 
 
 def test_logs_that_begin_at_rest_stay_as_they_are(machine_logs):

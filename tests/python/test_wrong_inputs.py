@@ -30,6 +30,7 @@ from axisight.gap import RefusedInputError, check_fit_inputs, check_inputs
 from axisight.gap.faults import MEANINGS
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.inputs import read_inputs
+from axisight.gap.used import Used
 from rigid_arm import COULOMB_NM, VISCOUS, arm, log_of
 from spoiled_cases import TABLE, Case, clean_arm, clean_loop, each, late, loop_case
 from wrong_files import write_case
@@ -173,7 +174,7 @@ def test_part_of_a_log_is_judged_by_itself(tmp_path):
     assert {f.name for f in check_fit_inputs(robot, [whole])} == {"samples_frozen"}
     until = next(f for f in check_fit_inputs(robot, [whole])).message
     begin = float(re.search(r"from (\S+) s on", until)[1])
-    (part,) = read_logs([log], columns, robot, unchecked=False, part=(0.0, begin - 0.1))
+    (part,) = read_logs([log], columns, robot, unchecked=False, used=Used(0.0, begin - 0.1))
     assert check_fit_inputs(robot, [part]) == ()
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from axisight.cli.common import Columns, MaxBytes, Untrusted, errors, say
+from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import load_simulator
 from axisight.cli.screen import OUT
 from axisight.cli.suggest import suggestion
@@ -30,11 +32,17 @@ def check_command(
             help="robot.toml, URDF, MJCF or preset: say too what a diagnosis would refuse or doubt.",
         ),
     ] = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     untrusted: Untrusted = False,
     max_bytes: MaxBytes = None,
 ) -> None:
     """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
     with errors():
+        options = ModelOptions(base, tip, payload)
+        if robot is None and options.given():
+            raise InputError(f"{', '.join(options.given())}: expected --robot MODEL beside it")
         if untrusted:
             check_log_inside(log)
         found = check_log(log, columns, max_bytes=max_bytes)
@@ -43,16 +51,23 @@ def check_command(
         near = next(filter(None, map(suggestion, wrong)), None)
         if near is not None:
             say(f"did you mean {near}?")
-        fits = found.ok and (robot is None or _fits(robot, found, columns, max_bytes))
+        fits = found.ok and (robot is None or _fits(robot, options, found, columns, max_bytes))
         if not fits:
             raise typer.Exit(1)
 
 
-def _fits(model: str, alone: LogReport, columns: Path | None, max_bytes: int | None) -> bool:
+def _fits(
+    model: str,
+    options: ModelOptions,
+    alone: LogReport,
+    columns: Path | None,
+    max_bytes: int | None,
+) -> bool:
     """Say what a diagnosis would refuse, flag and compare; False where it would refuse."""
+    load = partial(load_simulator, options=options)
     try:
         robot, (log,) = read_beside(
-            model, [alone.path], columns, load_simulator, max_bytes=max_bytes
+            model, [alone.path], columns, load, bare=options.load, max_bytes=max_bytes
         )
     except LogError as error:
         say(f"refused: {error}")

@@ -28,6 +28,20 @@ To = Annotated[
         "--to", metavar="SECONDS", help="Leave out what comes after in each log. Default: its end."
     ),
 ]
+Moving = Annotated[
+    bool,
+    typer.Option(
+        "--moving",
+        help="Use each log from its first to its last motion, with 0.2 s of rest around.",
+    ),
+]
+AtRests = Annotated[
+    bool,
+    typer.Option(
+        "--cut-at-rests",
+        help="Cut each log where all axes rest for more than 0.5 s: every motion is a run of its own.",
+    ),
+]
 Columns = Annotated[
     Path | None,
     typer.Option(

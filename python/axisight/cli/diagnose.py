@@ -14,6 +14,7 @@ import typer
 import axisight
 from axisight import report as pages
 from axisight.cli.common import (
+    AtRests,
     Columns,
     CutoffHz,
     Despite,
@@ -21,6 +22,7 @@ from axisight.cli.common import (
     From,
     MaxBytes,
     Model,
+    Moving,
     Simulated,
     To,
     Untrusted,
@@ -31,6 +33,7 @@ from axisight.cli.common import (
     write_each,
     write_text,
 )
+from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.screen import OUT, is_output
 from axisight.cli.show import show_diagnosis
@@ -42,6 +45,7 @@ from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
+from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
 
@@ -91,6 +95,9 @@ def diagnose_command(
         ),
     ] = None,
     model: Model = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     validation: Validation = None,
     columns: Columns = None,
     json: Annotated[
@@ -150,6 +157,8 @@ def diagnose_command(
     max_bytes: MaxBytes = None,
     start_s: From = 0.0,
     stop_s: To = None,
+    moving: Moving = False,
+    cut_at_rests: AtRests = False,
     fleet: Annotated[
         Path | None,
         typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
@@ -169,6 +178,9 @@ def diagnose_command(
         for_one = {
             "a case or logs": case_or_logs,
             "--model": model,
+            "--base": base,
+            "--tip": tip,
+            "--payload": payload,
             "--validation": validation,
             "--columns": columns,
             "--json": json,
@@ -187,6 +199,8 @@ def diagnose_command(
             "--max-bytes": max_bytes,
             "--from": start_s,
             "--to": stop_s,
+            "--moving": moving,
+            "--cut-at-rests": cut_at_rests,
         }
         settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
         # Brings what tables and schedulers need: only for those who have a fleet.
@@ -201,16 +215,17 @@ def diagnose_command(
             raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
         if out or workers or scheduler:
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
-        load = partial(load_simulator, given=parse_effects(effect))
-        part = (start_s, stop_s)
+        options = ModelOptions(base, tip, payload)
+        load = partial(load_simulator, given=parse_effects(effect), options=options)
         inputs = read_inputs(
             case_or_logs,
             model,
             validation or [],
             columns,
             load,
-            part,
+            Used(start_s, stop_s, moving, cut_at_rests),
             simulated or [],
+            bare=options.load,
             untrusted=untrusted,
             max_bytes=max_bytes,
         )
@@ -254,7 +269,7 @@ def diagnose_command(
         if next_experiment is not None:
             writes.append(partial(_write_experiment, found, next_experiment))
         if write_model is not None:
-            made = partial(_write_model, found, inputs, write_model, force=force)
+            made = partial(_write_model, found, inputs, options, write_model, force=force)
             writes.append(made)
         if signals is not None:
             writes.append(partial(_write_signals, found, signals))
@@ -272,13 +287,20 @@ def _write_signals(found: Diagnosis, target: Path) -> None:
     say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
 
 
-def _write_model(found: Diagnosis, inputs: Inputs, target: Path, *, force: bool) -> None:
+def _write_model(
+    found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
+) -> None:
     """Write the simulator with its causes, and say which of them it has no place for."""
     if not found.causes:
         say("no model was written: no cause was named")
         return
     made = axisight.write_back.write_model(
-        inputs.robot_source, inputs.robot, found.causes, target, overwrite=force
+        inputs.robot_source,
+        inputs.robot,
+        found.causes,
+        target,
+        overwrite=force,
+        drives=options.drives(inputs.robot_source) if options.given() else None,
     )
     say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
     for label in made.left_out:

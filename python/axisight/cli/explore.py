@@ -12,12 +12,14 @@ from typing import Annotated
 import typer
 
 from axisight.cli.common import (
+    AtRests,
     Columns,
     CutoffHz,
     Despite,
     From,
     MaxBytes,
     Model,
+    Moving,
     Simulated,
     To,
     Untrusted,
@@ -31,6 +33,7 @@ from axisight.errors import MissingExtraError
 from axisight.gap.inputs import read_inputs
 from axisight.gap.settings import Settings
 from axisight.gap.tolerances import with_tolerances
+from axisight.gap.used import Used
 from axisight.robot import Robot
 
 
@@ -51,6 +54,8 @@ def explore_command(
     simulated: Simulated = None,
     start_s: From = 0.0,
     stop_s: To = None,
+    moving: Moving = False,
+    cut_at_rests: AtRests = False,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of the page. Default: a free one.")
     ] = 0,
@@ -75,7 +80,7 @@ def explore_command(
             validation or [],
             columns,
             load,
-            (start_s, stop_s),
+            Used(start_s, stop_s, moving, cut_at_rests),
             simulated or [],
             untrusted=untrusted,
             max_bytes=max_bytes,

@@ -13,7 +13,7 @@ from axisight.cli.common import numbers, say
 from axisight.errors import InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.faults import refused
-from axisight.gap.inputs import part_of
+from axisight.gap.used import WHOLE, Used
 from axisight.logs import Log, check_log, read_log
 from axisight.logs.map_files import column_file
 from axisight.logs.sources import files_of
@@ -60,9 +60,9 @@ def read_logs(
     robot: Robot | None,
     *,
     unchecked: bool,
-    part: tuple[float, float | None] = (0.0, None),
+    used: Used = WHOLE,
 ) -> list[Log]:
-    """Return the ``part`` [s] of logs that pass what ``axisight check`` looks at; warnings are printed.
+    """Return what is ``used`` of logs that pass what ``axisight check`` looks at; warnings are printed.
 
     Identification fits data in wrong units, or with rows missing, as well as any. Raises InputError
     for an error that the check finds, and for what :func:`check_fit_inputs` refuses by name, unless
@@ -79,7 +79,7 @@ def read_logs(
                 f"{path.name}: expected axes that {_kinds(robot.axis_is_prismatic)} as the "
                 f"robot's, got axes that {_kinds(slides)} by their units"
             )
-        logs.append(log if part == (0.0, None) else part_of(log, *part))
+        logs.append(used.one_of(log))
     found = check_fit_inputs(robot, logs)
     if refused(found) and not unchecked:
         raise InputError(f"{RefusedInputError(found)} (put it right, or go on with --unchecked)")

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import Force, From, To, errors, say
+from axisight.cli.common import Force, From, Moving, To, errors, say
 from axisight.cli.identify_common import (
     Columns,
     Out,
@@ -28,6 +28,7 @@ from axisight.cli.identify_common import (
 from axisight.cli.screen import OUT
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
+from axisight.gap.used import Used
 
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification
@@ -121,6 +122,7 @@ def rigid_body_command(
     force: Force = False,
     start_s: From = 0.0,
     stop_s: To = None,
+    moving: Moving = False,
 ) -> None:
     """Masses, inertias and friction from logs of motor angles and torques, by regression.
 
@@ -132,8 +134,8 @@ def rigid_body_command(
         check_out(out, [*logs, *(held_out or [])], columns, force=force)
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]
-        part = (start_s, stop_s)
-        read = read_logs(paths, columns, machine, unchecked=unchecked, part=part)
+        used = Used(start_s, stop_s, moving)
+        read = read_logs(paths, columns, machine, unchecked=unchecked, used=used)
         held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
             # They are among the notes that are printed.

@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from axisight.cli.common import numbers, say
+from axisight.cli.model_options import AS_IT_IS, ModelOptions
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 from axisight.robot_file import refuse_effects_beside
 from axisight.robot_import import is_model_file
 
@@ -29,14 +30,18 @@ GivenEffects = Annotated[
 
 
 def load_simulator(
-    source: Path | str, given: Sequence[Effect] = (), *, sample_time_s: float | None = None
+    source: Path | str,
+    given: Sequence[Effect] = (),
+    *,
+    options: ModelOptions = AS_IT_IS,
+    sample_time_s: float | None = None,
 ) -> Robot:
     """Return the robot to simulate with the ``given`` effects, and say which of its own act.
 
-    ``sample_time_s`` as in `axisight.load_robot`.
+    ``options`` as in `ModelOptions.load`, ``sample_time_s`` as in `axisight.load_robot`.
     Raises InputError as `say_effects`, and for a given effect that the robot cannot have.
     """
-    robot = load_robot(source, sample_time_s=sample_time_s)
+    robot = options.load(source, sample_time_s=sample_time_s)
     if is_model_file(source):
         say_import(robot)
     say_effects(robot, source, given)

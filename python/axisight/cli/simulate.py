@@ -11,11 +11,11 @@ import typer
 import xarray as xr
 from numpy.typing import NDArray
 
-from axisight.cli.common import Columns, Force, From, To, errors, numbers, say
+from axisight.cli.common import Columns, Force, From, Moving, To, errors, numbers, say
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.excitation.files import holds_references, read_references
-from axisight.gap.inputs import part_of
+from axisight.gap.used import Used
 from axisight.logs import Log, read_log
 from axisight.logs.sources import files_of
 from axisight.robot import Robot
@@ -68,6 +68,7 @@ def simulate_command(
     ] = 0.0,
     start_s: From = 0.0,
     stop_s: To = None,
+    moving: Moving = False,
     experiment: Annotated[
         int | None, typer.Option(help="Of references with several: the one to simulate, from 1.")
     ] = None,
@@ -79,14 +80,17 @@ def simulate_command(
         given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
         check_targets({"--out": out}, inputs=given, replaces={"--out": (".parquet",)}, force=force)
         machine = load_simulator(robot, parse_effects(effect))
+        use = Used(start_s, stop_s, moving)
         if holds_references(log):
-            if (start_s, stop_s, torque) != (0.0, None, False):
-                raise InputError(f"--from, --to, --torque: expected a log, got references in {log}")
+            if torque or not use.whole:
+                raise InputError(
+                    f"--from, --to, --moving, --torque: expected a log, got references in {log}"
+                )
             inputs = _designed(log, machine, experiment, periods)
         elif experiment is not None or periods != 1:
             raise InputError(f"--experiment, --periods: expected references, got the log {log}")
         else:
-            used = part_of(read_log(log, columns, robot=machine), start_s, stop_s)
+            used = use.one_of(read_log(log, columns, robot=machine))
             inputs = _inputs(used, machine, torque=torque)
         result = simulate(
             machine,

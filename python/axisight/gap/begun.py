@@ -9,8 +9,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
@@ -19,20 +17,14 @@ from axisight.gap.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
+from axisight.gap.used import REST_S, stands
 from axisight.logs import Log
 from axisight.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Share of its largest speed with which a motor still begins at rest, and how often the noise of a position over
 # a sample that may be: six deviations of the parabola's slope.
 _BEGINS = 0.03
 _BY_NOISE = 15.0
-# Seconds that a rest has to last; of the largest speed and its reference, below which a motor stands; and
-# deviations of the noise of a mean speed.
-_REST_S = 0.2
-_STANDS = 0.005
-_NOISES = 6.0
 # Share of a log that has to be left.
 _LEFT = 0.5
 
@@ -134,16 +126,10 @@ def begins_at_rest(log: Log, noise_std: float) -> bool:
 
 def first_rest_s(log: Log) -> float | None:
     """Return where [s] all motors of a log first stand, and their references; None if too little is left."""
-    n = max(4, round(_REST_S / log.sample_time_s))
-    speed = _speeds(log, n)
-    noise = position_noise_std([log]) / (log.sample_time_s * n)
-    stands = np.all(speed <= _STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
-    if log.velocity_ref_rad_s is not None:
-        told = np.abs(log.velocity_ref_rad_s)
-        told = scipy.ndimage.maximum_filter1d(told, n, axis=0, mode="nearest")
-        stands &= np.all(told <= _STANDS * told.max(axis=0), axis=1)
-    stands[: n // 2] = False
-    places = np.flatnonzero(stands)
+    n = max(4, round(REST_S / log.sample_time_s))
+    still = stands(log)
+    still[: n // 2] = False
+    places = np.flatnonzero(still)
     if not len(places) or places[0] > (1 - _LEFT) * log.n_samples:
         return None
     start = float(places[0] * log.sample_time_s)
@@ -152,14 +138,6 @@ def first_rest_s(log: Log) -> float | None:
     except InputError:
         return None
     return start
-
-
-def _speeds(log: Log, n: int) -> Array:
-    """Return the mean speed (n_samples, n_axes) over ``n`` samples around each."""
-    mean = scipy.ndimage.uniform_filter1d(
-        np.gradient(log.position_rad, log.sample_time_s, axis=0), n, axis=0, mode="nearest"
-    )
-    return np.abs(mean)
 
 
 def _from(log: Log, start_s: float) -> Finding:
@@ -175,7 +153,7 @@ def _from(log: Log, start_s: float) -> Finding:
 def _without_references(names: Sequence[str], why: NotRunUpError) -> Finding:
     message = (
         f"expected starts at rest, where a simulation of the loop begins, got starts in motion, "
-        f"no rest of {_REST_S:g} s in the first half of {', '.join(names)}, and no beginning to simulate from "
+        f"no rest of {REST_S:g} s in the first half of {', '.join(names)}, and no beginning to simulate from "
         f"({why}): torques are predicted from the measured motion instead, without the references; log from "
         f"rest, log longer, or leave these logs out"
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from axisight.arguments import usable_path
 from axisight.errors import InputError
+from axisight.gap.used import WHOLE, Used
 from axisight.logs import Log, read_case, read_log
 from axisight.logs.sources import files_of, is_folder_log
 from axisight.logs.untrusted import check_log_inside
@@ -16,6 +17,7 @@ from axisight.robot_import import is_model_file
 
 # How models end that may stand first among logs; tables (.csv) are logs there.
 _MODELS = (".urdf", ".xml", ".mjcf", ".toml")
+_NONE_HELD = "--validation: expected a log to hold out, or at least two logs"
 
 
 @dataclass(frozen=True)
@@ -45,42 +47,45 @@ def read_inputs(
     validation: Sequence[Path],
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
-    part: tuple[float, float | None] = (0.0, None),
+    used: Used = WHOLE,
     simulated: Sequence[Path] = (),
     *,
+    bare: Callable[..., Robot] = load_robot,
     untrusted: bool = False,
     max_bytes: int | None = None,
 ) -> Inputs:
-    """Read a case folder, or logs with a model, which ``load`` turns into a robot.
+    """Read a case folder, or logs with a model, which ``load`` turns into a robot, ``bare`` into one to read by.
 
     The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
-    ``part``: from and to which time [s] each log is used; ``simulated``: logs of the user's own simulator;
-    ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`; ``max_bytes`` as in `read_log`.
-    Raises InputError when nothing is left to hold out, the model is missing, or the part cannot be used.
+    ``used``: what is used of each log; of one log, its last run is held out; ``simulated``: logs of
+    the user's own simulator; ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`;
+    ``max_bytes`` as in `read_log`. Raises InputError when nothing is left to hold out, the model is
+    missing, or of a log nothing can be used.
     """
     paths = [usable_path(path, InputError) for path in paths]
     for path in (*paths, *validation, *simulated) if untrusted else ():
         if not path.is_dir() or is_folder_log(path):
             check_log_inside(path)
-    read = _read(paths, model, validation, columns, load, untrusted, max_bytes)
+    read = _read(
+        paths, model, validation, columns, (load, bare), untrusted, max_bytes, runs=used.runs
+    )
     sims = [read_log(p, columns, robot=read.robot, max_bytes=max_bytes) for p in simulated]
     read = replace(read, simulated=tuple(sims))
-    if part == (0.0, None):
-        return read
+    return read if used.whole else _used(read, used)
+
+
+def _used(read: Inputs, used: Used) -> Inputs:
+    """Return the inputs with what is used of each log; logs of a simulator are cut as those beside them."""
     logs = (*read.estimation, *read.validation)
-    cut = [part_of(log, *part) for log in logs]
-    n = len(read.estimation)
-    own = tuple(part_of(log, *part) for log in read.simulated)
-    return replace(read, estimation=tuple(cut[:n]), validation=tuple(cut[n:]), simulated=own)
-
-
-def part_of(log: Log, start_s: float, stop_s: float | None) -> Log:
-    """Return what ``--from`` and ``--to`` [s] leave of a log; raises InputError naming them."""
-    try:
-        return log.part(start_s, stop_s)
-    except InputError as error:
-        text = str(error).replace("start_s", "--from").replace("stop_s", "--to")
-        raise InputError(f"{log.source}: {text}") from None
+    sims = list(read.simulated)
+    if len(sims) == len(logs):
+        sims = [one for log, sim in zip(logs, sims, strict=True) for one in used.beside(log, sim)]
+    fitted = [one for log in read.estimation for one in used.of(log)]
+    held = [one for log in read.validation for one in used.of(log)]
+    if not held and len(fitted) < 2:
+        raise InputError(_NONE_HELD)
+    held = held or [fitted.pop()]
+    return replace(read, estimation=tuple(fitted), validation=tuple(held), simulated=tuple(sims))
 
 
 def read_beside(
@@ -89,14 +94,15 @@ def read_beside(
     columns: Path | None,
     load: Callable[..., Robot] = load_robot,
     *,
+    bare: Callable[..., Robot] = load_robot,
     max_bytes: int | None = None,
 ) -> tuple[Robot, list[Log]]:
-    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it.
+    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it, read by ``bare``'s.
 
     ``columns`` and ``max_bytes`` as in `read_log`. Raises LogError for a log that is none of this robot.
     """
     # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
-    robot = load_robot(model) if is_model_file(model) else load(model)
+    robot = bare(model) if is_model_file(model) else load(model)
     logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in paths]
     return _loaded(load, model, logs) if is_model_file(model) else robot, logs
 
@@ -113,16 +119,20 @@ def _read(
     model: str | None,
     validation: Sequence[Path],
     columns: Path | None,
-    load: Callable[..., Robot],
+    loads: tuple[Callable[..., Robot], Callable[..., Robot]],
     untrusted: bool,
     max_bytes: int | None,
+    *,
+    runs: bool,
 ) -> Inputs:
+    load, bare = loads
     if model is None and paths and paths[0].suffix.lower() in _MODELS:
         model, paths = str(paths[0]), paths[1:]
         if not paths:
             raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
-        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes)
+        own = bare if model is None else load_robot
+        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes, load=own)
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
         extra = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in validation]
@@ -133,10 +143,12 @@ def _read(
         raise InputError(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
-    robot, read = read_beside(model, [*paths, *validation], columns, load, max_bytes=max_bytes)
+    robot, read = read_beside(
+        model, [*paths, *validation], columns, load, bare=bare, max_bytes=max_bytes
+    )
     logs, held = read[: len(paths)], read[len(paths) :]
     if not held:
-        if len(logs) < 2:
-            raise InputError("--validation: expected a log to hold out, or at least two logs")
-        held = [logs.pop()]
+        if len(logs) < 2 and not runs:
+            raise InputError(_NONE_HELD)
+        held = [logs.pop()] if len(logs) > 1 else []
     return Inputs(paths[0].stem, robot, model, tuple(logs), tuple(held))

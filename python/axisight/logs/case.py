@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -93,6 +94,7 @@ def read_case(
     *,
     untrusted: bool = False,
     max_bytes: int | None = None,
+    load: Callable[..., Robot] = load_robot,
 ) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
@@ -103,6 +105,7 @@ def read_case(
 
     ``untrusted``: a case of somebody else. Nothing outside the folder is opened: names that are absolute
     or have ``..``, links that lead out, and HDF5 files that name others are refused.
+    ``load`` makes of the robot's path the robot by whose gears signals of joints are read.
     """
     folder = usable_path(folder, CaseError)
     path = folder / "case.toml"
@@ -134,7 +137,7 @@ def read_case(
     recorded = any(
         is_bag(folder / entry.file) or is_folder_log(folder / entry.file) for entry in content.log
     )
-    robot = load_robot(robot_path) if joints or recorded else None
+    robot = load(robot_path) if joints or recorded else None
     logs = tuple(
         _read_entry(path, number, entry, given, robot, max_bytes)
         for number, entry in enumerate(content.log)

@@ -42,6 +42,7 @@ class Gathered:
     """The signals found in SI units, each 1-D, and what was wrong with the others.
 
     `doubts` are about whole files; a grid of more than `most_samples` would not keep to the budget.
+    `mapped`: by a column map that was given.
     """
 
     path: Path
@@ -55,6 +56,7 @@ class Gathered:
     pattern: ColumnPattern | None = None
     doubts: tuple[str, ...] = ()
     most_samples: int = 2**62
+    mapped: bool = False
 
     @property
     def notes(self) -> list[str]:
@@ -85,7 +87,7 @@ def gather(
     pattern = chosen if isinstance(chosen, ColumnPattern) else None
     if isinstance(chosen, ColumnPattern):
         chosen = chosen.for_file(files.main, robot, path)
-    result = Gathered(path, chosen, pattern=pattern)
+    result = Gathered(path, chosen, pattern=pattern, mapped=given is not None)
     _take_time(files, result)
     for number, axis in enumerate(result.columns.axis):
         for name in _FIELDS:

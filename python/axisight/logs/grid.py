@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from axisight.logs.findings import Finding
 from axisight.logs.log import RESAMPLED, Floats
+from axisight.logs.mean_rate import whole_rate
 
 JITTER_SAMPLES = 0.01
 """Largest tolerated error of a time stamp, in samples."""
@@ -43,6 +45,7 @@ def make_grid(
     n_samples: int,
     *,
     label: str = "time",
+    unmapped: str | None = None,
     resample_hz: float | None = None,
     most_samples: int = 2**62,
 ) -> Grid:
@@ -50,7 +53,7 @@ def make_grid(
 
     `time_s` (n,) in s or None, `rate_hz` declared or None, `n_samples` of the signals. Stamps
     that are off by up to 1 % of a sample are replaced by the uniform grid. One of more than
-    `most_samples` is not made.
+    `most_samples` is not made. `unmapped` is the file of a log that is read without a column map.
     """
     grid = Grid(n_samples=n_samples)
     for name, rate in (("sample_rate_hz", rate_hz), ("resample_hz", resample_hz)):
@@ -63,7 +66,7 @@ def make_grid(
             grid.sample_time_s = 1.0 / rate_hz
     elif _usable(grid, time_s, label):
         if resample_hz is None:
-            _check_uniform(grid, time_s, label)
+            _check_uniform(grid, time_s, label, unmapped)
             grid.n_samples = time_s.size
         else:
             _resample(grid, time_s, resample_hz, label, most_samples)
@@ -115,7 +118,7 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
     return True
 
 
-def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
+def _check_uniform(grid: Grid, time_s: Floats, label: str, unmapped: str | None) -> None:
     steps = np.diff(time_s)
     typical = float(np.median(steps))
     gaps = np.flatnonzero(steps > 1.5 * typical)
@@ -140,14 +143,29 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str) -> None:
         grid.error(
             label,
             f"expected uniform sampling within {JITTER_SAMPLES:.0%} of a sample, got a step of "
-            f"{steps[worst]:.6g} s instead of {mean:.6g} s after index {worst}; if the samples are "
-            "in truth uniform, give sample_rate_hz and no time column; if not, give resample_hz",
+            f"{steps[worst]:.6g} s instead of {mean:.6g} s after index {worst}; "
+            f"{_remedy(1.0 / mean, unmapped)}",
             "time_jitter",
         )
     elif jitter.max() > 1e-6:
         grid.notes.append(
             f"time stamps replaced by the uniform grid (jitter {jitter.max():.2g} of a sample)"
         )
+
+
+def _remedy(rate_hz: float, unmapped: str | None) -> str:
+    """Return what to do about stamps that are not uniform, with the lines of a column map."""
+    rate = f"{whole_rate(rate_hz):.6g}"
+    where = "of the column map"
+    if unmapped is not None:
+        where = (
+            f"of a column map for --columns, which `axisight columns guess {shlex.quote(unmapped)} "
+            f"-o columns.toml` proposes"
+        )
+    return (
+        f"put them on a grid by the line resample_hz = {rate} in [time] {where}; if the samples are in truth "
+        f"uniform, by sample_rate_hz = {rate} at its top instead of [time]"
+    )
 
 
 def _resample(

@@ -37,5 +37,9 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
             f"map with resample_hz"
         )
     # The mean: single late messages do not count.
-    rate = 1.0 / mean
-    return float(round(rate)) if abs(round(rate) / rate - 1.0) < 0.01 else rate
+    return whole_rate(1.0 / mean)
+
+
+def whole_rate(rate_hz: float) -> float:
+    """Return the whole number nearest to a rate that was measured, where that is within a hundredth."""
+    return float(round(rate_hz)) if abs(round(rate_hz) / rate_hz - 1.0) < 0.01 else rate_hz

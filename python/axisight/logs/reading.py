@@ -71,6 +71,7 @@ def grid_of(found: Gathered) -> Grid:
         found.rate_hz,
         n_samples,
         label=time.label if time is not None else "sample_rate_hz",
+        unmapped=None if found.mapped else str(found.path),
         resample_hz=resample,
         most_samples=found.most_samples,
     )

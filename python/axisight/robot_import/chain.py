@@ -95,8 +95,8 @@ def _only_end(tree: Tree, first: str) -> str:
         trunk = [name for name in paths[0] if all(name in path for path in paths)]
         raise RobotError(
             f"{tree.file}: expected one serial chain below {first!r}, got {len(ends)} moving branches: give "
-            f"the last link of the one that is meant, tip = '...' in the drive data beside the file or --tip of "
-            f"`axisight robot import` (they end at "
+            f"the last link of the one that is meant, --tip (of diagnose, check and robot import) or "
+            f"tip = '...' in the drive data beside the file (they end at "
             f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
         )
     return (tree.bodies[ends[0]].of or ends[0]) if ends else first

@@ -13,6 +13,7 @@ from axisight.errors import InputError
 from axisight.mujoco.torques import is_torque
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
+from axisight.robot_import.drives import DriveData
 from axisight.robot_import.load import bodies_and_chain, drive_data
 from axisight.robot_import.xml_tree import Element, parse_xml
 from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
@@ -51,6 +52,7 @@ def write_model(
     target: Path | str,
     *,
     overwrite: bool = False,
+    drives: DriveData | None = None,
 ) -> Written:
     """Write the model of a diagnosis with its causes.
 
@@ -65,6 +67,8 @@ def write_model(
         and lags of motors. What was re-fitted within its tolerance stays as it is.
     overwrite
         Replace a file that exists.
+    drives
+        What ``robot`` was read with; None: what stands beside the file.
 
     Raises InputError as `check_target`.
     """
@@ -72,7 +76,7 @@ def write_model(
     path = Path(target)
     if path.suffix.lower() == ".toml":
         return _as_robot_file(robot, causes, path, overwrite=overwrite)
-    return _as_model(Path(source), robot, causes, path)
+    return _as_model(Path(source), robot, causes, path, drives)
 
 
 def check_target(source: Path | str, target: Path | str, *, overwrite: bool = False) -> None:
@@ -101,13 +105,18 @@ def _as_robot_file(
     return Written(path, tuple(c.label for c in causes), ())
 
 
-def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -> Written:
+def _as_model(
+    source: Path, robot: Robot, causes: Sequence[Cause], path: Path, drives: DriveData | None
+) -> Written:
     text = source.read_bytes()
     root = parse_xml(text, str(source))
     if root.tag not in JOINT_NUMBERS:
         raise InputError(f"{source}: expected a URDF or MJCF to write back to, got <{root.tag}>")
     edits = Edits(text, str(source))
-    done = [*_on_axes(edits, root, robot, causes), *_on_chain(edits, root, source, robot, causes)]
+    done = [
+        *_on_axes(edits, root, robot, causes),
+        *_on_chain(edits, root, (source, drives), robot, causes),
+    ]
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
     try:
@@ -142,14 +151,19 @@ def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause])
 
 
 def _on_chain(
-    edits: Edits, root: Element, source: Path, robot: Robot, causes: Sequence[Cause]
+    edits: Edits,
+    root: Element,
+    source: tuple[Path, DriveData | None],
+    robot: Robot,
+    causes: Sequence[Cause],
 ) -> list[Placed]:
     """Write what belongs to links, and to where axes lie."""
     links = [cause for cause in causes if cause.effect in LINK_EFFECTS]
     frames = [cause for cause in causes if cause.effect in FRAME_EFFECTS]
     if not links and not frames:
         return []
-    tree, chain = bodies_and_chain(source, drive_data(source))
+    file, drives = source
+    tree, chain = bodies_and_chain(file, drives or drive_data(file))
     if [joint.body.joint for joint in chain.joints] != robot.joint_names:
         placed = Placed()
         placed.refuse([*links, *frames], "the robot is not the chain that the file says")

@@ -21,6 +21,7 @@ from axisight.logs.guessing.others import (
     take_velocity,
 )
 from axisight.logs.guessing.series import series_of
+from axisight.logs.guessing.uneven import uneven_text
 from axisight.logs.guessing.write import text_of
 from axisight.logs.lazy import LazyArrays
 from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
@@ -70,9 +71,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     opened, csv = _opened(path)
     arrays, unread = opened.readable()
     if set(_NATIVE) <= set(arrays):
-        raise LogError(
-            f"{path}: expected a log without the native columns, got one: it needs no map"
-        )
+        return _native(path, opened)
     fit, against = named_map(arrays, robot, path)
     if fit is not None:
         return _named(path, fit)
@@ -98,6 +97,16 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     return Proposal(
         text, parse_column_map(text, f"{path}: guess"), None, tuple(draft.doubts), draft.unused
     )
+
+
+def _native(path: Path, arrays: LazyArrays) -> Proposal:
+    """Return the map of a file with native columns, which needs one where its stamps are not uniform."""
+    text = uneven_text(arrays, path)
+    if text is None:
+        raise LogError(
+            f"{path}: expected a log without the native columns, got one: it needs no map"
+        )
+    return Proposal(text, parse_column_map(text, f"{path}: guess"), None, (), {})
 
 
 def _named(path: Path, fit: Fit) -> Proposal:

@@ -1,0 +1,84 @@
+"""What the command line says of a model file: between which links its chain runs, and what hangs on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from axisight.errors import InputError
+from axisight.robot import Robot, load_robot
+from axisight.robot_import import import_robot, is_model_file
+from axisight.robot_import.drives import DriveData, Payload
+from axisight.robot_import.load import drive_data
+
+Base = Annotated[
+    str | None, typer.Option(help="Of a model file: link that stands still. Default: the root.")
+]
+Tip = Annotated[
+    str | None,
+    typer.Option(
+        help="Of a model file: last link of the chain; other moving branches are locked at zero. Default: the "
+        "end of the only moving branch."
+    ),
+]
+Load = Annotated[
+    str | None,
+    typer.Option(
+        "--payload",
+        metavar="KG[,X,Y,Z]",
+        help="On a model file, load mounted by hand: mass, and its centre in the frame of the last link [m].",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """Options ``--base``, ``--tip`` and ``--payload`` as they were given."""
+
+    base: str | None = None
+    tip: str | None = None
+    payload: str | None = None
+
+    def given(self) -> list[str]:
+        """Return the options that were given."""
+        return [f"--{name}" for name, text in vars(self).items() if text is not None]
+
+    def drives(self, source: Path | str, file: Path | None = None) -> DriveData:
+        """Return the drive data of a model, those of ``file`` or beside it, with what was given.
+
+        Raises InputError for a payload that is none.
+        """
+        said: dict[str, object] = {"base": self.base, "tip": self.tip}
+        if self.payload is not None:
+            said["payload"] = _payload(self.payload)
+        stated = {name: value for name, value in said.items() if value is not None}
+        return drive_data(source, file).model_copy(update=stated)
+
+    def load(self, source: Path | str, *, sample_time_s: float | None = None) -> Robot:
+        """Return the robot of a source; raises InputError for options that a robot file has no use for."""
+        if not self.given():
+            return load_robot(source, sample_time_s=sample_time_s)
+        if not is_model_file(source):
+            raise InputError(
+                f"{', '.join(self.given())}: expected a model file (URDF, MJCF, DH table), got {source}; "
+                f"a robot file states its chain, and takes loads by --effect 'payload mass_kg=1'"
+            )
+        return import_robot(source, drives=self.drives(source), sample_time_s=sample_time_s)
+
+
+AS_IT_IS = ModelOptions()
+"""Nothing was given."""
+
+
+def _payload(text: str) -> Payload:
+    try:
+        mass, *com = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--payload: expected KG or KG,X,Y,Z, got {text!r}") from None
+    if len(com) not in (0, 3) or not mass > 0:
+        raise InputError(f"--payload: expected KG or KG,X,Y,Z with a positive mass, got {text!r}")
+    x, y, z = com or (0.0, 0.0, 0.0)
+    return Payload(mass=mass, com=(x, y, z))

@@ -1,0 +1,37 @@
+"""The map of a log with native columns whose stamps are not uniform: it says the rate, and the rest as it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from axisight.logs.columns import AxisColumns
+from axisight.logs.lazy import LazyArrays
+from axisight.logs.mean_rate import mean_rate_hz
+from axisight.logs.native import native_map
+
+
+def uneven_text(arrays: LazyArrays, path: Path) -> str | None:
+    """Return the TOML of the map; None for uniform stamps, which need none.
+
+    Raises LogError for a hole in the stamps, and as `native_map`.
+    """
+    rate = mean_rate_hz(arrays["time_s"], f"{path}: time_s")
+    if rate is None:
+        return None
+    lines = [
+        f"# The columns of {json.dumps(path.name)} are the native ones; its stamps are not uniform.",
+        'schema = "axisight.columns/1"',
+        "",
+        "[time]",
+        'name = "time_s"',
+        'unit = "s"',
+        f"resample_hz = {rate:.9g}",
+    ]
+    for axis in native_map(arrays, str(path)).axis:
+        lines += ["", "[[axis]]"]
+        for field in AxisColumns.model_fields:
+            signal = getattr(axis, field)
+            if signal is not None:
+                lines.append(f'{field} = {{ name = "{signal.name}", unit = "{signal.unit}" }}')
+    return "\n".join(lines) + "\n"
