@@ -132,6 +132,113 @@ def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
     assert "actuators of elbow are told positions, those of other joints are not" in robot.toml
 
 
+MOTOR = '<motor joint="shoulder" gear="50"/>'
+# What a chain has no number for: where it stands, and what is said of it.
+BEYOND = {
+    "gravcomp": (
+        'name="lower"',
+        'name="lower" gravcomp="0.5"',
+        "gravcomp of 'lower' left out: gravity acts on all of their masses",
+    ),
+    "force of a joint": (
+        'name="elbow"',
+        'name="elbow" actuatorfrcrange="-5 5"',
+        "joint 'elbow': limits of the force of its actuators left out",
+    ),
+    "second motor": (
+        MOTOR,
+        MOTOR + '<motor name="other" joint="shoulder" gear="3"/>',
+        "joint 'shoulder' has 2 motors, 'actuator 0', 'other': their gears, gains, limits, delays and lags",
+    ),
+    "site": (
+        MOTOR,
+        MOTOR + '<motor name="jet" site="s" gear="0 0 1 0 0 0"/>',
+        "actuator 'jet' acts on a site, not on one joint: left out",
+    ),
+    "tendon": (
+        MOTOR + "</actuator>",
+        '<motor name="rope" tendon="t"/></actuator><tendon><fixed name="t">'
+        '<joint joint="elbow" coef="1"/></fixed></tendon>',
+        "actuator 'rope' acts on a tendon, not on one joint: left out",
+    ),
+    "force of a motor": (
+        MOTOR,
+        '<motor joint="shoulder" name="m" forcerange="-1 1"/>',
+        "actuator 'm': limits of its force left out",
+    ),
+    "stiffness": (
+        'stiffness="3"',
+        'stiffness="3 2"',
+        "joint 'shoulder': stiffness beyond the linear left out",
+    ),
+    "damping": (
+        'damping="0.7"',
+        'damping="0.7 0 2"',
+        "joint 'shoulder': damping beyond the linear left out",
+    ),
+    "yielding": (
+        'stiffness="3"',
+        'stiffness="3" springyield="0.1"',
+        "joint 'shoulder': yielding of its spring left out",
+    ),
+    "damping of a motor": (
+        MOTOR,
+        '<motor name="m" joint="shoulder" damping="1 2"/>',
+        "actuator 'm': damping beyond the linear left out",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_what_a_chain_has_no_number_for_is_said(tmp_path: Path, what: str):
+    old, new, note = BEYOND[what]
+    plain = changed(MJCF, '<inertial pos="0 0 0"', '<site name="s"/><inertial pos="0 0 0"')
+    path = written(tmp_path, changed(plain, old, new), "arm.xml")
+    if what in ("stiffness", "damping", "yielding", "damping of a motor"):
+        since_mujoco_4(path)
+    assert f"# {note}" in import_robot(path).toml
+    assert note not in import_robot(written(tmp_path, plain, "plain.xml")).toml
+
+
+def since_mujoco_4(path: Path) -> None:
+    """Skip the test where the MuJoCo that is there does not know what the file says."""
+    if int(mujoco.__version__.split(".")[0]) < 4:
+        pytest.skip(f"{path.name} needs MuJoCo 4")
+
+
+def test_a_motor_in_the_parent_is_one_of_the_joint(tmp_path: Path):
+    """For one axis both frames have the same torque."""
+    path = written(tmp_path, MJCF, "arm.xml")
+    in_parent = changed(MJCF, "<motor joint=", "<motor jointinparent=")
+    robot = import_robot(written(tmp_path, in_parent, "parent.xml"))
+    assert robot.gear_ratio.tolist() == import_robot(path).gear_ratio.tolist()
+    assert "left out" not in robot.toml
+
+
+def test_armature_and_damping_of_motors_act_on_the_joint(tmp_path: Path):
+    """By the gear twice, beside those of the joint: inertia and passive torque are MuJoCo's."""
+    text = changed(MJCF, 'gear="50"', 'gear="50" armature="1e-4" damping="2e-3"')
+    path = written(tmp_path, text, "arm.xml")
+    since_mujoco_4(path)
+    parameters = import_robot(path).parameters()
+    assert parameters["shoulder.motor_inertia"] == pytest.approx(0.2 / 50**2 + 1e-4)
+    assert parameters["shoulder.viscous_friction"] == pytest.approx(0.7 / 50**2 + 2e-3)
+    bare = written(tmp_path, changed(MJCF, 'armature="0.2"', ""), "bare.xml")
+    moving = np.array([1.0, 0.0, 0.0])
+    torques = []
+    for model in (mujoco.MjModel.from_xml_path(str(one)) for one in (path, bare)):
+        data, inertia = mujoco.MjData(model), np.zeros(3)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_mulM(model, data, inertia, moving)
+        still = data.qfrc_passive[0]
+        data.qvel[:] = moving
+        mujoco.mj_forward(model, data)
+        torques.append((inertia[0], still - data.qfrc_passive[0]))
+    (inertia, damping), (of_links, _) = torques
+    assert parameters["shoulder.motor_inertia"] * 50**2 == pytest.approx(inertia - of_links)
+    assert parameters["shoulder.viscous_friction"] * 50**2 == pytest.approx(damping)
+
+
 def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def no(name: str):
         raise ImportError(name)

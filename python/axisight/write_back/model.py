@@ -107,7 +107,10 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     if root.tag not in JOINT_NUMBERS:
         raise InputError(f"{source}: expected a URDF or MJCF to write back to, got <{root.tag}>")
     edits = Edits(text, str(source))
-    done = [*_on_axes(edits, root, robot, causes), *_on_chain(edits, root, source, robot, causes)]
+    done = [
+        *_on_axes(edits, root, source, robot, causes),
+        *_on_chain(edits, root, source, robot, causes),
+    ]
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
     try:
@@ -124,21 +127,38 @@ def _as_model(source: Path, robot: Robot, causes: Sequence[Cause], path: Path) -
     )
 
 
-def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause]) -> list[Placed]:
+def _on_axes(
+    edits: Edits, root: Element, source: Path, robot: Robot, causes: Sequence[Cause]
+) -> list[Placed]:
     """Write what belongs to joints and motors, axis by axis."""
     # Transmissions, actuators and constraints name joints by elements of the same name.
     holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
     joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
     out = []
+    shares = _of_actuators(source, causes) if root.tag == "mujoco" else {}
     for axis, name in enumerate(robot.axis_names):
         mine = [cause for cause in causes if not cause.axes and cause.axis == axis + 1]
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
-            out.append(write_joint(edits, root, joints[name], robot, axis, numbers))
+            out.append(
+                write_joint(edits, root, joints[name], robot, axis, numbers, shares.get(name, {}))
+            )
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         if drives and root.tag == "mujoco":
             out.append(write_drive(edits, root, name, drives))
     return out
+
+
+def _of_actuators(source: Path, causes: Sequence[Cause]) -> dict[str, dict[str, float]]:
+    """Return how much of a number of a joint an MJCF has on actuators, by joint and number."""
+    names = ("armature", "damping")
+    if not any(JOINT_NUMBERS["mujoco"].get(cause.effect) in names for cause in causes):
+        return {}
+    _, chain = bodies_and_chain(source, drive_data(source))
+    return {
+        joint.body.joint: dict(zip(names, joint.body.drive.of_actuators, strict=True))
+        for joint in chain.joints
+    }
 
 
 def _on_chain(
