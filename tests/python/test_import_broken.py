@@ -123,6 +123,15 @@ BROKEN_URDF = {
     "limits swapped": (urdf('lower="-2"', 'lower="3"'), {}, r"<limit>: expected lower <= upper"),
     "negative damping": (urdf('damping="0.7"', 'damping="-1"'), {}, r"<dynamics>: damping"),
     "no reduction": (urdf("50</", "0</"), {}, r"<mechanicalReduction>.*got '0'"),
+    "no reduction of ros2_control": (
+        urdf(
+            "</robot>",
+            '<ros2_control name="c"><transmission name="t"><joint name="elbow"><mechanical_reduction>'
+            "many</mechanical_reduction></joint></transmission></ros2_control></robot>",
+        ),
+        {},
+        r"line 47, <mechanical_reduction>.*got 'many'",
+    ),
     "no links": ("<robot name='x'/>", {}, r"line 1, <robot 'x'>: expected at least one <link>"),
     "another root": ("<sdf version='1.6'/>", {}, r"<sdf>: expected <robot> \(URDF\) or <mujoco>"),
     "xacro not run": (

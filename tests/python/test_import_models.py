@@ -45,6 +45,62 @@ def test_a_urdf_says_drives(tmp_path: Path):
     assert (dry.parameters or {})["smoothing_rad_s"] == pytest.approx(0.01 * 50)
 
 
+TRANSMISSION = URDF[URDF.index("  <transmission") : URDF.index("</robot>")]
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+def test_gears_of_ros2_control_are_read(tmp_path: Path, joint: str):
+    """Beside the hardware interfaces of joints, which are none of the robot's."""
+    control = f"""<ros2_control name="arm" type="system"><hardware><plugin>a/B</plugin></hardware>
+    <joint name="{joint}"><command_interface name="effort"/></joint>
+    <transmission name="t"><plugin>transmission_interface/SimpleTransmission</plugin>
+      <joint name="{joint}" role="joint1"><mechanical_reduction> 80.0 </mechanical_reduction></joint>
+      <actuator name="m" role="actuator1"/></transmission></ros2_control>"""
+    robot = import_robot(written(tmp_path, changed(URDF, TRANSMISSION, control)))
+    number = robot.joint_names.index(joint)
+    assert robot.gear_ratio[number] == pytest.approx(1 / 80)
+    assert robot.gear_ratio[1 - number] == 1.0
+    assert "left out" not in robot.toml
+
+
+# Transmissions of which something is left out: what becomes of the file's, what is said, the shoulder's ratio.
+TRANSMISSIONS = {
+    "differential": (
+        '<joint name="shoulder"/>',
+        '<joint name="shoulder"/><joint name="elbow"/>',
+        "transmission 't' drives several joints, 'shoulder', 'elbow': their reductions left out",
+        1.0,
+    ),
+    "of the actuator": (
+        "mechanicalReduction>50</mechanicalReduction",
+        "mechanical_reduction>50</mechanical_reduction",
+        "transmission 't': mechanical_reduction of its actuator left out, ros2_control takes that of the joint",
+        1.0,
+    ),
+    "unknown joint": (
+        '<joint name="shoulder"/>',
+        '<joint name="sholder"/>',
+        "transmission 't' is of a joint 'sholder' that is not there: left out",
+        1.0,
+    ),
+    "two of one": (
+        "  </transmission>",
+        '</transmission><transmission name="u"><joint name="shoulder">'
+        "<mechanical_reduction>60</mechanical_reduction></joint></transmission>",
+        "transmission 'u': reduction 60 of 'shoulder' left out, another transmission says 50",
+        1 / 50,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TRANSMISSIONS)
+def test_transmissions_that_are_no_gear_of_one_joint_are_said(tmp_path: Path, what: str):
+    old, new, note, ratio = TRANSMISSIONS[what]
+    robot = import_robot(written(tmp_path, changed(URDF, old, new)))
+    assert f"# {note}" in robot.toml
+    assert robot.gear_ratio[0] == pytest.approx(ratio)
+
+
 def test_branches_are_cut_by_the_tip(tmp_path: Path):
     """A camera that nods beside the elbow: locked at zero, its mass stays where it is."""
     camera = """<link name="camera"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>

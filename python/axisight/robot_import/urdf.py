@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.urdf_transmissions import gear_ratios
 from axisight.robot_import.xml_tree import Element
 
 Array = NDArray[np.float64]
@@ -37,11 +38,11 @@ def read_urdf(root: Element, path: Path) -> Tree:
     if not links:
         raise RobotError(f"{root.where}: expected at least one <link>, got none")
     joints = _named(root, "joint")
-    ratios = _ratios(root)
+    ratios, notes = gear_ratios(root, joints)
     above = _above(joints, links)
     order = _from_the_root(root, links, above)
     bodies = {name: _body(name, links[name], above.get(name), ratios, links) for name in order}
-    return Tree(root.attributes.get("name", path.stem), bodies, str(path))
+    return Tree(root.attributes.get("name", path.stem), bodies, str(path), notes=notes)
 
 
 def _named(root: Element, tag: str) -> dict[str, Element]:
@@ -215,29 +216,3 @@ def _limits(joint: Element, kind: str) -> tuple[float, float] | None:
     if lower > upper:
         raise RobotError(f"{limit.where}: expected lower <= upper, got {lower:g} and {upper:g}")
     return None if lower == upper else (lower, upper)
-
-
-def _ratios(root: Element) -> dict[str, float]:
-    """Return the gear ratio r of joints with a <transmission>: one over its reduction."""
-    out: dict[str, float] = {}
-    for transmission in root.all("transmission"):
-        names = [joint.require("name", "a joint") for joint in transmission.all("joint")]
-        holders = [*transmission.all("actuator"), *transmission.all("joint")]
-        reductions = [x for holder in holders for x in holder.all("mechanicalReduction")]
-        # Several joints on one: a differential, which is no ratio of one axis.
-        if len(names) == 1 and reductions:
-            out[names[0]] = 1.0 / _reduction(reductions[0])
-    return out
-
-
-def _reduction(element: Element) -> float:
-    text = element.text.strip()
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if value == 0 or not np.isfinite(value):
-        raise RobotError(
-            f"{element.where}: expected a reduction other than zero, got {shown(text)}"
-        )
-    return value
