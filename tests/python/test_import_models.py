@@ -352,6 +352,42 @@ def test_a_pinocchio_model_is_taken_as_it_is(tmp_path: Path):
     assert import_robot(floating, base="root_joint").joint_names == robot.joint_names
 
 
+def test_a_mirrored_frame_is_refused(tmp_path: Path):
+    """URDF and MJCF cannot say one, a model in memory can."""
+    model = pinocchio.buildModelFromUrdf(str(written(tmp_path, URDF)))
+    mirror = np.diag([1.0, 1.0, -1.0])
+    model.jointPlacements[2] = pinocchio.SE3(mirror, np.array([0.5, 0, 0]))
+    with pytest.raises(
+        RobotError, match=r"joint 'elbow': expected a placement that turns.*mirrors"
+    ):
+        import_robot(model)
+
+
+def test_moments_that_a_rounding_made_negative_are_zero(tmp_path: Path):
+    flange = '<inertia ixx="0.001" ixy'
+    rounded = written(tmp_path, changed(URDF, flange, '<inertia ixx="-5e-20" ixy'), "rounded.urdf")
+    zero = written(tmp_path, changed(URDF, flange, '<inertia ixx="0" ixy'), "zero.urdf")
+    robot, same = import_robot(rounded), import_robot(zero)
+    assert "# ixx of link 'flange' taken as zero: -5e-20 kg m^2 in line 21" in robot.toml
+    assert "taken as zero" not in same.toml
+    q, v, a = states(robot, 20)
+    assert np.array_equal(robot.inverse_dynamics(q, v, a), same.inverse_dynamics(q, v, a))
+    # Of a body that has none at all, too.
+    nothing = changed(
+        changed(
+            URDF,
+            'ixx="0.001" ixy="0" ixz="0" iyy="0.001"',
+            'ixx="-5e-20" ixy="0" ixz="0" iyy="-5e-20"',
+        ),
+        'iyz="0" izz="0.001"',
+        'iyz="0" izz="0"',
+    )
+    assert "# iyy of link 'flange' taken" in import_robot(written(tmp_path, nothing)).toml
+    beyond = written(tmp_path, changed(URDF, flange, '<inertia ixx="-5e-9" ixy'), "beyond.urdf")
+    with pytest.raises(RobotError, match="line 21, <inertia>: ixx"):
+        import_robot(beyond)
+
+
 def test_drive_data_stand_before_the_file(tmp_path: Path):
     drives = written(
         tmp_path,

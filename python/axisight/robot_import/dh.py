@@ -55,7 +55,7 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     missing = [name for name in COLUMNS if name not in names and name not in _OPTIONAL]
     if unknown or missing:
         said = f"unknown {', '.join(map(str, unknown))}" if unknown else f"no {', '.join(missing)}"
-        raise RobotError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {said}")
+        raise RobotError(f"{path}, line 1: expected the columns {', '.join(COLUMNS)}, got {said}")
     rows = [(n, {**_OPTIONAL, **{k: v.strip() for k, v in r.items() if k and v}}) for n, r in found]
     seen: set[str] = set()
     for number, row in rows:

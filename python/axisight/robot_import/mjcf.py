@@ -53,11 +53,18 @@ class _Compiled:
 
     def __init__(self, model: Any, elements: Iterable[Element], path: Path) -> None:
         self.mujoco, self.model, self.path = _mujoco(), model, path
+        parts = [e for root in elements for e in root.walk()]
         self.lines = {
-            (e.tag, e.attributes["name"]): e.where
-            for root in elements
-            for e in root.walk()
-            if "name" in e.attributes
+            (e.tag, e.attributes["name"]): e.where for e in parts if "name" in e.attributes
+        }
+        worlds = [e.where for e in parts if e.tag == "worldbody"]
+        self.world = worlds[0] if worlds else str(path)
+        # A free joint need not have a name: its body has one of them.
+        self.free = {
+            body.attributes.get("name", ""): joint.where
+            for body in parts
+            if body.tag == "body"
+            for joint in body.all("freejoint")
         }
         kinds = self.mujoco.mjtJoint
         self.motions: dict[int, Motion] = {
@@ -69,9 +76,7 @@ class _Compiled:
         """Return its bodies, parents first, each joint one of its own."""
         model = self.model
         # The world is a body without a joint.
-        bodies = {
-            "world": Body("world", None, "", "fixed", still(), np.zeros(3), None, str(self.path))
-        }
+        bodies = {"world": Body("world", None, "", "fixed", still(), np.zeros(3), None, self.world)}
         names = [self._name("body", i) if i else "world" for i in range(model.nbody)]
         actuators = Actuators(model)
         for i in range(1, model.nbody):
@@ -130,6 +135,8 @@ class _Compiled:
         model = self.model
         name, axis = self._name("joint", j), model.jnt_axis[j].copy()
         where = self._where("joint", name)
+        if ("joint", name) not in self.lines:
+            where = self.free.get(body, where)
         motion = self.motions.get(int(model.jnt_type[j]), "other")
         refused = (
             ""
