@@ -151,7 +151,7 @@ BROKEN_URDF = {
         {},
         r"<xacro:arm>.*run `xacro arm.urdf > robot.urdf` first",
     ),
-    "cut off": (URDF[:700], {}, r"line \d+: expected XML"),
+    "cut off": (URDF[:700], {}, r"line 25, within <joint 'shoulder'>: expected XML"),
     "empty": ("", {}, r"line 1: expected XML, got no element found"),
     "no text": (b"\x00\x01\x02<robot>", {}, r"expected XML"),
     "nested without end": ("<robot>" + "<a>" * 300, {}, r"at most 200 elements in one another"),
@@ -260,6 +260,14 @@ BROKEN_MJCF = {
     "entities": ('<!DOCTYPE m [<!ENTITY a "b">]>' + MJCF, r"line 1: expected no document type"),
 }
 BROKEN_DH = {
+    "unknown column below a remark": (
+        "# of the maker\n" + changed(DH, "theta_rad", "theta"),
+        r"line 2: .*unknown theta",
+    ),
+    "no number below a remark": (
+        "# of the maker\n" + changed(DH, "-0.2,0.05", "-0.2,far"),
+        r"line 4, joint 'two': d_m.*'far'",
+    ),
     "unknown column": (changed(DH, "theta_rad", "theta"), r"line 1: .*unknown theta"),
     "no column": (changed(DH, ",mass_kg", ",ixz"), r"line 1: .*no mass_kg"),
     "another convention": (
