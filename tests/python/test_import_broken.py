@@ -75,11 +75,19 @@ BROKEN_URDF = {
     "unknown tip": (
         URDF,
         {"tip": "hand"},
-        r"--tip: expected a link.*base, upper, lower, flange, got 'hand'",
+        r"line 3, <link 'base'>: --tip: expected a link.*base, upper, lower, flange, got 'hand'",
     ),
-    "unknown base": (URDF, {"base": "floor"}, r"--base.*got 'floor'"),
-    "base beyond the tip": (URDF, {"base": "flange", "tip": "upper"}, r"--base.*got 'flange'"),
-    "nothing between": (URDF, {"tip": "base"}, r"at least one revolute"),
+    "unknown base": (URDF, {"base": "floor"}, r"line 3, <link 'base'>: --base.*got 'floor'"),
+    "base beyond the tip": (
+        URDF,
+        {"base": "flange", "tip": "upper"},
+        r"line 38, <joint 'mount'>: --base.*got 'flange'",
+    ),
+    "nothing between": (
+        URDF,
+        {"tip": "base"},
+        r"line 3, <link 'base'>: expected at least one revolute",
+    ),
     "unknown parent": (
         urdf('<parent link="upper"/>', '<parent link="arm"/>'),
         {},
@@ -106,7 +114,11 @@ BROKEN_URDF = {
     "floating": (urdf(ELBOW, '<joint name="elbow" type="floating">'), {}, r"got type 'floating'"),
     "planar": (urdf(ELBOW, '<joint name="elbow" type="planar">'), {}, r"got type 'planar'"),
     "mimic": (urdf(ELBOW, ELBOW + '<mimic joint="shoulder"/>'), {}, r"mimics 'shoulder'"),
-    "branches": (more("continuous", "upper", "x"), {}, r"2 moving branches"),
+    "branches": (
+        more("continuous", "upper", "x"),
+        {},
+        r"line 24, <joint 'shoulder'>: .*2 moving branches",
+    ),
     "axis without length": (urdf('xyz="0 1 1"', 'xyz="0 0 0"'), {}, r"line 28, <axis>: xyz"),
     "axis of two numbers": (
         urdf('xyz="0 1 1"', 'xyz="0 1"'),
@@ -123,6 +135,15 @@ BROKEN_URDF = {
     "limits swapped": (urdf('lower="-2"', 'lower="3"'), {}, r"<limit>: expected lower <= upper"),
     "negative damping": (urdf('damping="0.7"', 'damping="-1"'), {}, r"<dynamics>: damping"),
     "no reduction": (urdf("50</", "0</"), {}, r"<mechanicalReduction>.*got '0'"),
+    "no reduction of ros2_control": (
+        urdf(
+            "</robot>",
+            '<ros2_control name="c"><transmission name="t"><joint name="elbow"><mechanical_reduction>'
+            "many</mechanical_reduction></joint></transmission></ros2_control></robot>",
+        ),
+        {},
+        r"line 47, <mechanical_reduction>.*got 'many'",
+    ),
     "no links": ("<robot name='x'/>", {}, r"line 1, <robot 'x'>: expected at least one <link>"),
     "another root": ("<sdf version='1.6'/>", {}, r"<sdf>: expected <robot> \(URDF\) or <mujoco>"),
     "xacro not run": (
@@ -130,7 +151,7 @@ BROKEN_URDF = {
         {},
         r"<xacro:arm>.*run `xacro arm.urdf > robot.urdf` first",
     ),
-    "cut off": (URDF[:700], {}, r"line \d+: expected XML"),
+    "cut off": (URDF[:700], {}, r"line 25, within <joint 'shoulder'>: expected XML"),
     "empty": ("", {}, r"line 1: expected XML, got no element found"),
     "no text": (b"\x00\x01\x02<robot>", {}, r"expected XML"),
     "nested without end": ("<robot>" + "<a>" * 300, {}, r"at most 200 elements in one another"),
@@ -214,13 +235,41 @@ BROKEN_MJCF = {
             "",
         )
         .replace('<actuator><motor joint="shoulder" gear="50"/></actuator>', ""),
-        r"ball or free",
+        r"line 4, <freejoint>: .*ball or free",
+    ),
+    "axis without length": (
+        mjcf('axis="0 1 1"', 'axis="0 0 0"'),
+        r"MuJoCo: .*axis too small.*'shoulder'.*line 5",
+    ),
+    "turn of no length": (
+        mjcf('euler="0 1.2 0"', 'quat="0 0 0 0"'),
+        r"MuJoCo: .*zero quaternion.*'body', line 8",
+    ),
+    "axes that span no frame": (
+        mjcf('euler="0 1.2 0"', 'xyaxes="1 0 0 1 0 0"'),
+        r"MuJoCo: .*yaxis too small.*'lower'.*line 8",
+    ),
+    "inertia not definite": (
+        mjcf("0.25 0.01 0 -0.02", "0.25 0.6 0 -0.02"),
+        r"MuJoCo: .*positive eigenvalues.*'upper'.*line 4",
+    ),
+    "inertia of no body": (
+        mjcf("0.02 0.03 0.025", "0.02 0.03 0.5"),
+        r"MuJoCo: .*A \+ B >= C.*'lower'.*line 8",
     ),
     "entities": ('<!DOCTYPE m [<!ENTITY a "b">]>' + MJCF, r"line 1: expected no document type"),
 }
 BROKEN_DH = {
-    "unknown column": (changed(DH, "theta_rad", "theta"), r"unknown theta"),
-    "no column": (changed(DH, ",mass_kg", ",ixz"), r"no mass_kg"),
+    "unknown column below a remark": (
+        "# of the maker\n" + changed(DH, "theta_rad", "theta"),
+        r"line 2: .*unknown theta",
+    ),
+    "no number below a remark": (
+        "# of the maker\n" + changed(DH, "-0.2,0.05", "-0.2,far"),
+        r"line 4, joint 'two': d_m.*'far'",
+    ),
+    "unknown column": (changed(DH, "theta_rad", "theta"), r"line 1: .*unknown theta"),
+    "no column": (changed(DH, ",mass_kg", ",ixz"), r"line 1: .*no mass_kg"),
     "another convention": (
         DH.replace("two,standard", "two,craig"),
         r"line 3, joint 'two': convention",

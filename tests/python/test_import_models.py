@@ -45,6 +45,62 @@ def test_a_urdf_says_drives(tmp_path: Path):
     assert (dry.parameters or {})["smoothing_rad_s"] == pytest.approx(0.01 * 50)
 
 
+TRANSMISSION = URDF[URDF.index("  <transmission") : URDF.index("</robot>")]
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+def test_gears_of_ros2_control_are_read(tmp_path: Path, joint: str):
+    """Beside the hardware interfaces of joints, which are none of the robot's."""
+    control = f"""<ros2_control name="arm" type="system"><hardware><plugin>a/B</plugin></hardware>
+    <joint name="{joint}"><command_interface name="effort"/></joint>
+    <transmission name="t"><plugin>transmission_interface/SimpleTransmission</plugin>
+      <joint name="{joint}" role="joint1"><mechanical_reduction> 80.0 </mechanical_reduction></joint>
+      <actuator name="m" role="actuator1"/></transmission></ros2_control>"""
+    robot = import_robot(written(tmp_path, changed(URDF, TRANSMISSION, control)))
+    number = robot.joint_names.index(joint)
+    assert robot.gear_ratio[number] == pytest.approx(1 / 80)
+    assert robot.gear_ratio[1 - number] == 1.0
+    assert "left out" not in robot.toml
+
+
+# Transmissions of which something is left out: what becomes of the file's, what is said, the shoulder's ratio.
+TRANSMISSIONS = {
+    "differential": (
+        '<joint name="shoulder"/>',
+        '<joint name="shoulder"/><joint name="elbow"/>',
+        "transmission 't' drives several joints, 'shoulder', 'elbow': their reductions left out",
+        1.0,
+    ),
+    "of the actuator": (
+        "mechanicalReduction>50</mechanicalReduction",
+        "mechanical_reduction>50</mechanical_reduction",
+        "transmission 't': mechanical_reduction of its actuator left out, ros2_control takes that of the joint",
+        1.0,
+    ),
+    "unknown joint": (
+        '<joint name="shoulder"/>',
+        '<joint name="sholder"/>',
+        "transmission 't' is of a joint 'sholder' that is not there: left out",
+        1.0,
+    ),
+    "two of one": (
+        "  </transmission>",
+        '</transmission><transmission name="u"><joint name="shoulder">'
+        "<mechanical_reduction>60</mechanical_reduction></joint></transmission>",
+        "transmission 'u': reduction 60 of 'shoulder' left out, another transmission says 50",
+        1 / 50,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TRANSMISSIONS)
+def test_transmissions_that_are_no_gear_of_one_joint_are_said(tmp_path: Path, what: str):
+    old, new, note, ratio = TRANSMISSIONS[what]
+    robot = import_robot(written(tmp_path, changed(URDF, old, new)))
+    assert f"# {note}" in robot.toml
+    assert robot.gear_ratio[0] == pytest.approx(ratio)
+
+
 def test_branches_are_cut_by_the_tip(tmp_path: Path):
     """A camera that nods beside the elbow: locked at zero, its mass stays where it is."""
     camera = """<link name="camera"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>
@@ -132,6 +188,113 @@ def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
     assert "actuators of elbow are told positions, those of other joints are not" in robot.toml
 
 
+MOTOR = '<motor joint="shoulder" gear="50"/>'
+# What a chain has no number for: where it stands, and what is said of it.
+BEYOND = {
+    "gravcomp": (
+        'name="lower"',
+        'name="lower" gravcomp="0.5"',
+        "gravcomp of 'lower' left out: gravity acts on all of their masses",
+    ),
+    "force of a joint": (
+        'name="elbow"',
+        'name="elbow" actuatorfrcrange="-5 5"',
+        "joint 'elbow': limits of the force of its actuators left out",
+    ),
+    "second motor": (
+        MOTOR,
+        MOTOR + '<motor name="other" joint="shoulder" gear="3"/>',
+        "joint 'shoulder' has 2 motors, 'actuator 0', 'other': their gears, gains, limits, delays and lags",
+    ),
+    "site": (
+        MOTOR,
+        MOTOR + '<motor name="jet" site="s" gear="0 0 1 0 0 0"/>',
+        "actuator 'jet' acts on a site, not on one joint: left out",
+    ),
+    "tendon": (
+        MOTOR + "</actuator>",
+        '<motor name="rope" tendon="t"/></actuator><tendon><fixed name="t">'
+        '<joint joint="elbow" coef="1"/></fixed></tendon>',
+        "actuator 'rope' acts on a tendon, not on one joint: left out",
+    ),
+    "force of a motor": (
+        MOTOR,
+        '<motor joint="shoulder" name="m" forcerange="-1 1"/>',
+        "actuator 'm': limits of its force left out",
+    ),
+    "stiffness": (
+        'stiffness="3"',
+        'stiffness="3 2"',
+        "joint 'shoulder': stiffness beyond the linear left out",
+    ),
+    "damping": (
+        'damping="0.7"',
+        'damping="0.7 0 2"',
+        "joint 'shoulder': damping beyond the linear left out",
+    ),
+    "yielding": (
+        'stiffness="3"',
+        'stiffness="3" springyield="0.1"',
+        "joint 'shoulder': yielding of its spring left out",
+    ),
+    "damping of a motor": (
+        MOTOR,
+        '<motor name="m" joint="shoulder" damping="1 2"/>',
+        "actuator 'm': damping beyond the linear left out",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_what_a_chain_has_no_number_for_is_said(tmp_path: Path, what: str):
+    old, new, note = BEYOND[what]
+    plain = changed(MJCF, '<inertial pos="0 0 0"', '<site name="s"/><inertial pos="0 0 0"')
+    path = written(tmp_path, changed(plain, old, new), "arm.xml")
+    if what in ("stiffness", "damping", "yielding", "damping of a motor"):
+        since_mujoco_4(path)
+    assert f"# {note}" in import_robot(path).toml
+    assert note not in import_robot(written(tmp_path, plain, "plain.xml")).toml
+
+
+def since_mujoco_4(path: Path) -> None:
+    """Skip the test where the MuJoCo that is there does not know what the file says."""
+    if int(mujoco.__version__.split(".")[0]) < 4:
+        pytest.skip(f"{path.name} needs MuJoCo 4")
+
+
+def test_a_motor_in_the_parent_is_one_of_the_joint(tmp_path: Path):
+    """For one axis both frames have the same torque."""
+    path = written(tmp_path, MJCF, "arm.xml")
+    in_parent = changed(MJCF, "<motor joint=", "<motor jointinparent=")
+    robot = import_robot(written(tmp_path, in_parent, "parent.xml"))
+    assert robot.gear_ratio.tolist() == import_robot(path).gear_ratio.tolist()
+    assert "left out" not in robot.toml
+
+
+def test_armature_and_damping_of_motors_act_on_the_joint(tmp_path: Path):
+    """By the gear twice, beside those of the joint: inertia and passive torque are MuJoCo's."""
+    text = changed(MJCF, 'gear="50"', 'gear="50" armature="1e-4" damping="2e-3"')
+    path = written(tmp_path, text, "arm.xml")
+    since_mujoco_4(path)
+    parameters = import_robot(path).parameters()
+    assert parameters["shoulder.motor_inertia"] == pytest.approx(0.2 / 50**2 + 1e-4)
+    assert parameters["shoulder.viscous_friction"] == pytest.approx(0.7 / 50**2 + 2e-3)
+    bare = written(tmp_path, changed(MJCF, 'armature="0.2"', ""), "bare.xml")
+    moving = np.array([1.0, 0.0, 0.0])
+    torques = []
+    for model in (mujoco.MjModel.from_xml_path(str(one)) for one in (path, bare)):
+        data, inertia = mujoco.MjData(model), np.zeros(3)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_mulM(model, data, inertia, moving)
+        still = data.qfrc_passive[0]
+        data.qvel[:] = moving
+        mujoco.mj_forward(model, data)
+        torques.append((inertia[0], still - data.qfrc_passive[0]))
+    (inertia, damping), (of_links, _) = torques
+    assert parameters["shoulder.motor_inertia"] * 50**2 == pytest.approx(inertia - of_links)
+    assert parameters["shoulder.viscous_friction"] * 50**2 == pytest.approx(damping)
+
+
 def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def no(name: str):
         raise ImportError(name)
@@ -187,6 +350,42 @@ def test_a_pinocchio_model_is_taken_as_it_is(tmp_path: Path):
     with pytest.raises(RobotError, match=r"one degree of freedom.*FreeFlyer"):
         import_robot(floating)
     assert import_robot(floating, base="root_joint").joint_names == robot.joint_names
+
+
+def test_a_mirrored_frame_is_refused(tmp_path: Path):
+    """URDF and MJCF cannot say one, a model in memory can."""
+    model = pinocchio.buildModelFromUrdf(str(written(tmp_path, URDF)))
+    mirror = np.diag([1.0, 1.0, -1.0])
+    model.jointPlacements[2] = pinocchio.SE3(mirror, np.array([0.5, 0, 0]))
+    with pytest.raises(
+        RobotError, match=r"joint 'elbow': expected a placement that turns.*mirrors"
+    ):
+        import_robot(model)
+
+
+def test_moments_that_a_rounding_made_negative_are_zero(tmp_path: Path):
+    flange = '<inertia ixx="0.001" ixy'
+    rounded = written(tmp_path, changed(URDF, flange, '<inertia ixx="-5e-20" ixy'), "rounded.urdf")
+    zero = written(tmp_path, changed(URDF, flange, '<inertia ixx="0" ixy'), "zero.urdf")
+    robot, same = import_robot(rounded), import_robot(zero)
+    assert "# ixx of link 'flange' taken as zero: -5e-20 kg m^2 in line 21" in robot.toml
+    assert "taken as zero" not in same.toml
+    q, v, a = states(robot, 20)
+    assert np.array_equal(robot.inverse_dynamics(q, v, a), same.inverse_dynamics(q, v, a))
+    # Of a body that has none at all, too.
+    nothing = changed(
+        changed(
+            URDF,
+            'ixx="0.001" ixy="0" ixz="0" iyy="0.001"',
+            'ixx="-5e-20" ixy="0" ixz="0" iyy="-5e-20"',
+        ),
+        'iyz="0" izz="0.001"',
+        'iyz="0" izz="0"',
+    )
+    assert "# iyy of link 'flange' taken" in import_robot(written(tmp_path, nothing)).toml
+    beyond = written(tmp_path, changed(URDF, flange, '<inertia ixx="-5e-9" ixy'), "beyond.urdf")
+    with pytest.raises(RobotError, match="line 21, <inertia>: ixx"):
+        import_robot(beyond)
 
 
 def test_drive_data_stand_before_the_file(tmp_path: Path):

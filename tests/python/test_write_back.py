@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -93,6 +94,20 @@ def test_an_element_without_content_gets_one(tmp_path: Path):
         '+        <joint name=\'elbow\' axis="0 0 -1" damping="0.3"/>',
     ]
     assert load_robot(made.path).parameters()["elbow.viscous_friction"] == pytest.approx(0.3)
+
+
+def test_what_motors_add_stays_on_them(tmp_path: Path):
+    """A joint gets what its motor has not; the machine is the one that was found."""
+    if int(mujoco.__version__.split(".")[0]) < 4:
+        pytest.skip("motors have no damping before MuJoCo 4")
+    text = changed(MJCF, 'gear="50"', 'gear="50" armature="1e-5" damping="2e-4"')
+    source = written(tmp_path, text, "arm.xml")
+    robot = load_robot(source)
+    more = cause("viscous_friction", 1, "viscous_nm_s_rad", 1e-3)
+    made = load_robot(write_model(source, robot, [more], tmp_path / "new.xml").path)
+    before, after = (r.parameters()["shoulder.viscous_friction"] for r in (robot, made))
+    assert before == pytest.approx(0.7 / 50**2 + 2e-4)
+    assert after == pytest.approx(before + 1e-3)
 
 
 def test_a_robot_file_has_place_for_all(tmp_path: Path):

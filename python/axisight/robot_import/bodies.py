@@ -80,7 +80,7 @@ class Drive:
     ``spring_rest_rad``; ``servo`` of an actuator that is told positions, its gains of position [Nm/rad] and
     speed [Nm s/rad], motor side; ``gain`` is a motor's torque per command, ``limit_nm`` the largest,
     ``delay_s`` and ``lag_s`` by which torque is late; ``effort`` [Nm] the limit of the joint, 0 where none is
-    said.
+    said; ``of_actuators`` is how much of rotor inertia and damping the file has on actuators.
     """
 
     gear_ratio: float = 1.0
@@ -95,6 +95,7 @@ class Drive:
     delay_s: float = 0.0
     lag_s: float = 0.0
     effort: float = 0.0
+    of_actuators: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

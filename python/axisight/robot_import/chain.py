@@ -59,19 +59,21 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
     Raises RobotError for bodies that are not there, a branch without a ``tip``, joints that a chain cannot
     have, moving bodies without mass, and inertias that no body has.
     """
+    root = next(iter(tree.bodies.values()))
     for option, name in (("base", base), ("tip", tip)):
         if name is not None and name not in tree.bodies:
             near = get_close_matches(name, tree.bodies, n=5) or tree.bodies
             raise RobotError(
-                f"{tree.file}: --{option}: expected a link, such as {_listed(near)}, got {name!r}"
+                f"{root.where}: --{option}: expected a link, such as {_listed(near)}, got {name!r}"
             )
-    first = next(iter(tree.bodies)) if base is None else base
+    first = root.name if base is None else base
     last = _only_end(tree, first) if tip is None else tip
     path = tree.path(last)
     names = [body.name for body in path]
     if first not in names:
         raise RobotError(
-            f"{tree.file}: --base: expected a link between {names[0]!r} and the tip {last!r}, got {first!r}"
+            f"{tree.bodies[first].where}: --base: expected a link between {names[0]!r} and the "
+            f"tip {last!r}, got {first!r}"
         )
     path = path[names.index(first) :]
     joints, end, notes = _joints(tree, path)
@@ -94,8 +96,8 @@ def _only_end(tree: Tree, first: str) -> str:
         paths = [[body.name for body in tree.path(end)] for end in ends]
         trunk = [name for name in paths[0] if all(name in path for path in paths)]
         raise RobotError(
-            f"{tree.file}: expected one serial chain below {first!r}, got {len(ends)} moving branches: give "
-            f"the last link of the one that is meant, --tip (of diagnose, check and robot import) or "
+            f"{tree.bodies[trunk[-1]].where}: expected one serial chain below {first!r}, got {len(ends)} moving "
+            f"branches: give the last link of the one that is meant, --tip (of diagnose, check and robot import) or "
             f"tip = '...' in the drive data beside the file (they end at "
             f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
         )
@@ -132,7 +134,7 @@ def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, l
         moving.append((body, here, with_last))
     if not moving:
         raise RobotError(
-            f"{tree.file}: expected at least one revolute, continuous or prismatic joint between "
+            f"{path[-1].where}: expected at least one revolute, continuous or prismatic joint between "
             f"{path[0].name!r} and {path[-1].name!r}, got none"
         )
     joints: list[ChainJoint] = []

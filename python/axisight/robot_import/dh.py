@@ -46,16 +46,20 @@ def read_dh(path: Path) -> Tree:
 def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(line for line in file if not line.startswith("#"))
-            found = [(reader.line_num, row) for row in reader]
-            names = reader.fieldnames or []
+            lines = [(n, x) for n, x in enumerate(file, start=1) if not x.startswith("#")]
+        reader = csv.DictReader(text for _, text in lines)
+        # The reader counts what it gets, and comments are none of it.
+        found = [(lines[reader.line_num - 1][0], row) for row in reader]
+        names = reader.fieldnames or []
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RobotError(f"{path}: expected a readable table: {error}") from error
     unknown = [name for name in names if name not in COLUMNS]
     missing = [name for name in COLUMNS if name not in names and name not in _OPTIONAL]
     if unknown or missing:
         said = f"unknown {', '.join(map(str, unknown))}" if unknown else f"no {', '.join(missing)}"
-        raise RobotError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {said}")
+        raise RobotError(
+            f"{path}, line {lines[0][0] if lines else 1}: expected the columns {', '.join(COLUMNS)}, got {said}"
+        )
     rows = [(n, {**_OPTIONAL, **{k: v.strip() for k, v in r.items() if k and v}}) for n, r in found]
     seen: set[str] = set()
     for number, row in rows:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
 
 Array = NDArray[np.float64]
@@ -28,6 +29,11 @@ def tree_of(model: Any) -> Tree:
 def _body(model: Any, i: int) -> Body:
     joint, placement = model.joints[i], model.jointPlacements[i]
     motion, axis = _motion(joint)
+    if np.linalg.det(placement.rotation) < 0:
+        raise RobotError(
+            f"{model.name}, joint {model.names[i]!r}: expected a placement that turns, got one that mirrors: no "
+            f"body can be put there"
+        )
     return Body(
         model.names[i],
         model.names[model.parents[i]],

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.urdf_transmissions import gear_ratios
 from axisight.robot_import.xml_tree import Element
 
 Array = NDArray[np.float64]
@@ -37,11 +38,13 @@ def read_urdf(root: Element, path: Path) -> Tree:
     if not links:
         raise RobotError(f"{root.where}: expected at least one <link>, got none")
     joints = _named(root, "joint")
-    ratios = _ratios(root)
+    ratios, notes = gear_ratios(root, joints)
     above = _above(joints, links)
     order = _from_the_root(root, links, above)
-    bodies = {name: _body(name, links[name], above.get(name), ratios, links) for name in order}
-    return Tree(root.attributes.get("name", path.stem), bodies, str(path))
+    bodies = {
+        name: _body(name, links[name], above.get(name), ratios, links, notes) for name in order
+    }
+    return Tree(root.attributes.get("name", path.stem), bodies, str(path), notes=notes)
 
 
 def _named(root: Element, tag: str) -> dict[str, Element]:
@@ -113,8 +116,9 @@ def _body(
     joint: Element | None,
     ratios: dict[str, float],
     links: dict[str, Element],
+    notes: list[str],
 ) -> Body:
-    mass = _mass(link)
+    mass = _mass(link, notes)
     if joint is None:
         return Body(name, None, "", "fixed", still(), np.zeros(3), mass, link.where)
     kind = joint.require("type", f"one of {', '.join(_MOTIONS)}")
@@ -171,8 +175,17 @@ def _axis(joint: Element) -> Array:
     return axis / length
 
 
-def _mass(link: Element) -> Mass | None:
-    """Return what <inertial> says, None without it; raises RobotError for what no body has."""
+# Moments below zero by no more than this, or than this of the largest, are a rounding of what computed
+# them: a milligramme a millimetre aside has a thousand times as much.
+_ROUNDING_KG_M2 = 1e-15
+_ROUNDING = 1e-12
+
+
+def _mass(link: Element, notes: list[str]) -> Mass | None:
+    """Return what <inertial> says, None without it; raises RobotError for what no body has.
+
+    Moments that are zero but for a rounding are zero, and added to the ``notes``.
+    """
     inertial = link.find("inertial")
     if inertial is None:
         return None
@@ -183,14 +196,19 @@ def _mass(link: Element) -> Mass | None:
     mass = masses.number("value")
     xx, yy, zz = (inertias.number(name) for name in ("ixx", "iyy", "izz"))
     xy, xz, yz = (inertias.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
-    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0:
         raise RobotError(f"{masses.where}: value: expected a mass of zero or more, got {mass:g} kg")
     for name, value in zip(("ixx", "iyy", "izz"), (xx, yy, zz), strict=True):
-        if value < 0:
+        if value < -max(_ROUNDING_KG_M2, _ROUNDING * max(xx, yy, zz)):
             raise RobotError(
                 f"{inertias.where}: {name}: expected zero or more, got {value:g} kg m^2"
             )
+        if value < 0:
+            notes.append(
+                f"{name} of link {link.attributes['name']!r} taken as zero: {value:g} kg m^2 in line {inertias.line}"
+            )
+    xx, yy, zz = (max(value, 0.0) for value in (xx, yy, zz))
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     pose = _pose(inertial.find("origin"))
     return Mass(mass, np.zeros(3), matrix).at(pose)
 
@@ -215,29 +233,3 @@ def _limits(joint: Element, kind: str) -> tuple[float, float] | None:
     if lower > upper:
         raise RobotError(f"{limit.where}: expected lower <= upper, got {lower:g} and {upper:g}")
     return None if lower == upper else (lower, upper)
-
-
-def _ratios(root: Element) -> dict[str, float]:
-    """Return the gear ratio r of joints with a <transmission>: one over its reduction."""
-    out: dict[str, float] = {}
-    for transmission in root.all("transmission"):
-        names = [joint.require("name", "a joint") for joint in transmission.all("joint")]
-        holders = [*transmission.all("actuator"), *transmission.all("joint")]
-        reductions = [x for holder in holders for x in holder.all("mechanicalReduction")]
-        # Several joints on one: a differential, which is no ratio of one axis.
-        if len(names) == 1 and reductions:
-            out[names[0]] = 1.0 / _reduction(reductions[0])
-    return out
-
-
-def _reduction(element: Element) -> float:
-    text = element.text.strip()
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if value == 0 or not np.isfinite(value):
-        raise RobotError(
-            f"{element.where}: expected a reduction other than zero, got {shown(text)}"
-        )
-    return value

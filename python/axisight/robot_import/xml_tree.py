@@ -107,7 +107,9 @@ def parse_xml(text: bytes, name: str) -> Element:
         builder.parser.Parse(text, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise RobotError(f"{name}, line {error.lineno}: expected XML, got {reason}") from None
+        raise RobotError(
+            f"{name}, line {error.lineno}{builder.within}: expected XML, got {reason}"
+        ) from None
     assert builder.root is not None  # expat refuses a text without a root
     return builder.root
 
@@ -122,6 +124,14 @@ class _Builder:
         self.parser.EndElementHandler = lambda _: self._open.pop()
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._document_type
+
+    @property
+    def within(self) -> str:
+        """The element that is open, for messages; empty at the root."""
+        if not self._open:
+            return ""
+        name = self._open[-1].attributes.get("name")
+        return f", within <{self._open[-1].tag}{'' if name is None else f' {name!r}'}>"
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         one = Element(tag, attributes, self.name, self.parser.CurrentLineNumber)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
-from axisight.robot_import.mjcf import is_gain
+from axisight.robot_import.mjcf_actuators import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
 from axisight.write_back.servos import SERVO, SERVO_EFFECTS, write_servo
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _MOTOR = {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}
 # What a lag makes of it.
 _LAGS = {"dyntype": ("filter", "filterexact")}
+# How an actuator names its joint: for one axis both are the same.
+_JOINTS = ("joint", "jointinparent")
 # Of a file that states none.
 _STEP_S = 0.002
 
@@ -60,7 +62,7 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     """
     placed = Placed()
     holders = [e for e in root.walk() if e.tag == "actuator"]
-    mine = [e for h in holders for e in h.children if e.attributes.get("joint") == joint]
+    mine = [e for h in holders for e in h.children if joint in map(e.attributes.get, _JOINTS)]
     if len(mine) == 1 and mine[0].tag == SERVO:
         late = [
             c.parameters[TRANSPORT_DELAY[1]].value for c in causes if c.effect == TRANSPORT_DELAY[0]

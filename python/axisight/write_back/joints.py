@@ -42,15 +42,19 @@ def write_joint(
     robot: Robot,
     axis: int,
     causes: Sequence[Cause],
+    of_actuators: Mapping[str, float],
 ) -> Placed:
-    """Write the causes of one axis (from 0) that are numbers of its joint, with one comment."""
+    """Write the causes of one axis (from 0) that are numbers of its joint, with one comment.
+
+    ``of_actuators``: how much of a number, by name, the file has on actuators, where it stays.
+    """
     placed = Placed()
     by_number: dict[str, list[Cause]] = {}
     for cause in causes:
         by_number.setdefault(JOINT_NUMBERS[root.tag][cause.effect], []).append(cause)
     numbers: dict[str, float] = {}
     for name, mine in by_number.items():
-        value = _number(robot, axis, mine)
+        value = _number(robot, axis, mine) - of_actuators.get(name, 0.0)
         if value < 0:
             placed.refuse(mine, f"{name} would be {value:.4g}, and models have none below zero")
         elif name == "stiffness" and value == 0 and _at_zero(mine[-1]):

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 _KINDS = (".urdf", ".xml", ".mjcf")
 
 
+# A model file, and the drive data it was read with; None: what stands beside it.
+_Source = tuple[Path, DriveData | None]
+
+
 @dataclass(frozen=True)
 class Written:
     """A model that was written: labels of the causes in it, and of those that it has no place for.
@@ -114,7 +118,7 @@ def _as_model(
         raise InputError(f"{source}: expected a URDF or MJCF to write back to, got <{root.tag}>")
     edits = Edits(text, str(source))
     done = [
-        *_on_axes(edits, root, robot, causes),
+        *_on_axes(edits, root, (source, drives), robot, causes),
         *_on_chain(edits, root, (source, drives), robot, causes),
     ]
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
@@ -133,27 +137,45 @@ def _as_model(
     )
 
 
-def _on_axes(edits: Edits, root: Element, robot: Robot, causes: Sequence[Cause]) -> list[Placed]:
+def _on_axes(
+    edits: Edits, root: Element, source: _Source, robot: Robot, causes: Sequence[Cause]
+) -> list[Placed]:
     """Write what belongs to joints and motors, axis by axis."""
     # Transmissions, actuators and constraints name joints by elements of the same name.
     holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
     joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
     out = []
+    shares = _of_actuators(source, causes) if root.tag == "mujoco" else {}
     for axis, name in enumerate(robot.axis_names):
         mine = [cause for cause in causes if not cause.axes and cause.axis == axis + 1]
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
-            out.append(write_joint(edits, root, joints[name], robot, axis, numbers))
+            out.append(
+                write_joint(edits, root, joints[name], robot, axis, numbers, shares.get(name, {}))
+            )
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         if drives and root.tag == "mujoco":
             out.append(write_drive(edits, root, name, drives))
     return out
 
 
+def _of_actuators(source: _Source, causes: Sequence[Cause]) -> dict[str, dict[str, float]]:
+    """Return how much of a number of a joint an MJCF has on actuators, by joint and number."""
+    names = ("armature", "damping")
+    if not any(JOINT_NUMBERS["mujoco"].get(cause.effect) in names for cause in causes):
+        return {}
+    file, drives = source
+    _, chain = bodies_and_chain(file, drives or drive_data(file))
+    return {
+        joint.body.joint: dict(zip(names, joint.body.drive.of_actuators, strict=True))
+        for joint in chain.joints
+    }
+
+
 def _on_chain(
     edits: Edits,
     root: Element,
-    source: tuple[Path, DriveData | None],
+    source: _Source,
     robot: Robot,
     causes: Sequence[Cause],
 ) -> list[Placed]:
