@@ -80,7 +80,7 @@ def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
         # A key of controllers that are told positions.
         "robot_file/reader.rs": {"gravity_compensation"},
         # A load that is mounted, as drive data state it.
-        "cli/robot_files.py": {"payload"},
+        "cli/model_options.py": {"payload"},
     }
     strays = []
     for folder in ("crates", "python"):
