@@ -55,9 +55,15 @@ class Machine:
         )
 
 
+class NotRunError(Exception):
+    """A machine that an effect takes beyond its margin: its loop swings without end."""
+
+
 def log_of(machine: Robot, effects: list[Effect], reference: Array, name: str, run: int) -> Log:
-    """Return a log of the machine along a reference (n, n_axes) [rad/s]."""
+    """Return a log of the machine along a reference (n, n_axes) [rad/s]; raises NotRunError."""
     out = simulate(machine, reference, effects=effects, noise_seed=7, run=run, method="rk4")
+    if len(out.time) < len(reference):
+        raise NotRunError(name)
     return Log(
         name=name,
         source=Path(f"{name}.parquet"),
@@ -118,7 +124,11 @@ def main(machines: int, seed: int) -> None:
             line = [f"  {at(finite[k], 1.0).label:28s} {finite[k].value:.3g} {finite[k].unit}"]
             for run, (name, factor) in enumerate(SIZES.items(), 1):
                 effect = at(finite[k], factor)
-                found = machine.diagnosed([effect], run)
+                try:
+                    found = machine.diagnosed([effect], run)
+                except NotRunError:
+                    line.append(f"{name}: does not run")
+                    continue
                 hit = claimed(found, effect, machine.simulator.n_axes)
                 others = [] if hit else [c.label for c in found.causes]
                 wrong += found.verdict == "explained" and bool(others)
