@@ -1,6 +1,7 @@
 """Causes that hold only with a bent simulator, and their rivals."""
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from axisight.gap.decide import Ranked, Standing, Trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
+from axisight.gap.search import _weigh_again
 from axisight.gap.swaps import mending, nearly_as_good, straightened, weighed_again
 from gap_data import linear_evidence
 
@@ -207,3 +209,32 @@ def test_another_law_of_the_same_dry_friction_or_gear_mends_a_cause():
         standing_of(Effect("coulomb_friction", 1, {"coulomb_nm": 0.2})),
     ]
     assert mending(dry, others) == []
+
+
+@pytest.mark.parametrize(
+    ("beside_none", "after", "swapped"),
+    [(True, -2.0, True), (True, 30.0, True), (False, 9.0, False), (False, 4.0, True)],
+)
+def test_only_a_law_that_mends_has_to_halve_what_is_left(
+    beside_none: bool, after: float, swapped: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """What came in beside a cause that was none is judged by likelihood alone, at the floor or below it too."""
+    before = -1.0 if beside_none else 10.0
+    sides = [SOFT, CUBIC] if beside_none else [SOFT]
+    cause = SimpleNamespace(trial=SimpleNamespace(evidence=SimpleNamespace(free=sides)))
+    standing = SimpleNamespace(axis=0)
+    new = SimpleNamespace(name="new")
+    state = SimpleNamespace(
+        model=SimpleNamespace(free=[SOFT]),
+        rounds=[SimpleNamespace(standings=())],
+        accepted=[(cause, standing)],
+        floor=np.zeros(1),
+        layout=None,
+        left=lambda: np.array([before]),
+        left_by=lambda _model: np.array([after]),
+    )
+    for name in ("mending", "nearly_as_good"):
+        monkeypatch.setattr(f"axisight.gap.search.{name}", lambda *_: [])
+    monkeypatch.setattr("axisight.gap.search.weighed_again", lambda *_: (new, (cause, standing)))
+    _weigh_again(None, state, SimpleNamespace(explained_share=0.6))
+    assert (state.model is new) is swapped

@@ -80,13 +80,15 @@ def excess_shown(effect: Effect) -> float:
 def own_error(evidence: Evidence, name: str, stretch: NDArray[np.int64]) -> float:
     """Return the standard error of a parameter of the last effect, of itself: delete-one-stretch jackknife.
 
-    Infinite where it is not fitted, or stands at a bound.
+    Infinite where it is not fitted, is none, or stands at a bound.
     """
     key = (len(evidence.effects) - 1, name)
+    size = abs((evidence.effects[-1].parameters or {})[name])
     groups = np.unique(stretch)
-    if key not in evidence.parameters or key in evidence.at_bound or len(groups) < 2:
+    known = key in evidence.parameters and key not in evidence.at_bound
+    if not known or size == 0 or len(groups) < 2:
         return float("inf")
     column = evidence.parameters.index(key)
     moved = np.array([step_without(evidence, stretch == g)[column] for g in groups])
     error = np.sqrt((len(groups) - 1) / len(groups) * float(moved @ moved))
-    return float(error / abs((evidence.effects[-1].parameters or {})[name]))
+    return float(error / size)

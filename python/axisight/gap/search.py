@@ -439,10 +439,7 @@ def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None
     final = {f.effect.label for f in state.model.free}
     last = state.rounds[-1].standings
     for cause, standing in state.accepted:
-        if {f.effect.label for f in cause.trial.evidence.free} <= final:
-            least, rivals = _MENDED, mending(cause, last)
-        else:
-            least, rivals = np.inf, nearly_as_good(state.model, cause, standing)
+        mended = {f.effect.label for f in cause.trial.evidence.free} <= final
         found = weighed_again(
             fitter,
             state.model,
@@ -451,13 +448,12 @@ def _weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None
             state.floor,
             state.layout,
             settings.explained_share,
-            rivals,
+            mending(cause, last) if mended else nearly_as_good(state.model, cause, standing),
         )
-        left = state.left()
-        if (
-            found is not None
-            and state.left_by(found[0])[standing.axis] < least * left[standing.axis]
-        ):
+        if found is None:
+            continue
+        left, axis = state.left(), standing.axis
+        if not mended or state.left_by(found[0])[axis] < _MENDED * left[axis]:
             state.model, taken = found
             state.rounds.append(Round((taken[1],), (taken,), left))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPOR
 from axisight.robot_import.mjcf_actuators import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.servos import SERVO, SERVO_EFFECTS, write_servo
+from axisight.write_back.servos import SERVO, SERVO_EFFECTS, delayed, write_servo
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
@@ -38,19 +37,13 @@ def _lag(value: float, _step_s: float) -> Mapping[str, Numbers]:
     return {"dyntype": "filterexact", "dynprm": value}
 
 
-def _delay(value: float, step_s: float) -> Mapping[str, Numbers]:
-    # As many commands are kept as lie within the delay; between two of them it acts for a part of a step.
-    kept = math.ceil(value / step_s - 1e-9) + 1
-    return {"delay": value, "nsample": str(kept), "interp": "linear"}
-
-
 _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbers]]]] = {
     TORQUE_CONSTANT[0]: (TORQUE_CONSTANT[1], _gain),
     TORQUE_LIMIT[0]: (TORQUE_LIMIT[1], _limit),
     LAG[0]: (LAG[1], _lag),
-    TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], _delay),
+    TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], delayed),
 }
-DRIVE_EFFECTS = tuple({*_ATTRIBUTES, *SERVO_EFFECTS})
+DRIVE_EFFECTS = frozenset((*_ATTRIBUTES, *SERVO_EFFECTS))
 
 
 def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]) -> Placed:
@@ -64,12 +57,7 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     holders = [e for e in root.walk() if e.tag == "actuator"]
     mine = [e for h in holders for e in h.children if joint in map(e.attributes.get, _JOINTS)]
     if len(mine) == 1 and mine[0].tag == SERVO:
-        late = [
-            c.parameters[TRANSPORT_DELAY[1]].value for c in causes if c.effect == TRANSPORT_DELAY[0]
-        ]
-        return write_servo(
-            edits, mine[0], causes, dict(_delay(late[-1], _step_s(root))) if late else {}
-        )
+        return write_servo(edits, mine[0], causes, _step_s(root))
     stated = [cause for cause in causes if cause.effect not in _ATTRIBUTES]
     placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
     causes = [cause for cause in causes if cause.effect in _ATTRIBUTES]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TRANSPORT_DELAY
@@ -20,13 +21,15 @@ SERVO_EFFECTS = (OTHER_GAINS[0], TORQUE_CONSTANT[0], TRANSPORT_DELAY[0])
 """What its attributes say: ``kp`` and ``kv`` times what is found, ``delay`` of its targets."""
 
 
-def write_servo(
-    edits: Edits, actuator: Element, causes: Sequence[Cause], late: dict[str, Numbers]
-) -> Placed:
-    """Write what causes of one joint make of its only actuator, which is told positions.
+def delayed(value: float, step_s: float) -> Mapping[str, Numbers]:
+    """Return the attributes of an actuator whose commands act late [s], in a model of a time step [s]."""
+    # As many commands are kept as lie within the delay; between two of them it acts for a part of a step.
+    kept = math.ceil(value / step_s - 1e-9) + 1
+    return {"delay": value, "nsample": str(kept), "interp": "linear"}
 
-    ``late``: attributes of a delay, of which there is one at most.
-    """
+
+def write_servo(edits: Edits, actuator: Element, causes: Sequence[Cause], step_s: float) -> Placed:
+    """Write what causes of one joint make of its only actuator, which is told positions."""
     placed = Placed()
     other = [cause for cause in causes if cause.effect not in SERVO_EFFECTS]
     placed.refuse(other, f"expected a motor, <{SERVO}> has gains and a delay")
@@ -36,7 +39,9 @@ def write_servo(
         placed.refuse(gains, f"expected kp of the <{SERVO}>, and kv if any, instead of defaults")
         mine = [cause for cause in mine if cause not in gains]
         gains = []
-    made: dict[str, Numbers] = dict(late) if len(mine) > len(gains) else {}
+    made: dict[str, Numbers] = {}
+    for late in (cause for cause in mine if cause not in gains):
+        made |= delayed(late.parameters[TRANSPORT_DELAY[1]].value, step_s)
     for key, factor in zip(("kp", "kv"), _factors(gains), strict=True):
         if gains and key in actuator.attributes:
             made[key] = float(actuator.attributes[key]) * factor

@@ -102,10 +102,11 @@ def _against_simulator(robot: Robot, estimation: _Logs, validation: _Logs) -> li
     logs = [*estimation, *validation]
     closed = is_closed_loop(robot, logs)
     found = _closed_loop(robot, logs) if closed else check_inverse(robot, logs)
-    if not closed or not refused(found):
-        # What turns the other way may look like another mistake.
-        found = check_turned_axes(robot, logs) or found
-    return [*_references(robot, logs), *found]
+    turned = [] if closed and refused(found) else check_turned_axes(robot, logs)
+    if turned:
+        # By inverse dynamics what turns the other way may look like another mistake.
+        found = [f for f in found if f.severity != "refuse"]
+    return [*_references(robot, logs), *found, *turned]
 
 
 def _at_last(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
