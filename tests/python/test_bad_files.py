@@ -83,8 +83,8 @@ SAID: dict[str, tuple[type[Exception], dict[str, str]]] = {
     "models": (
         RobotError,
         {
-            "cut.urdf": "line 25: expected XML",
-            "cut.xml": "line 12: expected XML",
+            "cut.urdf": "line 25, within <joint 'shoulder'>: expected XML",
+            "cut.xml": "line 12, within <body 'lower'>: expected XML",
             "digits.urdf": "line 7, <mass>: value: expected a number",
             "entity.urdf": ENTITY,
             "entities.urdf": ENTITY,
