@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from axisight import Effect, diagnose
+from axisight.fitting import Weighting
+from axisight.gap.closed_loop import TRACKING_SPEED, records_of
 from axisight.gap.coarse import encoder_steps
+from axisight.gap.decay import slowest_decay_1_s
 from gap_data import PLAN, bare_axis, logs_of, scattered
 
 STEP = 1e-3
@@ -75,3 +78,20 @@ def test_where_something_is_unknown_the_floor_tells_nothing_of_steps(logs):
     said = diagnose(robot=bare_axis(), estimation=hand[:-1], validation=hand[-1:])
     assert said.verdict == "unknown"
     assert "position_quantization" not in {c.effect for c in said.causes}
+
+
+def test_edges_of_logs_with_steps_do_not_count(logs):
+    """A held motor swings between two steps before its log begins: until the loop forgets, none knows how."""
+    robot = bare_axis().with_controller_speed(TRACKING_SPEED)
+    flat = Weighting(np.array([0.0, 500.0]), np.ones((1, 2)), 1)
+    (_, _, certain, _, _), *_ = records_of(robot, logs, flat)
+    time_s = np.arange(len(certain)) * robot.sample_time_s
+    counted = np.flatnonzero(certain[:, 0] > 0)
+    forgets_s = -np.log(0.01) / slowest_decay_1_s(robot, np.zeros(1))
+    assert time_s[counted[0]] >= min(forgets_s, 0.25 * time_s[-1])
+    assert time_s[-1] - time_s[counted[-1]] == pytest.approx(0.5, abs=2 * robot.sample_time_s)
+    fine = [
+        replace(x, position_rad=x.position_rad + 1e-5 * np.pi * x.time_s[:, None]) for x in logs
+    ]
+    (_, _, certain, _, _), *_ = records_of(robot, fine, flat)
+    assert certain[:3].all()

@@ -16,6 +16,7 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import highest_cutoff_hz
+from axisight.gap.decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.encoder_steps import encoder_steps
 from axisight.gap.feedback import loop_responses, periodic_response
 from axisight.gap.limits import missing, reported, torque_limits
@@ -203,13 +204,41 @@ _MIRRORED_S = 0.1
 def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
     """Return what a simulator that is kept on logs is compared with."""
     certain = certainties(tracking, logs, weighting)
+    stepped = encoder_steps(tracking, logs) > 0
+    forgets_s = _forgets_s(tracking) if stepped.any() else 0.0
     out = []
     for log, c in zip(logs, certain, strict=True):
         if log.run_up is not None:
             c[: round(_MIRRORED_S / log.sample_time_s)] = 0.0
+        c[np.ix_(_at_edges(log, forgets_s), stepped)] = 0.0
         position, torque = (_contiguous(log.led(x)) for x in ("position_rad", "torque_nm"))
         out.append((position, torque, c, log.start_rad, log.lead))
     return out
+
+
+# Of a log, what its beginning may be at most; and its end that does not count where positions come in steps [s],
+# for the same reason as `_MIRRORED_S`: the error of a position there is no smaller than half a step.
+_MOST_FORGOTTEN = 0.25
+_END_S = 0.5
+
+
+def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
+    """Return which samples of a log are so near its beginning or its end that steps of an encoder do not tell."""
+    first_s = min(forgets_s, _MOST_FORGOTTEN * log.duration_s)
+    time_s = np.arange(log.n_samples) * log.sample_time_s
+    return (time_s < first_s) | (
+        time_s > time_s[-1] - min(_END_S, _MOST_FORGOTTEN * log.duration_s)
+    )
+
+
+def _forgets_s(tracking: Robot) -> float:
+    """Return for how long [s] a loop remembers where it began.
+
+    A motor that is held between two steps of its encoder swings between them before a log begins: nobody
+    knows with what speed it does begin.
+    """
+    decay_1_s = slowest_decay_1_s(tracking, np.array(tracking.operating_point))
+    return float(-np.log(FORGOTTEN) / decay_1_s) if decay_1_s > 0 else np.inf
 
 
 # Seconds that a log is not cut below.

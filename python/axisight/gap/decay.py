@@ -11,6 +11,11 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
+FORGOTTEN = 0.01
+"""Share of what differs at the beginning that may be left where a comparison begins.
+
+That of the errors of formulas in the torque (`Settings.model_error`).
+"""
 # Of the loop, in which a state is left within a sample.
 _AT_ONCE = 1e-12
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError
 from axisight.gap.compared import Compared
-from axisight.gap.decay import slowest_decay_1_s
+from axisight.gap.decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.faults import Finding
 from axisight.gap.feedback import before, feedback
 from axisight.gap.first_state import LEAST_SAMPLES, with_first_state
@@ -33,9 +33,6 @@ _SEEN_S = 0.02
 _SEEN_SAMPLES = 8
 # Of a log whose samples are so many of the simulation, at least so many of its own.
 _SEEN_STEPS = 4
-# Share of what differs at the beginning that may be left where a comparison begins: that of the errors of
-# formulas in the torque (`Settings.model_error`).
-FORGOTTEN = 0.01
 # Share of a log that has to be left.
 _LEFT = 0.5
 # Its start depends on the torque that holds the robot there, which depends on it: by a thousandth a step.
