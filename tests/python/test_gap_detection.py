@@ -5,6 +5,7 @@ import pytest
 
 from axisight import Effect, Settings, diagnose
 from axisight.effects import effect_info
+from axisight.gap.detection import _of_a_stiffer_gear
 from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 
 LOOKED_AT = (
@@ -61,6 +62,22 @@ def test_twice_the_limit_is_found_and_a_third_is_not(name, limits):
     assert name in {c.effect for c in found.ranking[:4]}
     assert found.causes, found.headline
     assert run([Effect(name, 1, {limit.parameter: limit.value / 3.0})]).causes == ()
+
+
+def test_the_limit_of_a_richer_law_is_of_what_a_plainer_one_lacks(limits):
+    """Beside dry friction, which alone shows earlier; an excess of a twentieth of it is its corner."""
+    excess = limits["stribeck_friction", 1]
+    assert excess.parameter == "excess_nm"
+    assert excess.value > 2.0 * limits["coulomb_friction", 1].value
+    dry = {"coulomb_nm": 0.3, "stribeck_speed_rad_s": 2.0}
+    found = run([Effect("stribeck_friction", 1, {**dry, "excess_nm": 2.0 * excess.value})])
+    assert [c.effect for c in found.causes] == ["stribeck_friction"], found.headline
+
+
+@pytest.mark.parametrize(("softer", "stiffer"), [(0.2, 0.25), (0.45, 9 / 11), (0.6, None)])
+def test_a_stiffer_gear_shows_by_what_it_gives_less(softer, stiffer):
+    # 1 / (1 + x) = 1 - c; at twice the limit a gear gives less still.
+    assert _of_a_stiffer_gear(softer) == (stiffer and pytest.approx(stiffer))
 
 
 def test_limits_fall_with_more_data(limits):

@@ -128,6 +128,9 @@ Parameters: the shift in the frame of the link; its own; angles about x and y.
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad", "at_zero_nm")
 """What a spring of a joint is: its stiffness, and its torque where the joint is at zero."""
 
+STIFFER = ("joint_stiffness", "relative_change")
+"""What a gear of another stiffness is, and its parameter."""
+
 CONSTANT = ("torque_offset", "offset_nm")
 """What a constant torque of the motor is, and its parameter."""
 

@@ -226,9 +226,8 @@ def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
     """Return which samples of a log are so near its beginning or its end that steps of an encoder do not tell."""
     first_s = min(forgets_s, _MOST_FORGOTTEN * log.duration_s)
     time_s = np.arange(log.n_samples) * log.sample_time_s
-    return (time_s < first_s) | (
-        time_s > time_s[-1] - min(_END_S, _MOST_FORGOTTEN * log.duration_s)
-    )
+    last_s = time_s[-1] - min(_END_S, _MOST_FORGOTTEN * log.duration_s)
+    return np.asarray((time_s < first_s) | (time_s > last_s))
 
 
 def _forgets_s(tracking: Robot) -> float:

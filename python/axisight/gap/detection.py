@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.effects.stated import STIFFER
 from axisight.gap.decide import numbers, smallest_likely_fall
 from axisight.gap.result import DetectionLimit
 from axisight.gap.score import held_out_loss
@@ -102,5 +103,16 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     if at_most > low:
         bounded = missing(at_most) > _PRECISION
         low = scipy.optimize.brentq(missing, low, at_most, xtol=_PRECISION) if bounded else at_most
-    value = max(float(np.exp(low)), tolerated)
+    size = max(float(np.exp(low)), tolerated)
+    softens = (effect.name, s.parameter) == STIFFER
+    value = _of_a_stiffer_gear(size) if softens else size
     return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes)
+
+
+def _of_a_stiffer_gear(softer: float) -> float | None:
+    """Return the relative change of a stiffness that a relative change of its compliance is.
+
+    That is what shows, and a gear that gives nothing at all is the most of it: None where twice the
+    change would be more.
+    """
+    return None if softer >= 0.5 else softer / (1.0 - softer)

@@ -16,10 +16,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What the first amplitude of a candidate does, everything else of the candidate nothing.
+    """What the first amplitude of a candidate that is its own does.
 
-    ``rest``: normal equations of all other parameters, one block an axis, for an amplitude of one
-    that the model lacks; ``more``: how many times as much data there are.
+    Those that it shares with a plainer law make up for what they can; everything else of the candidate
+    does nothing. ``rest``: normal equations of all other parameters, one block an axis, for an amplitude
+    of one that the model lacks; ``more``: how many times as much data there are.
     """
 
     option: FreeEffect
@@ -51,13 +52,17 @@ def sensitivity(
 
     ``evidence``: the model with the candidate, last; ``axis`` (n_blocks,) of the blocks.
     """
-    sizes = {p.name for p in effect_info(option.effect.name).parameters if p.role == "amplitude"}
-    name = next((n for n in option.free if n in sizes), None)
+    info = effect_info(option.effect.name)
+    sizes = {p.name for p in info.parameters if p.role == "amplitude"}
+    plainer = {p.name for law in info.contains for p in effect_info(law).parameters}
+    free = sorted((n for n in option.free if n in sizes), key=lambda n: n in plainer)
+    name = free[0] if free else None
     last = max((place for place, _ in evidence.parameters if place is not None), default=None)
     if option.effect.acts or name is None or (last, name) not in evidence.parameters:
         return None
     column = evidence.parameters.index((last, name))
-    rest = [i for i, (place, _) in enumerate(evidence.parameters) if place != last]
+    shared = {(last, n) for n in free[1:] if n in plainer and name not in plainer}
+    rest = [i for i, key in enumerate(evidence.parameters) if key[0] != last or key in shared]
     names = tuple(evidence.parameters[i] for i in rest)
     axes = range(int(axis.max()) + 1)
     by_axis = np.stack([evidence.matrix[axis == i].sum(axis=0) for i in axes])

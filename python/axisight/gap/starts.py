@@ -216,12 +216,14 @@ def _slip(trial: Trial) -> FreeEffect:
     name, deflection = "deflection_rad", _deflection_rad(trial)
     starts = tuple({name: share * deflection} for share in _SLIPS)
     bounds = {name: (0.1 * starts[0][name], 10 * starts[-1][name])}
-    begin = trial.effect({"share": 0.0, "included": 0.5, **starts[1]})
+    begin = trial.effect(
+        {"share": 0.0, "included": 0.5, "sharpness": 0.5, "strain_at_rest": 0.0, **starts[1]}
+    )
     # Stiffness comes from small motions, which feel the whole spring, or from large ones.
     return FreeEffect(
         begin,
-        ("share", name, "included"),
-        {"included": (0.5, 0.5)},
+        ("share", name, "included", "sharpness", "strain_at_rest"),
+        {"included": (0.5, 0.5), "sharpness": (0.5, 0.5), "strain_at_rest": (0.0, 0.5)},
         bounds,
         starts=(starts[0], starts[2]),
     )

@@ -31,58 +31,121 @@ fn the_dead_zone_is_a_shifted_line_outside_its_edge_and_nothing_inside() {
     assert_eq!(dead_zone(0.0, 0.0).0, 0.0);
 }
 
-/// Torques of a gear that slips, `a k D z`, along a way of its deflection in small steps (midpoint
-/// rule: the error of the way is the square of a step over D, 1e-6).
-fn slipping(share: f64, deflection: f64, stiffness: f64, way: &[f64]) -> Vec<f64> {
-    let kernel = build("gear_hysteresis", &[share, deflection, 0.0]).expect("in the table");
-    let (mut z, mut rate) = ([0.0], [0.0]);
+/// Torques of a gear that slips, by its values of `gear_hysteresis`, along a way of its deflection in small
+/// steps (midpoint rule: the error of the way is the square of a step over D, 1e-6).
+fn slipping(values: &[f64; 5], stiffness: f64, way: &[f64]) -> Vec<f64> {
+    let kernel = build("gear_hysteresis", values).expect("in the table");
+    let n = kernel.n_internal();
+    let (mut z, mut rate) = (vec![0.0; n], vec![0.0; n]);
     let mut torques = Vec::new();
     for step in way.windows(2) {
-        let change = step[1] - step[0];
-        for half in [0.5, 1.0] {
-            let spring = |internal| Spring {
-                loaded: step[0],
-                rate: change,
+        let at = |loaded, rate, internal: &[f64]| {
+            kernel.gear_torque(&Spring {
+                loaded,
+                rate,
                 stiffness,
                 internal,
-            };
-            let middle = [z[0] + 0.5 * rate[0]];
-            let at = if half < 1.0 { z } else { middle };
-            kernel.gear_rates(&spring(&at), &mut rate);
-        }
-        z[0] += rate[0];
-        rate[0] = 0.0;
-        torques.push(kernel.gear_torque(&Spring {
-            loaded: step[1],
-            rate: 0.0,
-            stiffness,
-            internal: &z,
-        }));
+            })
+        };
+        let rates = |internal: &[f64], out: &mut [f64]| {
+            kernel.gear_rates(
+                &Spring {
+                    loaded: step[0],
+                    rate: step[1] - step[0],
+                    stiffness,
+                    internal,
+                },
+                out,
+            );
+        };
+        rates(&z, &mut rate);
+        let middle: Vec<f64> = z.iter().zip(&rate).map(|(z, r)| z + 0.5 * r).collect();
+        rates(&middle, &mut rate);
+        z.iter_mut().zip(&rate).for_each(|(z, r)| *z += r);
+        torques.push(at(step[1], 0.0, &z));
     }
     torques
 }
 
 #[test]
-fn a_gear_that_slips_follows_the_bouc_wen_model() {
-    let (a, d, k, n) = (0.3, 2e-4, 1e5, 3000);
+fn a_gear_that_slips_gradually_follows_dahls_model() {
+    let (a, d, k, n, begins) = (0.3, 2e-4, 1e5, 3000, -0.4);
     let full = a * k * d;
     let line =
         |from: f64, to: f64| (0..=n).map(move |i| from + (to - from) * f64::from(i) / f64::from(n));
-    // Loading from rest: z = 1 - exp(-delta / D).
-    let loading: Vec<f64> = line(0.0, 3.0 * d).collect();
-    let torques = slipping(a, d, k, &loading);
-    for (torque, delta) in torques.iter().zip(&loading[1..]) {
-        assert!((torque - full * (1.0 - (-delta / d).exp())).abs() < 1e-5 * full);
+    let there: Vec<f64> = line(0.0, 3.0 * d).collect();
+    let back: Vec<f64> = line(3.0 * d, d).skip(1).collect();
+    let way: Vec<f64> = there.iter().chain(&back).copied().collect();
+    let torques = slipping(&[a, d, 0.0, 0.0, begins], k, &way);
+    // Each way it comes closer to where it slips, exponentially; the torque at rest is not felt.
+    let strain = |from: f64, to: f64, delta: f64| to + (from - to) * (-delta / d).exp();
+    let top = strain(begins, 1.0, 3.0 * d);
+    for (torque, delta) in torques.iter().zip(&way[1..]).take(n as usize) {
+        let z = strain(begins, 1.0, *delta);
+        assert!(
+            (torque - full * (z - begins)).abs() < 1e-5 * full,
+            "{delta}"
+        );
     }
-    // Turned round, it unloads along the stiff line until it is relaxed.
-    let top = torques[n as usize - 1];
-    let back: Vec<f64> = loading
-        .iter()
-        .copied()
-        .chain(line(3.0 * d, 2.5 * d).skip(1))
+    for (torque, delta) in torques.iter().zip(&way[1..]).skip(n as usize) {
+        let z = strain(top, -1.0, 3.0 * d - delta);
+        assert!(
+            (torque - full * (z - begins)).abs() < 1e-5 * full,
+            "{delta}"
+        );
+    }
+}
+
+/// Springs in parallel that slip, each at once, evenly apart: play operators, as Iwan's model has them.
+fn sliders(d: f64, way: &[f64]) -> Vec<f64> {
+    let mut strains = [0.0_f64; 4];
+    let mut out = Vec::new();
+    for step in way.windows(2) {
+        for (x, at) in strains.iter_mut().zip([0.4, 0.8, 1.2, 1.6]) {
+            *x = (*x + step[1] - step[0]).clamp(-at * d, at * d);
+        }
+        out.push(strains.iter().sum::<f64>() / 4.0);
+    }
+    out
+}
+
+#[test]
+fn a_gear_that_slips_suddenly_is_like_sliders_in_parallel() {
+    let (a, d, k) = (0.3, 2e-4, 1e5);
+    // Small turns on the flanks of large ones: they close with sliders, and creep with Dahl's law.
+    let way: Vec<f64> = (0..20000)
+        .map(|i| {
+            let t = std::f64::consts::TAU * f64::from(i) / 20000.0;
+            d * (2.5 * (2.0 * t).sin() + 0.4 * (37.0 * t).sin())
+        })
         .collect();
-    let end = *slipping(a, d, k, &back).last().expect("steps");
-    assert!((end - (top - a * k * 0.5 * d)).abs() < 1e-5 * full);
+    let oracle = sliders(d, &way);
+    let off = |sharpness: f64| {
+        let torques = slipping(&[a, d, 0.0, sharpness, 0.0], k, &way);
+        let error = torques
+            .iter()
+            .zip(&oracle)
+            .map(|(x, y)| (x / (a * k) - y).powi(2));
+        let size = oracle.iter().map(|y| y * y);
+        (error.sum::<f64>() / size.sum::<f64>()).sqrt()
+    };
+    // Where a slider slips, an element has come to z: z + z^6/6 + z^11/11 + .. = 1, 0.883. Nowhere is it further off.
+    assert!(off(1.0) < 1.0 - 0.883, "{}", off(1.0));
+    assert!(off(0.0) > 3.0 * off(1.0), "{}", off(0.0));
+}
+
+#[test]
+fn a_step_longer_than_a_corner_ends_where_it_slips() {
+    let d = 1e-5;
+    let way: Vec<f64> = (0..200).map(|i| 0.5 * d * f64::from(i)).collect();
+    let torques = slipping(&[0.3, d, 0.0, 1.0, 0.0], 1e5, &way);
+    let full = 0.3 * 1e5 * d;
+    assert!(torques.iter().all(|x| *x < 2.0 * full));
+    assert!(
+        (torques[198] / full - 1.0).abs() < 0.1,
+        "{}",
+        torques[198] / full
+    );
 }
 
 #[test]
@@ -115,13 +178,13 @@ fn a_gear_with_a_knee_has_two_stiffnesses() {
 #[test]
 fn a_slipping_spring_that_the_stiffness_includes_shows_in_large_motions_only() {
     let (a, d, k) = (0.3, 2e-4, 1e5);
-    let kernel = build("gear_hysteresis", &[a, d, 1.0]).expect("in the table");
+    let kernel = build("gear_hysteresis", &[a, d, 1.0, 0.0, 0.0]).expect("in the table");
     let torque = |loaded: f64, z: f64| {
         kernel.gear_torque(&Spring {
             loaded,
             rate: 0.0,
             stiffness: k,
-            internal: &[z],
+            internal: &[z; 4],
         })
     };
     // Stuck, z follows the deflection: nothing is different from the gear's own spring.
@@ -140,7 +203,7 @@ fn a_gear_that_slips_takes_energy_out() {
         let way: Vec<f64> = (0..8000)
             .map(|i| amplitude * (turns * f64::from(i)).sin())
             .collect();
-        let torques = slipping(a, d, k, &way);
+        let torques = slipping(&[a, d, 0.0, 0.5, 0.0], k, &way);
         let work = |i: usize| torques[i] * (way[i + 1] - way[i]);
         // The second turn: the first forgets how it began.
         let loss: f64 = (4000..7999).map(work).sum();

@@ -6,8 +6,8 @@ use axisight_scalar::Scalar;
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "gear_hysteresis",
     summary: "a loop of torque over deflection: a spring beside the gear's slips, or part of it",
-    equation: "tau_g = k (1 - b a) delta + a k D z,  z' = (delta' - (|delta'| z + delta' |z|) / 2) / D",
-    source: "Bouc-Wen model: Wen (1976), J. Eng. Mech. Div. 102(2), with A = n = 1, beta = gamma = 1/2; beside the spring as in Dhaouadi, Ghorbel, Gandhi (2003), IEEE Trans. Ind. Electron. 50(6)",
+    equation: "tau_g = k (1 - b a) delta + a k sum_j D_j z_j / 4,  D_j z_j' = delta' - ((1 - s/2) |delta'| z_j + s/2 delta' |z_j|) (1 - s + s z_j^4),  D_j = D (1 + s (j - 2.5) 0.4)",
+    source: "four Bouc-Wen elements: Wen (1976), J. Eng. Mech. Div. 102(2), with A = 1, beta = 1 - s/2, gamma = s/2; with s = 0 all are Dahl's (1968, TOR-0158), with s = 1 about the sliders of Iwan (1966), J. Appl. Mech. 33(4), evenly apart; beside the spring as in Dhaouadi, Ghorbel, Gandhi (2003), IEEE Trans. Ind. Electron. 50(6)",
     scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
@@ -49,13 +49,39 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1.5,
             typical: 0.5,
         },
+        // How suddenly each element slips, and how far apart they do: the more, the less small loops creep
+        // under a load.
+        ParameterInfo {
+            name: "sharpness",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.0,
+            lower: 0.0,
+            upper: 1.0,
+            typical: 0.5,
+        },
+        // What it remembers of the motion before a run.
+        ParameterInfo {
+            name: "strain_at_rest",
+            unit: "1",
+            role: Role::Shape,
+            neutral: 0.0,
+            lower: -1.0,
+            upper: 1.0,
+            typical: 0.5,
+        },
     ],
 };
+
+/// Deflections that elements slip at, as shares of their mean, about it: evenly from nought, if most sudden.
+const APART: [f64; 4] = [-0.6, -0.2, 0.2, 0.6];
 
 struct Hysteresis<S> {
     share: S,
     deflection: S,
     included: S,
+    sharpness: S,
+    strain_at_rest: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
@@ -63,25 +89,43 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
         share: p[0],
         deflection: p[1],
         included: p[2],
+        sharpness: p[3],
+        strain_at_rest: p[4],
     })
+}
+
+impl<S: Scalar> Hysteresis<S> {
+    /// Deflection at which an element slips.
+    fn slips_at(&self, apart: f64) -> S {
+        self.deflection * (self.sharpness * apart + 1.0)
+    }
 }
 
 impl<S: Scalar> Kernel<S> for Hysteresis<S> {
     fn n_internal(&self) -> usize {
-        1
+        APART.len()
     }
 
     fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
-        // It starts relaxed, whatever the load at rest.
-        let slipping = spring.internal.first().map_or_else(S::zero, |z| *z);
+        // From what the strains are at rest, where the gear holds the load whatever they are.
+        let slipping = spring
+            .internal
+            .iter()
+            .zip(APART)
+            .fold(S::zero(), |sum, (z, apart)| sum + *z * self.slips_at(apart));
         let taken = self.included * spring.loaded;
-        self.share * spring.stiffness * (self.deflection * slipping - taken)
+        self.share * spring.stiffness * (slipping * (1.0 / APART.len() as f64) - taken)
     }
 
     fn gear_rates(&self, spring: &Spring<'_, S>, rates: &mut [S]) {
-        if let (Some(z), Some(out)) = (spring.internal.first(), rates.first_mut()) {
-            let slip = (spring.rate.abs() * *z + spring.rate * z.abs()) * 0.5;
-            *out = (spring.rate - slip) / self.deflection;
+        for ((change, out), apart) in spring.internal.iter().zip(rates).zip(APART) {
+            let z = *change + self.strain_at_rest;
+            // Beyond its yield a step too long for the corner brings it: from there it is Dahl's way back.
+            let short = z.square().square() - 1.0;
+            let sudden = short.if_positive(S::zero(), short) * self.sharpness + 1.0;
+            let straight = self.sharpness * 0.5;
+            let slip = (spring.rate.abs() * z * (-straight + 1.0) + spring.rate * z.abs() * straight) * sudden;
+            *out = (spring.rate - slip) / self.slips_at(apart);
         }
     }
 }
