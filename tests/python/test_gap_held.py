@@ -96,3 +96,16 @@ def test_a_cable_that_does_not_stretch_is_a_constant_torque(slack, monkeypatch):
     monkeypatch.setattr("axisight.gap.held.step_without", lambda *_: np.array([0.05]))
     found = held_to_plainer(tried, fits, np.array([0.0, 1.0, -9.0]), np.array([0, 0, 1]))
     assert found == pytest.approx([0.0, -np.log(50.0) if slack else 1.0, -9.0])
+
+
+@pytest.mark.parametrize("unsure", [None, "step", "knee_rad"])
+def test_a_knee_that_is_not_known_is_another_stiffness(unsure, monkeypatch):
+    """Not by how much the gear changes there, or not where that is."""
+    monkeypatch.setattr(
+        "axisight.gap.held.own_error", lambda _fit, name, _at: 2.0 if name == unsure else 0.1
+    )
+    softer = Effect("joint_stiffness", 1, {"relative_change": -0.15})
+    knee = Effect("piecewise_stiffness", 1, {"step": -0.07, "within": -0.07, "knee_rad": 3e-6})
+    fits = [SimpleNamespace(effects=[one]) for one in (softer, knee)]
+    found = held_to_plainer([softer, knee], fits, np.array([-3.0, 2.0, -5.0]), np.zeros(1, int))
+    assert found[1] == pytest.approx(2.0 if unsure is None else -3.0 - np.log(10.0))

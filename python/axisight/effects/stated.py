@@ -192,6 +192,9 @@ SPRING_CHANGES = {
 }
 """Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
 
+KNEE = ("piecewise_stiffness", "step", "knee_rad")
+"""What a gear is whose stiffness changes at a deflection, and its parameters: by how much, and where."""
+
 PLAY = ("backlash", "damped")
 """What a gear has whose middle is without stiffness, and its parameter for what is damped there."""
 

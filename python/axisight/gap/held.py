@@ -2,7 +2,8 @@
 
 Whoever writes dry friction rounds its corner otherwise, over speed or over a small way; a law with a way of its own
 takes up the difference, and predicts better by it, as does an excess at standstill that never shows, since the sign
-turns over a wider range of speeds. A cable that hardly pulls harder as it is stretched, and is at rest far away,
+turns over a wider range of speeds. A gear with a knee that nothing reaches, or all pass, is one of another stiffness.
+A cable that hardly pulls harder as it is stretched, and is at rest far away,
 pulls like a constant. Where the way or the stiffness is real its size is sure, and where the excess is, friction
 falls with speed.
 """
@@ -15,7 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
-from axisight.effects.stated import BRISTLES, CONSTANT, DRY_FRICTION, JOINT_SPRING, STRIBECK
+from axisight.effects.stated import (
+    BRISTLES,
+    CONSTANT,
+    DRY_FRICTION,
+    JOINT_SPRING,
+    KNEE,
+    STIFFER,
+    STRIBECK,
+)
 from axisight.gap.evidence import Evidence
 from axisight.gap.score import step_without
 
@@ -36,7 +45,10 @@ _PLAINER = {
     BRISTLES[0]: (DRY_FRICTION[0], 10.0),
     STRIBECK[0]: (DRY_FRICTION[0], 10.0),
     JOINT_SPRING[0]: (CONSTANT[0], 50.0),
+    KNEE[0]: (STIFFER[0], 10.0),
 }
+# What each of them adds; of all but Stribeck's an error tells whether it is there.
+_ADDED = {BRISTLES[0]: BRISTLES[1:2], JOINT_SPRING[0]: JOINT_SPRING[1:2], KNEE[0]: KNEE[1:]}
 
 
 def held_to_plainer(
@@ -63,8 +75,7 @@ def _is_plain(name: str, fit: Evidence, stretch: NDArray[np.int64]) -> bool:
     """Whether a fitted law is no more than its plainer one."""
     if name == STRIBECK[0]:
         return excess_shown(fit.effects[-1]) < _RISES
-    added = BRISTLES[1] if name == BRISTLES[0] else JOINT_SPRING[1]
-    return own_error(fit, added, stretch) > _UNKNOWN
+    return any(own_error(fit, added, stretch) > _UNKNOWN for added in _ADDED[name])
 
 
 def excess_shown(effect: Effect) -> float:
