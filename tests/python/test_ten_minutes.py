@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 from pathlib import Path
@@ -9,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from axisight import load_robot
 from axisight.cli import app
 from servo_arm import MACHINES, NOMINAL
 
+Array = NDArray[np.float64]
 LINK = """  <link name="{name}"><inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/>
     <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
   <joint name="{joint}" type="revolute"><parent link="{parent}"/><child link="{name}"/>
@@ -48,10 +51,8 @@ def said(line: str) -> str:
     return " ".join(out.output.split())
 
 
-def test_a_urdf_and_csv(
-    commands: dict[str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def arm_urdf() -> None:
+    """Write arm.urdf: three links, viscous friction."""
     parents = ["base", "l1", "l2"]
     links = [
         LINK.format(name=f"l{i + 1}", joint=joint, parent=parents[i], axis=axis, at=at,
@@ -61,23 +62,35 @@ def test_a_urdf_and_csv(
     Path("arm.urdf").write_text(
         '<robot name="arm">\n  <link name="base"/>\n' + "".join(links) + "</robot>\n"
     )
+
+
+def measured(run: int) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Time [s], position, velocity and torque (n, 3) of the arm, which has dry friction on axis 2 as well."""
     robot, time = load_robot("arm.urdf"), np.arange(2000) / 100
+    rng = np.random.default_rng(run)
+    q, v, a = np.zeros((3, len(time), 3))
+    for axis in range(3):
+        for f in rng.uniform(0.1, 0.8, 4):
+            w, phase = 2 * np.pi * f, rng.uniform(0, 2 * np.pi)
+            q[:, axis] += 0.2 * np.sin(w * time + phase)
+            v[:, axis] += 0.2 * w * np.cos(w * time + phase)
+            a[:, axis] -= 0.2 * w**2 * np.sin(w * time + phase)
+    torque = robot.inverse_dynamics(q, v, a) + 0.5 * v
+    torque[:, 1] += 2.0 * np.tanh(v[:, 1] / 0.01)
+    return time, (
+        q + 1e-5 * rng.normal(size=q.shape),
+        v + 1e-3 * rng.normal(size=q.shape),
+        torque + 0.1 * rng.normal(size=q.shape),
+    )
+
+
+def test_a_urdf_and_csv(
+    commands: dict[str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arm_urdf()
     for run in (1, 2, 3):
-        rng = np.random.default_rng(run)
-        q, v, a = np.zeros((3, len(time), 3))
-        for axis in range(3):
-            for f in rng.uniform(0.1, 0.8, 4):
-                w, phase = 2 * np.pi * f, rng.uniform(0, 2 * np.pi)
-                q[:, axis] += 0.2 * np.sin(w * time + phase)
-                v[:, axis] += 0.2 * w * np.cos(w * time + phase)
-                a[:, axis] -= 0.2 * w**2 * np.sin(w * time + phase)
-        torque = robot.inverse_dynamics(q, v, a) + 0.5 * v
-        torque[:, 1] += 2.0 * np.tanh(v[:, 1] / 0.01)
-        noisy = (
-            q + 1e-5 * rng.normal(size=q.shape),
-            v + 1e-3 * rng.normal(size=q.shape),
-            torque + 0.1 * rng.normal(size=q.shape),
-        )
+        time, noisy = measured(run)
         table = {"time": time}
         for name, values in zip(("position", "velocity", "torque"), noisy, strict=True):
             table |= {f"{name}_{joint}": values[:, i] for i, joint in enumerate(JOINTS)}
@@ -91,6 +104,22 @@ def test_a_urdf_and_csv(
     assert re.search(r'<dynamics damping="0.5" friction="[12]\.', Path("new.urdf").read_text())
     assert Path("verdict.json").exists()
     assert Path("report.html").exists()
+
+
+def test_recordings_of_ros(
+    commands: dict[str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Joints in another order than the model's."""
+    pytest.importorskip("rosbags", reason="bags are read with the extra `ros`")
+    written_states = importlib.import_module("bag_data").written_states
+    monkeypatch.chdir(tmp_path)
+    arm_urdf()
+    for run in (1, 2, 3):
+        time, fields = measured(run)
+        back = [np.ascontiguousarray(x[:, ::-1]) for x in fields]
+        written_states(Path(f"bag{run}"), "rosbag2", time, list(JOINTS)[::-1], back)
+    (diagnose,) = commands["Recordings of ROS"]
+    assert "explained: The simulator lacks Coulomb friction on axis 2" in said(diagnose)
 
 
 def test_an_mjcf_with_targets(
