@@ -19,10 +19,9 @@ from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
+from axisight.robot.sources import is_model_file, refuse_neither
 
 Array = NDArray[np.float64]
-MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
-"""How the names of files end that say a robot in another format."""
 
 ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]
 
@@ -420,7 +419,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         return Robot.from_toml(text)
     path = usable_path(source, RobotError)
     # Stands above robots: only those who have such a file load its readers.
-    if path.suffix.lower() in MODEL_SUFFIXES:
+    if is_model_file(path):
         found: Robot = import_module("axisight.robot_import").import_robot(
             path, sample_time_s=sample_time_s
         )
@@ -432,6 +431,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         raise RobotError(
             f"{path}: expected a robot description or a preset ({known}): {error}"
         ) from error
+    refuse_neither(text, str(path))
     try:
         return Robot.from_toml(text)
     except RobotError as error:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from axisight.errors import RobotError
-from axisight.robot.robot import MODEL_SUFFIXES, Robot
+from axisight.robot.robot import Robot
 from axisight.robot_import.bodies import Tree
 from axisight.robot_import.chain import Chain, chain_of
 from axisight.robot_import.description import description
@@ -18,11 +18,6 @@ from axisight.robot_import.mjcf import read_mjcf
 from axisight.robot_import.pinocchio_model import tree_of
 from axisight.robot_import.urdf import read_urdf
 from axisight.robot_import.xml_tree import read_xml
-
-
-def is_model_file(source: Path | str) -> bool:
-    """Whether a file is one of those that `import_robot` reads, by its name."""
-    return Path(source).suffix.lower() in MODEL_SUFFIXES
 
 
 def drives_path(source: Path | str) -> Path:
@@ -58,7 +53,7 @@ def import_robot(
     Parameters
     ----------
     source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
-        and Hartenberg (``.csv``), or a ``pinocchio.Model``.
+        and Hartenberg (``.csv``, ``.toml``), or a ``pinocchio.Model``.
     base, tip : links (bodies; joints of a ``pinocchio.Model``) between which the chain runs: the root, and
         the end of the only moving branch, unless given here or in the drive data.
     drives : what the file lacks of drives: data or their TOML file; of a file ``arm.urdf`` it is
@@ -125,7 +120,7 @@ def bodies_and_chain(
 
 def _tree(path: Path) -> Tree:
     """Return the bodies of a file, read as what it says it is."""
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in (".csv", ".toml"):
         return read_dh(path)
     root = read_xml(path)
     if root.tag == "robot":
