@@ -11,7 +11,7 @@ from axisight.errors import RobotError
 from axisight.robot.robot import Robot
 from axisight.robot_import.bodies import Tree
 from axisight.robot_import.chain import Chain, chain_of
-from axisight.robot_import.description import description
+from axisight.robot_import.description import description, torque_constants
 from axisight.robot_import.dh import read_dh
 from axisight.robot_import.drives import DriveData, read_drives
 from axisight.robot_import.mjcf import read_mjcf
@@ -76,7 +76,8 @@ def import_robot(
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
         try:
-            return Robot.from_toml(description(chain, stated, named))
+            robot = Robot.from_toml(description(chain, stated, named))
+            return robot.with_torque_constants(torque_constants(chain, stated))
         except RobotError as error:
             raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
 
