@@ -81,6 +81,20 @@ three,standard,0.4,0.1,0,-1.2,1,0,0.02,0.1,0.01,0.01,0.004,0
 """
 
 
+def dh_toml(table: str = DH) -> str:
+    """Return the TOML that says the same as a CSV of one convention, numbers as they stand there."""
+    head, *rows = [line.split(",") for line in table.splitlines()]
+    tables = [dict(zip(head, row, strict=True)) for row in rows]
+    (convention,) = {row.pop("convention") for row in tables}
+    words = ("joint", "motion")
+    joints = [
+        "[[joint]]\n"
+        + "".join(f'{k} = "{v}"\n' if k in words else f"{k} = {v}\n" for k, v in row.items())
+        for row in tables
+    ]
+    return f'convention = "{convention}"\n' + "".join(joints)
+
+
 def written(folder: Path, text: str | bytes, name: str = "arm.urdf") -> Path:
     """Write a model file and return its path."""
     path = folder / name

@@ -13,7 +13,7 @@ from axisight import Robot, load_robot
 from axisight.cli import app
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import DriveData
-from import_data import DH, MJCF, URDF, written
+from import_data import DH, MJCF, URDF, dh_toml, written
 from model_logs import written_log, written_table
 
 
@@ -45,6 +45,25 @@ def test_without_a_file_it_is_printed(tmp_path: Path):
     status, said = run("robot", "import", written(tmp_path, DH, "arm.csv"))
     assert status == 0
     assert 'schema = "axisight.robot/2"' in said
+
+
+def test_a_table_as_toml_is_told_from_a_robot_file(tmp_path: Path):
+    """By what is in it: it may stand first among logs, has notes, and takes a load."""
+    table, out = written(tmp_path, dh_toml(), "table.toml"), tmp_path / "robot.toml"
+    status, said = run("robot", "import", table, "-o", out)
+    assert status == 0, said
+    assert "3 axes, one, two, three" in said
+    robot = load_robot(out)
+    log = written_log(tmp_path, 0, robot, lambda q, _: 0 * q)
+    status, said = run("check", log, "--robot", table, "--payload", "0.5")
+    assert status == 0, said
+    status, said = run("check", log, "--robot", out, "--payload", "0.5")
+    assert (status, "--payload: expected a model file" in said) == (2, True)
+    status, said = run("diagnose", table, log, log)
+    assert "imported from table.toml" in said, said
+    # A robot file is no table.
+    status, said = run("robot", "import", out)
+    assert (status, "expected a table of Denavit and Hartenberg" in said) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from axisight.robot import load_robot
 from axisight.robot_file.sidecar import Sidecar
 from columns_data import robot_toml
 from damage import TIMES, batch, mutated, sound
-from import_data import DH, MJCF, URDF
+from import_data import DH, MJCF, URDF, dh_toml
 from montecarlo_data import small_study
 from reading_children import read_in_child
 
@@ -73,6 +73,7 @@ TEXTS = {
     "urdf": ("models", "arm.urdf", URDF),
     "mjcf": ("models", "arm.xml", MJCF),
     "dh": ("models", "arm.csv", DH),
+    "dh toml": ("robot", "arm.toml", dh_toml()),
     "robot": ("robot", "robot.toml", robot_toml(2)),
     "preset": ("robot", "robot.toml", load_robot("irb6600_like").toml),
     "drives": ("drives", "drives.toml", DRIVES),

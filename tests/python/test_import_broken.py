@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from axisight.errors import RobotError
+from axisight.robot import load_robot
 from axisight.robot_import import import_robot
-from import_data import DH, MJCF, URDF, changed, written
+from import_data import DH, MJCF, URDF, changed, dh_toml, written
 
 UPPER = '<mass value="4"/>'
 ELBOW = '<joint name="elbow" type="continuous">'
@@ -285,6 +286,56 @@ BROKEN_DH = {
         r"line 2, joint 'one': motion",
     ),
 }
+TABLE = dh_toml()
+BROKEN_DH_TOML = {
+    "no TOML": ("convention standard\n", r"arm.toml: expected TOML"),
+    "unknown key": (
+        changed(TABLE, "theta_rad = -0.2", "theta = -0.2"),
+        r"\[\[joint\]\] 2, joint 'two': expected the keys .*unknown theta",
+    ),
+    "no key": (changed(TABLE, "d_m = 0.05\n", ""), r"joint 'two': expected the keys .*got no d_m"),
+    "no name": (changed(TABLE, 'joint = "two"\n', ""), r"\[\[joint\]\] 2, .*got no joint"),
+    "a name that is none": (
+        changed(TABLE, 'joint = "two"', "joint = 2"),
+        r"\[\[joint\]\] 2: joint: expected a word, got 2",
+    ),
+    "unknown key of the file": ("units = 1\n" + TABLE, r"arm.toml: expected the keys .*'units'"),
+    "another convention": (
+        changed(TABLE, '"standard"', '"craig"'),
+        r"arm.toml: convention: expected standard or modified, got 'craig'",
+    ),
+    "no convention": (
+        changed(TABLE, 'convention = "standard"\n', ""),
+        r"convention: expected standard or modified",
+    ),
+    "convention of a row": (
+        changed(TABLE, 'joint = "two"', 'joint = "two"\nconvention = "modified"'),
+        r"joint 'two': expected the keys .*unknown convention",
+    ),
+    "a text for a number": (
+        changed(TABLE, "d_m = 0.05", 'd_m = "0.05"'),
+        r"joint 'two': d_m: expected a number, got '0.05'",
+    ),
+    "a truth for a number": (changed(TABLE, "d_m = 0.05", "d_m = true"), r"joint 'two': d_m: "),
+    "no finite number": (changed(TABLE, "d_m = 0.05", "d_m = inf"), r"joint 'two': d_m: .*'inf'"),
+    "zero mass": (
+        changed(TABLE, "mass_kg = 2", "mass_kg = 0"),
+        r"joint 'two': mass_kg: .*positive",
+    ),
+    "joint twice": (
+        changed(TABLE, '"two"', '"one"'),
+        r"\[\[joint\]\] 2: joint: expected a name no other row has, got 'one'",
+    ),
+    "sliding sideways": (
+        changed(TABLE, 'joint = "two"', 'joint = "two"\nmotion = "screw"'),
+        r"joint 'two': motion: expected revolute or prismatic",
+    ),
+    "no joints": ('convention = "standard"\n', r"arm.toml: joint: expected tables \[\[joint\]\]"),
+    "joints that are none": (
+        'convention = "standard"\njoint = [1]\n',
+        r"arm.toml: joint: expected tables",
+    ),
+}
 BROKEN_DRIVES = {
     "unknown key": ("gear = 3\n", r"my.toml: gear"),
     "no TOML": ("gear 3\n", r"my.toml: expected TOML"),
@@ -353,6 +404,34 @@ def test_a_broken_table_is_refused(tmp_path: Path, name: str):
         import_robot(path)
 
 
+@pytest.mark.parametrize("name", BROKEN_DH_TOML)
+def test_a_broken_table_as_toml_is_refused(tmp_path: Path, name: str):
+    text, message = BROKEN_DH_TOML[name]
+    path = written(tmp_path, text, "arm.toml")
+    with pytest.raises(RobotError, match=message):
+        import_robot(path)
+    if name != "no TOML":  # which nobody can tell from a robot file that is none
+        with pytest.raises(RobotError, match=message):
+            load_robot(path)
+
+
+def test_a_toml_that_is_no_robot_says_what_would_be(tmp_path: Path):
+    for text in ("", "gear = 3\n", "[joint.elbow]\ngear_ratio = 0.02\n", "joint = [1]\n"):
+        path = written(tmp_path, text, "arm.toml")
+        for read in (load_robot, import_robot):
+            with pytest.raises(
+                RobotError,
+                match=r"arm.toml: expected a robot file \(schema .* or a table of Denavit",
+            ):
+                read(path)
+    path = written(tmp_path, 'schema = "axisight.columns/1"\n', "map.toml")
+    with pytest.raises(RobotError, match=r"schema.*expected \"axisight.robot/1.*columns"):
+        load_robot(path)
+    path = written(tmp_path, load_robot("two_mass_axis").toml, "robot.toml")
+    with pytest.raises(RobotError, match=r"expected a table of .*got a file of schema 'axisight.r"):
+        import_robot(path)
+
+
 @pytest.mark.parametrize("name", BROKEN_DRIVES)
 def test_broken_drive_data_are_refused(tmp_path: Path, name: str):
     text, message = BROKEN_DRIVES[name]
@@ -362,6 +441,6 @@ def test_broken_drive_data_are_refused(tmp_path: Path, name: str):
 
 
 def test_a_file_that_is_not_there_is_said(tmp_path: Path):
-    for name in ("none.urdf", "none.xml", "none.csv"):
+    for name in ("none.urdf", "none.xml", "none.csv", "none.toml"):
         with pytest.raises(RobotError, match=re.escape(f"{tmp_path / name}: expected a readable")):
             import_robot(tmp_path / name)

@@ -11,9 +11,9 @@ import pytest
 
 from axisight import Robot, load_robot
 from axisight.errors import MissingExtraError, RobotError
-from axisight.robot_import import import_robot
+from axisight.robot_import import import_robot, is_model_file
 from axisight.robot_import.drives import DriveData
-from import_data import DH, MJCF, URDF, changed, written
+from import_data import DH, MJCF, URDF, changed, dh_toml, written
 from imported_arms import difference_to_mujoco, difference_to_pinocchio, states
 
 
@@ -331,6 +331,30 @@ def test_a_table_moves_as_pinocchio_with_its_transforms(tmp_path: Path, conventi
         body = pinocchio.Inertia(mass, np.array([x, y, z]), inertia)
         model.appendBodyToJoint(parent, body, before)
     assert difference_to_pinocchio(robot, model) < 1e-12
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("motion", ["revolute", "prismatic"])
+def test_a_table_is_the_same_robot_as_toml(tmp_path: Path, convention: str, motion: str):
+    """Numbers are read as the same floats, down to the last bit."""
+    table = DH.replace("convention,", "convention,motion,").replace(
+        "standard,", f"{convention},{motion},"
+    )
+    csv = import_robot(written(tmp_path, table, "arm.csv"))
+    toml = load_robot(written(tmp_path, dh_toml(table), "arm.toml"))
+    assert toml.toml.replace("arm.toml", "arm.csv") == csv.toml
+    q, v, a = states(csv, 20)
+    np.testing.assert_array_equal(toml.inverse_dynamics(q, v, a), csv.inverse_dynamics(q, v, a))
+
+
+def test_a_table_as_toml_has_drive_data_and_defaults(tmp_path: Path):
+    """Products of inertia and the motion may be left out, whole numbers are numbers."""
+    table = written(tmp_path, dh_toml(), "arm.toml")
+    written(tmp_path, "[joint.two]\ngear_ratio = 0.02\n", "arm.drives.toml")
+    robot = load_robot(table, sample_time_s=0.004)
+    assert robot.gear_ratio.tolist() == [1.0, 0.02, 1.0]
+    assert robot.sample_time_s == 0.004
+    assert is_model_file(table) and not is_model_file(written(tmp_path, robot.toml, "robot.toml"))
 
 
 def test_a_pinocchio_model_is_taken_as_it_is(tmp_path: Path):

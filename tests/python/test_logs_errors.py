@@ -183,7 +183,7 @@ def test_addresses_that_do_not_fit(tmp_path):
         ("sample_rate_hz = 1", ["axis"]),
         ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"grad"'), ["axis.0.position.unit", "grad"]),
         ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"counts"'), ["counts_per_rev"]),
-        ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"A"'), ["scale", "'A'"]),
+        ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"V"'), ["scale", "'V'"]),
         ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"mm"'), ["torque in Nm", "mm"]),
         ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", index = "a"'), ["index", "'a'"]),
         ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", sign = 2'), ["sign", "2"]),

@@ -214,7 +214,7 @@ Q = 'position = { name = "q{0}", unit = "rad" }\n'
         (TIME + '[every_axis]\nposition = { name = "q", unit = "rad" }', "{0}, {1} or {joint}"),
         (TIME + '[every_axis]\nposition = { name = "q{0}{1}", unit = "rad" }', "once in the name"),
         (TIME + "[every_axis]\nposition = []", "position"),
-        (TIME + f'[every_axis]\n{Q}torque = {{ name = "i{{0}}", unit = "A" }}', "scale"),
+        (TIME + f'[every_axis]\n{Q}torque = {{ name = "i{{0}}", unit = "V" }}', "scale"),
         (TIME + f"axes = 0\n[every_axis]\n{Q}", "axes"),
         (TIME + f"[every_axis]\n{Q}torqe = 1", "every_axis.torqe: expected a known key"),
         (TIME + f"[every_axis]\n{Q}[[axis]]\n", "axis: expected a known key"),

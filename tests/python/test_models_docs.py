@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from axisight.robot_import.dh import _OPTIONAL, COLUMNS
+from axisight.robot_import.dh_rows import COLUMNS, OPTIONAL
 from key_tables import same, told
 
 
@@ -44,6 +44,6 @@ def test_snippets_run(
 
 def test_every_column_of_a_table_of_joints_is_told(page: str) -> None:
     section = page.split("\n## Tables of Denavit and Hartenberg\n")[1]
-    defaults = {name: f"`{value}`" for name, value in _OPTIONAL.items()}
+    defaults = {name: f"`{value}`" for name, value in OPTIONAL.items()}
     known = {name: defaults.get(name, "needed") for name in COLUMNS}
     same(told(section.split("\n## ", maxsplit=1)[0]), known)

@@ -25,7 +25,7 @@ def _robot() -> None:
 @robot_app.command("import")
 def import_command(
     model: Annotated[
-        Path, typer.Argument(help="URDF, MJCF, or a table of Denavit and Hartenberg (CSV).")
+        Path, typer.Argument(help="URDF, MJCF, or a table of Denavit and Hartenberg (CSV or TOML).")
     ],
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Robot file to write. Default: the screen.")

@@ -17,7 +17,7 @@ from axisight.documents import parse_toml, read_text
 from axisight.errors import CaseError
 from axisight.logs.columns import describe_validation
 from axisight.logs.log import Log
-from axisight.logs.map_files import AnyMap, load_column_map
+from axisight.logs.map_files import AnyMap, load_column_map, needs_robot
 from axisight.logs.reading import read_log
 from axisight.logs.sources import is_folder_log
 from axisight.logs.sources_bag import is_bag
@@ -105,7 +105,8 @@ def read_case(
 
     ``untrusted``: a case of somebody else. Nothing outside the folder is opened: names that are absolute
     or have ``..``, links that lead out, and HDF5 files that name others are refused.
-    ``load`` makes of the robot's path the robot by whose gears signals of joints are read.
+    ``load`` makes of the robot's path the robot by whose gears signals of joints are read, and currents by its
+    torque constants.
     """
     folder = usable_path(folder, CaseError)
     path = folder / "case.toml"
@@ -133,11 +134,11 @@ def read_case(
         seen.add(file)
     given = load_column_map(columns) if isinstance(columns, str | Path) else columns
     # Logs of motors are read without the robot, which may be a file that only later is looked at.
-    joints = given is not None and given.side == "joint"
+    needed = given is not None and needs_robot(given)
     recorded = any(
         is_bag(folder / entry.file) or is_folder_log(folder / entry.file) for entry in content.log
     )
-    robot = load(robot_path) if joints or recorded else None
+    robot = load(robot_path) if needed or recorded else None
     logs = tuple(
         _read_entry(path, number, entry, given, robot, max_bytes)
         for number, entry in enumerate(content.log)

@@ -90,6 +90,7 @@ def check_log(
     findings += [Finding("ok", "time", note) for note in grid.notes]
     findings += [Finding("warning", "map", note) for note in found.notes]
     findings += _without_torque(found)
+    findings += _currents(found)
     why = "not a native column, not used" if found.pattern is None else "not used by the map"
     findings += [Finding("ok", short(name, 200), why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
@@ -112,6 +113,14 @@ def _without_torque(found: Gathered) -> list[Finding]:
         "sensors and constants do not show"
     )
     return [Finding("ok", "torque", message)]
+
+
+def _currents(found: Gathered) -> list[Finding]:
+    """Say what currents without a scale need."""
+    message = "a current without a scale: read with a robot that states its torque constant; figures here are in A"
+    return [
+        Finding("warning", found.labels["torque", axis], message) for axis in sorted(found.currents)
+    ]
 
 
 def _usable(values: Floats | None) -> bool:

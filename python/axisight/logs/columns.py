@@ -95,15 +95,23 @@ class VelocityColumn(_Signal):
 
 
 class TorqueColumn(_Signal):
-    """Torque or force; for A and V, `scale` states Nm (or N) per A or V."""
+    """Torque or force; for A and V, `scale` states Nm (or N) per A or V.
+
+    A without one is a current of the motor, which is read with a robot that states its torque constant.
+    """
 
     unit: TorqueUnit
 
     @model_validator(mode="after")
     def _scaled(self) -> TorqueColumn:
-        if self.unit in {"A", "V"} and self.scale is None:
-            raise ValueError(f"scale (Nm or N per {self.unit}) is needed with unit {self.unit!r}")
+        if self.unit == "V" and self.scale is None:
+            raise ValueError("scale (Nm or N per V) is needed with unit 'V'")
         return self
+
+    @property
+    def is_current(self) -> bool:
+        """Whether it is a current of the motor, which its torque constant turns into torque."""
+        return self.unit == "A" and self.scale is None
 
 
 class TemperatureColumn(_Signal):

@@ -42,7 +42,8 @@ class Gathered:
     """The signals found in SI units, each 1-D, and what was wrong with the others.
 
     `doubts` are about whole files; a grid of more than `most_samples` would not keep to the budget.
-    `mapped`: by a column map that was given.
+    `mapped`: by a column map that was given; `currents`: axes (from 0) whose torque is a current of the motor,
+    [A] without a robot.
     """
 
     path: Path
@@ -57,6 +58,7 @@ class Gathered:
     doubts: tuple[str, ...] = ()
     most_samples: int = 2**62
     mapped: bool = False
+    currents: set[int] = field(default_factory=set)
 
     @property
     def notes(self) -> list[str]:
@@ -94,6 +96,7 @@ def gather(
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
+    _to_torques(result, robot)
     if result.time_s is None:
         _count_time(result, budget)
     if result.columns.side == "joint" and robot is not None:
@@ -131,9 +134,35 @@ def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> AnyMap:
 _POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "position_ref": -1, "torque": 1}
 
 
+def _to_torques(result: Gathered, robot: Robot | None) -> None:
+    """Turn currents of motors into torques by the torque constants of their drives."""
+    for number, columns in enumerate(result.columns.axis):
+        signal = columns.torque
+        if signal is None or not signal.is_current:
+            continue
+        result.currents.add(number)
+        if robot is None or number >= robot.n_axes:  # which is said by those who need one
+            continue
+        constant = robot.torque_constants[number]
+        if constant is None:
+            joint = robot.axis_names[number]
+            result.findings.append(Finding("error", signal.label, _no_constant(joint)))
+        elif ("torque", number) in result.signals:
+            result.signals["torque", number] *= constant
+
+
+def _no_constant(joint: str) -> str:
+    return (
+        f"expected scale (Nm or N per A) with unit 'A', or joint.{joint}.torque_constant in the drive data of a "
+        f"model file, got neither"
+    )
+
+
 def _to_motors(result: Gathered, robot: Robot) -> None:
-    """Turn signals of joints into those of their motors."""
+    """Turn signals of joints into those of their motors; currents are the motors' as they are."""
     for name, axis in result.signals:
+        if name == "torque" and axis in result.currents:
+            continue
         if name in _POWERS and axis < robot.n_axes:
             result.signals[name, axis] *= robot.gear_ratio[axis] ** _POWERS[name]
 

@@ -31,6 +31,15 @@ def parse_column_map(text: str, where: str = "column map") -> AnyMap:
         raise LogError(f"{where}: expected TOML, got: {error}") from error
 
 
+def needs_robot(columns: AnyMap) -> bool:
+    """Whether signals can only be read with the robot: those of joints, and currents without a scale."""
+    if isinstance(columns, ColumnPattern):
+        torques = columns.every_axis.torque
+    else:
+        torques = tuple(axis.torque for axis in columns.axis if axis.torque is not None)
+    return columns.side == "joint" or any(torque.is_current for torque in torques)
+
+
 def named_map_text(name: str) -> str:
     """Return the TOML of a map that ships with the package. Raises LogError listing their names."""
     if name not in MAPS:

@@ -34,10 +34,11 @@ def read_log(
     `franka`, ...), or None for a file with the native column names of `axisight.case/1`, a recording of
     ROS (a rosbag2 may be its folder) or a folder of LeRobot (`folder#3` is its episode 3).
     `robot` is the one it is a log of:
-    its axes are found by the names of its joints in recordings, and its gear ratios turn signals
-    of joints into those of motors. `n_axes` is the number of driven axes the caller expects, those of the
-    robot unless given. Only columns that are mapped are read, and none that would take more than `max_bytes`
-    together, as they are read and as signals; by default 64 MiB and sixteen times the size of the files.
+    its axes are found by the names of its joints in recordings, its gear ratios turn signals
+    of joints into those of motors, and its torque constants currents without a scale into torques.
+    `n_axes` is the number of driven axes the caller expects, those of the robot unless given. Only columns
+    that are mapped are read, and none that would take more than `max_bytes` together, as they are read and
+    as signals; by default 64 MiB and sixteen times the size of the files.
     The result is in SI units on a uniform grid that starts at 0.
 
     Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
@@ -50,6 +51,11 @@ def read_log(
         raise LogError(
             f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "
             f"motors, got none"
+        )
+    if found.currents and robot is None:
+        raise LogError(
+            f"{found.path}: axis {min(found.currents) + 1}: torque: expected scale (Nm or N per A) with unit 'A', or a "
+            f"robot that states its torque constants (of a model file, in its drive data), got neither"
         )
     if n_axes is None and robot is not None:
         n_axes = robot.n_axes

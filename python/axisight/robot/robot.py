@@ -12,17 +12,16 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import usable_path
+from axisight.arguments import positive, usable_path
 from axisight.display import html
 from axisight.documents import read_text
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
 from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
+from axisight.robot.sources import is_model_file, refuse_neither
 
 Array = NDArray[np.float64]
-MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
-"""How the names of files end that say a robot in another format."""
 
 ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]
 
@@ -41,6 +40,11 @@ class Robot:
 
     def __init__(self, core: _core.Robot) -> None:
         self.core = core
+        self._torque_constants: tuple[float | None, ...] = (None,) * core.n_axes
+
+    def _with_core(self, core: _core.Robot) -> Robot:
+        """Return the same with another robot of the compiled core."""
+        return Robot(core).with_torque_constants(self._torque_constants)
 
     @classmethod
     def from_toml(cls, text: str) -> Robot:
@@ -184,6 +188,27 @@ class Robot:
         """
         return self.core.controller_gains
 
+    @property
+    def torque_constants(self) -> tuple[float | None, ...]:
+        """Torque constant of each motor [Nm/A], by which currents in logs are read; None where nobody said it.
+
+        Model files have them in their drive data. Robot files have no place for them.
+        """
+        return self._torque_constants
+
+    def with_torque_constants(self, nm_per_a: Sequence[float | None]) -> Robot:
+        """Return the same robot with torque constants (n_axes,) [Nm/A], None where one is not known.
+
+        Raises InputError for another number of them, or ones that are not positive.
+        """
+        if len(nm_per_a) != self.n_axes:
+            raise InputError(f"nm_per_a: expected {self.n_axes} entries, got {len(nm_per_a)}")
+        out = Robot(self.core)
+        out._torque_constants = tuple(
+            None if x is None else positive("nm_per_a", x) for x in nm_per_a
+        )
+        return out
+
     def parameters(self) -> dict[str, float]:
         """Return all physical parameters by name (``axis1.stiffness``), in SI units."""
         return dict(self.core.parameters())
@@ -193,7 +218,7 @@ class Robot:
 
         Raises InputError for a name that `parameters` does not have.
         """
-        return Robot(self.core.with_parameters(list(values.items())))
+        return self._with_core(self.core.with_parameters(list(values.items())))
 
     @property
     def velocity_feedforward(self) -> bool:
@@ -227,14 +252,16 @@ class Robot:
 
         Raises InputError unless its controller is ``pd_position``.
         """
-        return Robot(self.core.with_velocity_feedforward(on))
+        return self._with_core(self.core.with_velocity_feedforward(on))
 
     def with_operating_point(self, angle_rad: ArrayLike) -> Robot:
         """Return the same robot at rest at other driven joint angles (n_axes,) [rad or m].
 
         Raises InputError for another number of angles, or ones that are not finite.
         """
-        return Robot(self.core.with_operating_point(np.asarray(angle_rad, float).tolist()))
+        return self._with_core(
+            self.core.with_operating_point(np.asarray(angle_rad, float).tolist())
+        )
 
     def with_controller_speed(self, factor: float) -> Robot:
         """Return the same robot with a controller for a loop ``factor`` times as fast as stated.
@@ -243,7 +270,7 @@ class Robot:
         the shape of the loop stays.
         Raises InputError unless the factor is positive.
         """
-        return Robot(self.core.with_controller_speed(factor))
+        return self._with_core(self.core.with_controller_speed(factor))
 
     def with_effects(self, effects: Iterable[Effect]) -> Robot:
         """Return the same robot with ``effects`` in place of all its own; none switch them off.
@@ -251,7 +278,7 @@ class Robot:
         Raises InputError for an effect that the robot cannot have: an axis that is not there, a
         spring in a rigid transmission, parameters outside their bounds.
         """
-        return Robot(self.core.with_effects(core_effects(effects)))
+        return self._with_core(self.core.with_effects(core_effects(effects)))
 
     def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
         out = []
@@ -420,7 +447,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         return Robot.from_toml(text)
     path = usable_path(source, RobotError)
     # Stands above robots: only those who have such a file load its readers.
-    if path.suffix.lower() in MODEL_SUFFIXES:
+    if is_model_file(path):
         found: Robot = import_module("axisight.robot_import").import_robot(
             path, sample_time_s=sample_time_s
         )
@@ -432,6 +459,7 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         raise RobotError(
             f"{path}: expected a robot description or a preset ({known}): {error}"
         ) from error
+    refuse_neither(text, str(path))
     try:
         return Robot.from_toml(text)
     except RobotError as error:

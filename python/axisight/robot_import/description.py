@@ -92,6 +92,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         f"imported from {source}",
         *chain.notes,
         *by_class,
+        *_constants(chain, drives),
         *_defaults(tables, drives, controller, servos),
     ]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
@@ -150,6 +151,24 @@ def _defaults(
     elif drives.controller is None:
         out.append("controller: actuators that are told positions")
     return out
+
+
+def torque_constants(chain: Chain, drives: DriveData) -> list[float | None]:
+    """Return the torque constant of every motor [Nm/A], None where the drive data state none."""
+    stated = (drives.joint.get(joint.body.joint) for joint in chain.joints)
+    return [None if drive is None else drive.torque_constant for drive in stated]
+
+
+def _constants(chain: Chain, drives: DriveData) -> list[str]:
+    """Say which torque constants logs of this model are read by, and where they go with a robot file."""
+    pairs = zip(chain.joints, torque_constants(chain, drives), strict=True)
+    known = [f"{joint.body.joint} {value:g}" for joint, value in pairs if value is not None]
+    if not known:
+        return []
+    return [
+        f"torque constants {', '.join(known)} Nm/A: of currents in logs that are read with this model; a robot "
+        f"file has no place for them, with it they are the scale in the column map"
+    ]
 
 
 def _line(text: str) -> str:

@@ -36,7 +36,8 @@ class JointDrive(_Strict):
 
     ``gear_ratio`` r: joint angle per motor angle [1, m/rad]; ``motor_inertia`` [kg m^2],
     ``viscous_friction`` [Nm s/rad] and ``coulomb_friction`` [Nm] on the motor side; ``stiffness``
-    [Nm/rad] and ``damping`` [Nm s/rad] of the gear, on the joint side, both or neither.
+    [Nm/rad] and ``damping`` [Nm s/rad] of the gear, on the joint side, both or neither;
+    ``torque_constant`` [Nm/A], motor side, by which currents in logs are torques.
     """
 
     gear_ratio: Annotated[_Finite, AfterValidator(_not_zero)] | None = None
@@ -45,6 +46,7 @@ class JointDrive(_Strict):
     coulomb_friction: _NotNegative | None = None
     stiffness: _Positive | None = None
     damping: _NotNegative | None = None
+    torque_constant: _Positive | None = None
 
 
 class Payload(_Strict):

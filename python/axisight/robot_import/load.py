@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 
 from axisight.errors import RobotError
-from axisight.robot.robot import MODEL_SUFFIXES, Robot
+from axisight.robot.robot import Robot
 from axisight.robot_import.bodies import Tree
 from axisight.robot_import.chain import Chain, chain_of
-from axisight.robot_import.description import description
+from axisight.robot_import.description import description, torque_constants
 from axisight.robot_import.dh import read_dh
 from axisight.robot_import.drives import DriveData, read_drives
 from axisight.robot_import.mjcf import read_mjcf
 from axisight.robot_import.pinocchio_model import tree_of
 from axisight.robot_import.urdf import read_urdf
 from axisight.robot_import.xml_tree import read_xml
-
-
-def is_model_file(source: Path | str) -> bool:
-    """Whether a file is one of those that `import_robot` reads, by its name."""
-    return Path(source).suffix.lower() in MODEL_SUFFIXES
 
 
 def drives_path(source: Path | str) -> Path:
@@ -58,7 +53,7 @@ def import_robot(
     Parameters
     ----------
     source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
-        and Hartenberg (``.csv``), or a ``pinocchio.Model``.
+        and Hartenberg (``.csv``, ``.toml``), or a ``pinocchio.Model``.
     base, tip : links (bodies; joints of a ``pinocchio.Model``) between which the chain runs: the root, and
         the end of the only moving branch, unless given here or in the drive data.
     drives : what the file lacks of drives: data or their TOML file; of a file ``arm.urdf`` it is
@@ -81,7 +76,8 @@ def import_robot(
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
         try:
-            return Robot.from_toml(description(chain, stated, named))
+            robot = Robot.from_toml(description(chain, stated, named))
+            return robot.with_torque_constants(torque_constants(chain, stated))
         except RobotError as error:
             raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
 
@@ -125,7 +121,7 @@ def bodies_and_chain(
 
 def _tree(path: Path) -> Tree:
     """Return the bodies of a file, read as what it says it is."""
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in (".csv", ".toml"):
         return read_dh(path)
     root = read_xml(path)
     if root.tag == "robot":
