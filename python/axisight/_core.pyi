@@ -58,6 +58,8 @@ __all__ = [
     "right_divide_matrices",
     "simulate_batch",
     "square_period",
+    "state_at_rest",
+    "state_rates",
     "status_advice",
     "torque_regressor",
 ]
@@ -719,6 +721,16 @@ def simulate_batch(
     shape, is added to the measured position. ``start`` (1 or n_runs, n_axes) [rad] are the driven joint
     angles at rest, None the operating point. ``resolution`` [rad] is the step of the position
     sensor, 0 for none. ``threads`` 0 takes every core; results do not depend on it.
+    """
+
+def state_at_rest(robot: Robot, effects: _Effects, joint_angle: Sequence[float]) -> _Array:
+    """Return the state (n_states,) at rest at angles (n_joints,) [rad] of `state_rates`."""
+
+def state_rates(robot: Robot, effects: _Effects, state: _Array, torque: Sequence[float]) -> _Array:
+    """Return the rates (m, n_states) of states under delivered motor torques (n_axes,) [Nm].
+
+    A state has the angles of motors behind elastic gears [rad], those of the joints, their speeds in the
+    same order [rad/s], then what effects remember.
     """
 
 def measurement_noise(

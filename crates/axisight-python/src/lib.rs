@@ -15,6 +15,7 @@ mod frf;
 mod local_models;
 mod montecarlo;
 mod own_pool;
+mod plant;
 mod regressor;
 mod robot;
 mod simulation;
@@ -46,6 +47,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::check_integrator, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
+    module.add_function(wrap_pyfunction!(plant::state_at_rest, module)?)?;
+    module.add_function(wrap_pyfunction!(plant::state_rates, module)?)?;
     module.add_function(wrap_pyfunction!(fit::courses, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;

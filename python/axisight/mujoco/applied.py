@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
 from typing import Any
@@ -14,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from axisight.effects import Effect
 from axisight.errors import InputError, MissingExtraError
 from axisight.mujoco.end_of_step import torque_at_end
-from axisight.mujoco.torques import EffectTorques, check_applicable
+from axisight.mujoco.gears import Gear
+from axisight.mujoco.joints import Axes, axes_of, springs_of
+from axisight.mujoco.torques import EffectTorques, acts_in_gear, check_applicable
 
 Array = NDArray[np.float64]
 
@@ -28,100 +29,130 @@ def apply(
     joints: Sequence[str] | None = None,
     *,
     gear_ratio: ArrayLike = 1.0,
+    gears: Mapping[str, str] | None = None,
 ) -> Array:
     """Set ``data.qfrc_applied`` of joints to what effects add there, and return it (n_axes,) [Nm or N].
 
     To be called at every step, in ``mujoco.set_mjcb_control`` or between ``mj_step1`` and ``mj_step2``, after
     ``data.ctrl`` is set. Entries of joints that no effect acts on stay; forces of your own on the others are
     added after the call. Torques are those at the speed at the end of the step, so that dry friction stops a
-    joint and does not shake it.
+    joint and does not shake it; springs of gears are taken where they are at its beginning.
 
     Parameters
     ----------
     model, data : ``mujoco.MjModel`` and ``mujoco.MjData``.
     effects : effects on single axes that are torques of the joint's angle, speed, load and command: friction
-        laws, ripple, springs, gravity compensation, what the drive makes of the command. Parameters are
+        laws, ripple, springs, gravity compensation, what the drive makes of the command; and those inside
+        gears (backlash, hysteresis, stiffness, transmission error) where ``gears`` names one. Parameters are
         those of the motor. The causes of a diagnosis that a model file had no place for are
         ``Written.remaining``. The load is what arm and gravity ask of the gear, by the acceleration of the
         last step.
-    joints : names of the joints in the order of the axes; by default all that turn or slide, in the order of
-        the model.
+    joints : names of the joints of the motors in the order of the axes; by default all that turn or slide
+        and are no gears, in the order of the model.
     gear_ratio : joint angle per motor angle, one or (n_axes,); by default motors are on the joints.
+    gears : for joints behind an elastic gear the joint that is its spring, with its stiffness and damping, and
+        the angle of the arm less the motor's. A gear that remembers (hysteresis) does so in the last entries of
+        ``data.userdata``, from rest at the first call on; all effects on gears are in one call.
 
-    Raises InputError for effects that act inside gears, on sensors, controllers or masses, between axes, or
-    have a memory; for joints that are not there; and for data without positions (``mj_forward``).
-    MissingExtraError without MuJoCo, ConvergenceError where a step is too long.
+    Raises InputError for effects that act inside gears that are not there, on sensors, controllers or masses,
+    between axes, or have a memory elsewhere; for joints that are not there; and for data without
+    positions (``mj_forward``). MissingExtraError without MuJoCo, ConvergenceError where a step is too long.
 
     """
     mujoco = _mujoco()
-    axes = _axes(model, data, joints)
+    axes = axes_of(mujoco, model, data, joints, gears or {})
     ratio = np.asarray(gear_ratio, np.float64)
     if ratio.shape not in ((), axes.dofs.shape):
         raise InputError(
             f"gear_ratio: expected one, or one of each of {len(axes.dofs)} joints, got shape {ratio.shape}"
         )
     ratio = np.broadcast_to(ratio, axes.dofs.shape)
-    torques = _torques(tuple(effects), tuple(ratio.tolist()))
+    torques, inside = _torques(tuple(effects), tuple(ratio.tolist()), springs_of(model, axes))
     acting = [i for i in range(len(axes.dofs)) if any(e.axis == i + 1 for e in effects)]
     dofs = axes.dofs[acting]
     data.qfrc_applied[dofs] = 0.0
     if not acting:
         return np.zeros(len(axes.dofs))
+    in_gears = _in_gears(mujoco, model, data, axes, inside, data.qvel)
     load = _load(mujoco, model, data)[axes.dofs]
     mujoco.mj_fwdActuation(model, data)
     command = data.qfrc_actuator[axes.dofs] * ratio
-    of_command = torques.of_command(command)
-    data.qfrc_applied[dofs] = of_command[acting]
+    known = torques.of_command(command) + in_gears
+    data.qfrc_applied[dofs] = known[acting]
     mujoco.mj_fwdAcceleration(model, data)
     step = model.opt.timestep
-    free = data.qvel[axes.dofs] + step * data.qacc_smooth[axes.dofs]
+    free = data.qvel + step * data.qacc_smooth
     angle = data.qpos[axes.places]
+    moves = step * _moves(mujoco, model, data, axes.dofs)
     found = torque_at_end(
         lambda speeds: torques(angle, speeds, load, command),
-        free,
-        step * _mobility(mujoco, model, data, axes.dofs),
+        free[axes.dofs],
+        moves[:, axes.dofs].T,
         _ROUNDING * float(np.abs(load).max() + np.abs(command / ratio).max()),
     )
-    out = np.asarray(found + of_command)
+    # MuJoCo damps springs by the speed at the end: what takes damping off is of the same.
+    at_end = _in_gears(mujoco, model, data, axes, inside, free + found @ moves)
+    out = np.asarray(found + known - in_gears + at_end)
     data.qfrc_applied[dofs] = out[acting]
     return out
 
 
-@dataclass(frozen=True)
-class _Axes:
-    """Where the joints of axes stand in positions and in speeds, (n_axes,)."""
-
-    places: NDArray[np.int64]
-    dofs: NDArray[np.int64]
-
-
-def _axes(model: Any, data: Any, joints: Sequence[str] | None) -> _Axes:
-    mujoco = _mujoco()
-    kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-    single = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] in kinds}
-    if joints is None:
-        found = [i for i in range(model.njnt) if model.jnt_type[i] in kinds]
-    else:
-        for name in joints:
-            if name not in single:
-                raise InputError(
-                    f"joints: expected hinge and slide joints of the model, {', '.join(single)}, got {name!r}"
-                )
-        found = [single[name] for name in joints]
-    if not found:
-        raise InputError("joints: expected at least one hinge or slide joint, got none")
-    if not np.any(data.crb):
-        raise InputError("data: expected positions that were computed (mj_forward), got none")
-    return _Axes(model.jnt_qposadr[found].astype(int), model.jnt_dofadr[found].astype(int))
-
-
 @lru_cache(maxsize=64)
-def _torques(effects: tuple[Effect, ...], ratio: tuple[float, ...]) -> EffectTorques:
-    """Return what is made once of effects that are asked for at every step."""
+def _torques(
+    effects: tuple[Effect, ...],
+    ratio: tuple[float, ...],
+    springs: tuple[tuple[int, float, float], ...],
+) -> tuple[EffectTorques, dict[int, Gear]]:
+    """Return what is made once of effects that are asked for at every step; gears by axis.
+
+    ``springs``: axis, stiffness and damping of gears.
+    """
     if not all(np.isfinite(r) and r != 0 for r in ratio):
         raise InputError(f"gear_ratio: expected numbers other than zero, got {list(ratio)}")
-    check_applicable(effects, len(ratio))
-    return EffectTorques(effects, ratio)
+    check_applicable(effects, len(ratio), [axis + 1 for axis, _, _ in springs])
+    inside = [effect for effect in effects if acts_in_gear(effect)]
+    gears = {}
+    for axis, stiffness, damping in springs:
+        own = tuple(effect for effect in inside if effect.axis == axis + 1)
+        if own:
+            gears[axis] = Gear(own, ratio[axis], stiffness, damping)
+    return EffectTorques([e for e in effects if e not in inside], ratio), gears
+
+
+def _in_gears(
+    mujoco: Any, model: Any, data: Any, axes: Axes, gears: Mapping[int, Gear], speeds: Array
+) -> Array:
+    """Set what effects inside gears add on their springs, and return what on motors (n_axes,) [Nm].
+
+    ``speeds`` (nv,) [rad/s].
+    """
+    out = np.zeros(len(axes.dofs))
+    kept = _kept(mujoco, model, data, list(gears.values()))
+    for axis, gear in gears.items():
+        place, dof = axes.springs[axis]
+        speed = speeds[[axes.dofs[axis], dof]]
+        at = data.qpos[[axes.places[axis], place]] - [0.0, model.qpos_spring[place]]
+        own, kept = np.split(kept, [gear.n_kept])
+        remembered = gear.remember(own, data.time, at) if gear.n_kept else own
+        out[axis], data.qfrc_applied[dof] = gear.torques(at, speed, remembered)
+    return out
+
+
+def _kept(mujoco: Any, model: Any, data: Any, gears: Sequence[Gear]) -> Array:
+    """Return the place for what gears remember, a view into the data."""
+    need = sum(gear.n_kept for gear in gears)
+    if not need:
+        return np.zeros(0)
+    if model.nuserdata < need:
+        raise InputError(
+            f'model: expected room for what gears remember, <size nuserdata="{need}"/>, got {model.nuserdata}'
+        )
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        raise InputError(
+            "model: expected an integrator that asks once a step for what gears remember, Euler or implicit, "
+            "got RK4"
+        )
+    return np.asarray(data.userdata[model.nuserdata - need :])
 
 
 def _load(mujoco: Any, model: Any, data: Any) -> Array:
@@ -132,13 +163,13 @@ def _load(mujoco: Any, model: Any, data: Any) -> Array:
     return np.asarray(inertia - rotors + data.qfrc_bias - data.qfrc_spring)
 
 
-def _mobility(mujoco: Any, model: Any, data: Any, dofs: NDArray[np.int64]) -> Array:
-    """Return the accelerations of joints by torques on them (n_axes, n_axes) [rad/s^2/Nm]."""
+def _moves(mujoco: Any, model: Any, data: Any, dofs: NDArray[np.int64]) -> Array:
+    """Return what torques on joints accelerate (n_axes, nv) [rad/s^2/Nm]."""
     pushes = np.zeros((len(dofs), model.nv))
     pushes[np.arange(len(dofs)), dofs] = 1.0
     moves = np.zeros_like(pushes)
     mujoco.mj_solveM(model, data, moves, pushes)
-    return moves[:, dofs].T
+    return moves
 
 
 def _mujoco() -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import tomlkit
@@ -19,7 +19,7 @@ from axisight.simulation import Integrator
 Array = NDArray[np.float64]
 
 _INSTEAD = {
-    "transmission": "it acts inside the gear, which the model has no joint of its own for",
+    "transmission": "it acts inside the gear: give the model a joint that is its spring, and name it in gears",
     "sensor": "it changes what is measured: change what your controller reads",
     "controller": "it belongs to the controller: change your own",
     "arm": "it changes masses or lengths: write it into the model, write_back.write_model",
@@ -32,14 +32,20 @@ def is_torque(effect: Effect) -> bool:
     return not _why_none(effect)
 
 
-def check_applicable(effects: Sequence[Effect], n_axes: int) -> None:
+def acts_in_gear(effect: Effect) -> bool:
+    """Whether an effect acts inside the gear of one axis."""
+    info = effect_info(effect.name)
+    return info.acts == "transmission" and info.scope == "axis"
+
+
+def check_applicable(effects: Sequence[Effect], n_axes: int, elastic: Collection[int] = ()) -> None:
     """Raise InputError naming the first effect that is no torque of angle, speed, load and command.
 
-    ``n_axes``: how many there are.
+    ``n_axes``: how many there are, of which ``elastic`` (from 1 on) may have effects inside their gears.
     """
     for effect in effects:
         why = _why_none(effect)
-        if why:
+        if why and not (acts_in_gear(effect) and effect.axis in elastic):
             raise InputError(
                 f"effect {effect.label!r}: expected one that is a torque of the joint's angle, speed, load "
                 f"and command, got one that is none: {why}"

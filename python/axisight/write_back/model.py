@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from axisight import storage
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.mujoco.torques import is_torque
+from axisight.mujoco.torques import acts_in_gear, is_torque
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
 from axisight.robot_import.drives import DriveData
@@ -39,7 +39,7 @@ class Written:
     """A model that was written: labels of the causes in it, and of those that it has no place for.
 
     ``why``: for each of the latter, by label; ``remaining``: they as effects, of which
-    `axisight.mujoco.apply` takes those that are torques.
+    `axisight.mujoco.apply` takes those that are torques or inside gears.
     """
 
     path: Path
@@ -199,4 +199,6 @@ def _no_number(root: Element, effect: Effect) -> str:
     """Return why nothing of a model says an effect."""
     if root.tag == "mujoco" and is_torque(effect):
         return "MJCF has no number for it: axisight.mujoco.apply adds it at every step"
+    if root.tag == "mujoco" and acts_in_gear(effect):
+        return "MJCF has no number for it: axisight.mujoco.apply adds it to a joint that is the gear's spring"
     return f"{'MJCF' if root.tag == 'mujoco' else 'URDF'} has no number for it"
