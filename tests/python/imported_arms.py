@@ -24,18 +24,15 @@ def states(robot: Robot, count: int) -> tuple[Array, Array, Array]:
 def difference_to_pinocchio(robot: Robot, model: Any, count: int = 1000) -> float:
     """Return the largest difference, relative to the largest force, at random states.
 
-    Joints of the model that the robot does not have are locked at zero.
+    Joints of the model that the robot does not have stand still at zero.
     """
-    others = [i for i in range(1, model.njoints) if model.names[i] not in robot.joint_names]
-    if others:
-        model = pinocchio.buildReducedModel(model, others, pinocchio.neutral(model))
     data = model.createData()
     joints = [model.joints[model.getJointId(name)] for name in robot.joint_names]
     speeds = [joint.idx_v for joint in joints]
     q, v, a = states(robot, count)
     wanted = np.empty_like(q)
     for k in range(count):
-        configuration = np.zeros(model.nq)
+        configuration = pinocchio.neutral(model)
         for joint, angle in zip(joints, q[k], strict=True):
             if joint.nq == 2:
                 configuration[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)

@@ -10,6 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from axisight import Robot
+from axisight.robot_import import import_robot
+from axisight.robot_import.drives import DriveData
+from import_data import URDF, written
 
 Array = NDArray[np.float64]
 STEP_S = 0.01
@@ -46,3 +49,23 @@ def written_table(path: Path, position: Array, torque: Array, step_s: float = ST
         columns |= {f"position_{i + 1}": position[:, i], f"torque_cmd_{i + 1}": torque[:, i]}
     pd.DataFrame(columns).to_parquet(path)
     return path
+
+
+# A gripper beside the chain, and a tip beyond the flange.
+FINGER = """<link name="finger"><inertial><mass value="0.3"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>
+  <joint name="grip" type="prismatic"><parent link="upper"/><child link="finger"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="0.1" effort="10" velocity="1"/></joint>
+</robot>"""
+
+
+def branched(folder: Path) -> Path:
+    """Write an arm with two moving branches, without friction and gears."""
+    bare = URDF.replace('<dynamics damping="0.7" friction="1.5"/>', "")
+    return written(folder, bare[: bare.index("  <transmission")] + FINGER)
+
+
+def with_load(path: Path, mass_kg: float) -> Robot:
+    """Return the arm with a load in the frame of its flange."""
+    load = DriveData.model_validate({"payload": {"mass": mass_kg}})
+    return import_robot(path, tip="flange", drives=load)

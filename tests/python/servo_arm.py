@@ -85,8 +85,14 @@ class ServoArm:
 </mujoco>
 """
 
-    def log(self, run: int, noise_rad: float = NOISE_RAD, home_rad: Array = HOME_RAD) -> Log:
-        """Return targets and positions of one run, from where the arm has settled."""
+    def log(
+        self,
+        run: int,
+        noise_rad: float = NOISE_RAD,
+        home_rad: Array = HOME_RAD,
+        speed_noise_rad_s: float | None = None,
+    ) -> Log:
+        """Return targets and positions of one run, from where the arm has settled; speeds where they have noise."""
         import mujoco  # noqa: PLC0415 - an extra
 
         model = mujoco.MjModel.from_xml_string(self.mjcf())
@@ -99,13 +105,14 @@ class ServoArm:
         told = np.concatenate(
             [np.repeat(wanted[:1], late, axis=0), np.repeat(wanted, steps, axis=0)]
         )
-        position = np.empty_like(wanted)
+        position, speed = np.empty_like(wanted), np.empty_like(wanted)
         for k in range(len(wanted)):
-            position[k] = data.qpos
+            position[k], speed[k] = data.qpos, data.qvel
             for target in told[k * steps : (k + 1) * steps]:
                 data.ctrl[:] = target
                 mujoco.mj_step(model, data)
         noise = np.random.default_rng(1000 + run).normal(size=position.shape)
+        own = np.random.default_rng(2000 + run).normal(size=position.shape)
         return Log(
             name=f"run{run}",
             sample_time_s=1 / self.rate_hz,
@@ -113,6 +120,7 @@ class ServoArm:
             torque_nm=not_logged(position.shape),
             position_rad=position + noise_rad * noise,
             position_ref_rad=wanted,
+            velocity_rad_s=None if speed_noise_rad_s is None else speed + speed_noise_rad_s * own,
             source=Path(f"run{run}.parquet"),
         )
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from axisight import Robot, load_robot
+from axisight import load_robot
 from axisight.cli import app
 from axisight.robot_import import import_robot
 from axisight.robot_import.drives import DriveData
 from import_data import DH, MJCF, URDF, dh_toml, written
-from model_logs import written_log, written_table
+from model_logs import branched, with_load, written_log, written_table
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -156,26 +156,6 @@ def test_causes_without_a_number_are_told_why(tmp_path: Path):
         "every step"
     ) in said
     assert new.read_text() == bare
-
-
-# A gripper beside the chain, and a tip beyond the flange.
-FINGER = """<link name="finger"><inertial><mass value="0.3"/>
-    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>
-  <joint name="grip" type="prismatic"><parent link="upper"/><child link="finger"/><axis xyz="1 0 0"/>
-    <limit lower="0" upper="0.1" effort="10" velocity="1"/></joint>
-</robot>"""
-
-
-def branched(folder: Path) -> Path:
-    """Write an arm with two moving branches, without friction and gears."""
-    bare = URDF.replace('<dynamics damping="0.7" friction="1.5"/>', "")
-    return written(folder, bare[: bare.index("  <transmission")] + FINGER)
-
-
-def with_load(path: Path, mass_kg: float) -> Robot:
-    """Return the arm with a load in the frame of its flange."""
-    load = DriveData.model_validate({"payload": {"mass": mass_kg}})
-    return import_robot(path, tip="flange", drives=load)
 
 
 def test_a_diagnosis_takes_tip_and_payload(tmp_path: Path):

@@ -9,13 +9,14 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli.common import complain, errors, numbers, say
-from axisight.cli.robot import GivenEffects, parse_effects, say_effects, with_given
+from axisight.cli.model_options import Base, Load, ModelOptions, Tip
+from axisight.cli.robot import GivenEffects, parse_effects, say_effects, say_import, with_given
 from axisight.cli.screen import OUT
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
 from axisight.excitation.files import reference_files
 from axisight.excitation.plots import plot_references, plot_signal
-from axisight.robot import load_robot
+from axisight.robot_import import is_model_file
 from axisight.storage import check_targets, write_bytes
 
 
@@ -26,7 +27,12 @@ def excite_command(
     out: Annotated[
         Path, typer.Option(help="File to write: .csv (with .design.json), .mat or .parquet.")
     ] = Path("excitation.parquet"),
-    robot: Annotated[str | None, typer.Option(help="robot.toml or a preset.")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="robot.toml, URDF, MJCF, DH table or a preset.")
+    ] = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -95,7 +101,9 @@ def excite_command(
         data |= {name: value for name, value in top.items() if value is not None}
         checked = read_design(data, "options" if design is None else str(design))
         given = parse_effects(effect)
-        machine = load_robot(checked.robot)
+        machine = ModelOptions(base, tip, payload).load(checked.robot)
+        if is_model_file(checked.robot):
+            say_import(machine)
         # Without limits or a controller nothing is simulated.
         if checked.limits is not None and machine.controller_kind != "none":
             say_effects(machine, checked.robot, given)

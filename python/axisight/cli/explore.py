@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import webbrowser
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,13 +29,13 @@ from axisight.cli.common import (
     errors,
     say,
 )
+from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import MissingExtraError
 from axisight.gap.inputs import read_inputs
 from axisight.gap.settings import Settings
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.used import Used
-from axisight.robot import Robot
 
 
 def explore_command(
@@ -43,6 +44,9 @@ def explore_command(
         typer.Argument(help="A case folder, or logs; the simulator may stand first."),
     ],
     model: Model = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     validation: Validation = None,
     columns: Columns = None,
     verdict: Annotated[
@@ -69,11 +73,8 @@ def explore_command(
     with errors(stopped="stopped"):
         if find_spec("panel") is None:
             raise MissingExtraError("axisight explore needs Panel: pip install axisight[explore]")
-        given = parse_effects(effect)
-
-        def load(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-            return load_simulator(source, given, sample_time_s=sample_time_s)
-
+        options = ModelOptions(base, tip, payload)
+        load = partial(load_simulator, given=parse_effects(effect), options=options)
         inputs = read_inputs(
             case_or_logs,
             model,
@@ -82,6 +83,7 @@ def explore_command(
             load,
             Used(start_s, stop_s, moving, cut_at_rests),
             simulated or [],
+            bare=options.load,
             untrusted=untrusted,
             max_bytes=max_bytes,
         )

@@ -9,9 +9,10 @@ from rich.table import Table
 from axisight.cli.common import say
 from axisight.cli.screen import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
-from axisight.gap.compared import FROM_POSITIONS, torque_of
+from axisight.gap.compared import FROM_POSITIONS, MOTION_HEAD, motion_words, torque_of
 from axisight.gap.headline import in_order, percent
 from axisight.gap.own_simulator import said
+from axisight.gap.result import MotionErrors
 from axisight.report.limits import limit_table
 
 _RANKED = 8
@@ -25,6 +26,8 @@ def show_diagnosis(found: Diagnosis) -> None:
     if found.causes:
         OUT.print(_causes(found))
     OUT.print(_gaps(found))
+    if found.gap.motion is not None:
+        OUT.print(_motion(found.gap.motion))
     _show_comparison(found)
     _show_places(found)
     for finding in found.findings:
@@ -105,6 +108,16 @@ def _gaps(found: Diagnosis) -> Table:
         table.add_row("pooled", "", *(_percent(x) for x in pooled))
         squared = f"{torque_of(gap.compared)}s"
         table.caption = f"pooled: sqrt(sum of squared errors / sum of squared {squared})"
+    return table
+
+
+def _motion(errors: MotionErrors) -> Table:
+    table = Table(box=SIMPLE_HEAD)
+    for name in ("axis", *MOTION_HEAD):
+        table.add_column(name, overflow="fold")
+    for i, row in enumerate(errors.rows(), start=1):
+        table.add_row(str(i), *(f"{x:.3g}" for x in row))
+    table.caption = motion_words(errors.velocity_from)
     return table
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, cast, get_args
 
@@ -12,13 +14,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.cli.common import Columns, Force, From, Moving, To, errors, numbers, say
+from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.excitation.files import holds_references, read_references
+from axisight.gap.inputs import read_beside
 from axisight.gap.used import Used
-from axisight.logs import Log, read_log
+from axisight.logs import Log
 from axisight.logs.sources import files_of
 from axisight.robot import Robot
+from axisight.robot_import import is_model_file
 from axisight.simulation import Method, Model, simulate
 from axisight.storage import check_targets, write_bytes
 
@@ -27,7 +32,7 @@ _SAME_RATE = 1e-4
 
 
 def simulate_command(
-    robot: Annotated[str, typer.Argument(help="robot.toml or a preset.")],
+    robot: Annotated[str, typer.Argument(help="robot.toml, URDF, MJCF, DH table or a preset.")],
     log: Annotated[
         Path,
         typer.Argument(
@@ -37,6 +42,9 @@ def simulate_command(
     ],
     out: Annotated[Path, typer.Option(help="Parquet log to write.")],
     columns: Columns = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     torque: Annotated[
         bool, typer.Option("--torque", help="Drive with the log's torques, without controller.")
     ] = False,
@@ -79,19 +87,20 @@ def simulate_command(
     with errors():
         given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
         check_targets({"--out": out}, inputs=given, replaces={"--out": (".parquet",)}, force=force)
-        machine = load_simulator(robot, parse_effects(effect))
+        options = ModelOptions(base, tip, payload)
+        load = partial(load_simulator, given=parse_effects(effect), options=options)
         use = Used(start_s, stop_s, moving)
         if holds_references(log):
             if torque or not use.whole:
                 raise InputError(
                     f"--from, --to, --moving, --torque: expected a log, got references in {log}"
                 )
-            inputs = _designed(log, machine, experiment, periods)
+            machine, inputs = _designed(log, robot, load, experiment, periods)
         elif experiment is not None or periods != 1:
             raise InputError(f"--experiment, --periods: expected references, got the log {log}")
         else:
-            used = use.one_of(read_log(log, columns, robot=machine))
-            inputs = _inputs(used, machine, torque=torque)
+            machine, (read,) = read_beside(robot, [log], columns, load, bare=options.load)
+            inputs = _inputs(use.one_of(read), machine, torque=torque)
         result = simulate(
             machine,
             **inputs,
@@ -112,10 +121,14 @@ def simulate_command(
 
 
 def _designed(
-    path: Path, robot: Robot, experiment: int | None, periods: int
-) -> dict[str, NDArray[np.float64]]:
-    """Return one experiment of designed references as the input of `simulate`."""
+    path: Path, source: str, load: Callable[..., Robot], experiment: int | None, periods: int
+) -> tuple[Robot, dict[str, NDArray[np.float64]]]:
+    """Return a robot and one experiment of designed references as the input of `simulate`.
+
+    One of a model file has the sample time of the references, unless its drive data say one.
+    """
     references = read_references(path)
+    robot = load(source, sample_time_s=references.sample_time_s if is_model_file(source) else None)
     if references.unit != "rad/s":
         raise InputError(f"{path}: expected velocity references in rad/s, got {references.unit}")
     _same_rate(path, references.sample_time_s, robot)
@@ -126,7 +139,8 @@ def _designed(
         raise InputError(f"--experiment: expected one of 1 to {count} of {path}, got {experiment}")
     if periods < 1:
         raise InputError(f"--periods: expected a positive number, got {periods}")
-    return {"velocity_ref_rad_s": np.tile(references.period[experiment - 1], (periods, 1))}
+    period = references.period[experiment - 1]
+    return robot, {"velocity_ref_rad_s": np.tile(period, (periods, 1))}
 
 
 def _inputs(log: Log, robot: Robot, *, torque: bool) -> dict[str, NDArray[np.float64]]:

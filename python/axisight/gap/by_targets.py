@@ -131,48 +131,66 @@ class TargetsView(View):
         """Return what the controller commands along the measured positions."""
         return log.torque_nm
 
+    @property
+    def step(self) -> int:
+        """Samples of the controller per sample of the logs."""
+        return self._commanded.step
+
+    @property
+    def logged_s(self) -> float:
+        """Time between samples of the logs [s]."""
+        return self.robot.sample_time_s * self.step
+
+    def positions(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the motor positions of a simulator on each log (n, n_axes) [rad], at the controller's rate."""
+        return simulated_positions(self.robot, variant, logs, threads=self.settings.threads)
+
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return what it commands along the simulated positions."""
-        positions = simulated_positions(self.robot, variant, logs, threads=self.settings.threads)
         return [
-            log.torque_nm + self._told(position - log.position_rad)
-            for position, log in zip(positions, logs, strict=True)
+            log.torque_nm + self._as_torque(self.off_by(position, log))
+            for position, log in zip(self.positions(variant, logs), logs, strict=True)
         ]
 
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
         """Return the same of one log, and its simulated position."""
         (position,) = simulated_positions(self.robot, variant, [log])
-        return log.torque_nm + self._told(position - log.position_rad), position
+        return log.torque_nm + self._as_torque(self.off_by(position, log)), position
 
-    def _told(self, error_rad: Array) -> Array:
-        """Return an error of position, known where positions were logged, as torque.
+    def off_by(self, position_rad: Array, log: Log) -> Array:
+        """Return what is compared of an error of position, at the samples of a log (n, n_axes) [rad].
 
         Without its mean: a log's first position is as noisy as the others, and a run begins there.
         """
-        logged = error_rad[:: self._commanded.step]
-        return self._as_torque(logged - logged.mean(axis=0))
+        logged = (position_rad - log.position_rad)[:: self.step]
+        return self.passed(logged - logged.mean(axis=0))
 
-    def _as_torque(self, logged_rad: Array) -> Array:
-        """Return an error at the rate of the logs (n, n_axes) [rad] as torque, what is compared of it."""
-        time = self.robot.sample_time_s * self._commanded.step
-        passed = lowpass(np.ascontiguousarray(logged_rad), time, _BAND / time)
-        return self._commanded.of_error(self._commanded.fine(passed))
+    def passed(self, logged: Array) -> Array:
+        """Return of a signal at the rate of the logs (n, n_axes) what is compared of it."""
+        return lowpass(np.ascontiguousarray(logged), self.logged_s, _BAND / self.logged_s)
+
+    def _as_torque(self, passed_rad: Array) -> Array:
+        """Return an error at the rate of the logs (n, n_axes) [rad] as torque, at the controller's."""
+        return self._commanded.of_error(self._commanded.fine(passed_rad))
+
+    def position_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return what is compared of the noise of the sensors, at the samples of every log [rad]."""
+        noise = [
+            white_noise(self.settings.seed, run, len(log.time_s[:: self.step]), self.robot.n_axes)
+            for run, log in enumerate(logs, start=first_run)
+        ]
+        return [self.passed(x * self._std_rad) for x in noise]
 
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
         """Return what noise of the sensors is as torque, for every log."""
         del variant
-        step = self._commanded.step
-        noise = [
-            white_noise(self.settings.seed, run, len(log.time_s[::step]), self.robot.n_axes)
-            for run, log in enumerate(logs, start=first_run)
-        ]
-        return [self._as_torque(x * self._std_rad) for x in noise]
+        return [self._as_torque(x) for x in self.position_noises(logs, first_run)]
 
     def remarks(self) -> tuple[str, ...]:
         """Say what was compared."""
-        said = what_is_compared(1.0 / (self.robot.sample_time_s * self._commanded.step))
+        said = what_is_compared(1.0 / self.logged_s)
         short = ", ".join(map(str, self._commanded.short_of_inertia))
         if not short:
             return (said,)

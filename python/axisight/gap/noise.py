@@ -42,17 +42,20 @@ def position_noise_std(logs: list[Log]) -> Array:
     Motion has no power there; what is left is the sensor. Median over the logs. Of short logs the top
     two fifths: a hundred lines are off by a twentieth, and a floor by a tenth.
     """
-    estimates = []
-    for log in logs:
-        rate = 1.0 / log.sample_time_s
-        # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
-        f, density = scipy.signal.welch(
-            np.diff(log.position_rad, n=2, axis=0), rate, nperseg=segment_of(log), axis=0
-        )
-        top = (f > (0.4 if log.n_samples > _SHORT else 0.3) * rate) & (f < 0.49 * rate)
-        gain = (2 * np.sin(np.pi * f[top] / rate)) ** 4
-        estimates.append(np.sqrt(np.mean(density[top] / gain[:, None], axis=0) * rate / 2))
+    estimates = [white_std(log.position_rad, log.sample_time_s) for log in logs]
     return np.asarray(np.median(np.array(estimates), axis=0))
+
+
+def white_std(x: Array, sample_time_s: float) -> Array:
+    """Return the standard deviation of white noise (n_axes,) on a signal (n, n_axes), as `position_noise_std`."""
+    rate = 1.0 / sample_time_s
+    # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
+    f, density = scipy.signal.welch(
+        np.diff(x, n=2, axis=0), rate, nperseg=min(_SEGMENT, len(x) // 2), axis=0
+    )
+    top = (f > (0.4 if len(x) > _SHORT else 0.3) * rate) & (f < 0.49 * rate)
+    gain = (2 * np.sin(np.pi * f[top] / rate)) ** 4
+    return np.asarray(np.sqrt(np.mean(density[top] / gain[:, None], axis=0) * rate / 2))
 
 
 def segment_of(log: Log) -> int:

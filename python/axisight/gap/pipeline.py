@@ -34,11 +34,19 @@ from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overl
 from axisight.gap.intervals import with_own_scatter
 from axisight.gap.misfit import with_balanced_values
 from axisight.gap.modes import view_of
+from axisight.gap.motion_errors import motion_errors, velocity_from
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
 from axisight.gap.remainder import refit_worse, remainder_of, reversals_smeared
-from axisight.gap.result import Cause, Diagnosis, Interval, Overlay, Reproduction
+from axisight.gap.result import (
+    Cause,
+    Diagnosis,
+    Interval,
+    MotionErrors,
+    Overlay,
+    Reproduction,
+)
 from axisight.gap.search import Search, search
 from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
@@ -124,6 +132,7 @@ def diagnose(
     out = _assemble(
         name or found_name, machine, view, held_logs, seen, error_logs, chosen, inputs.noted
     )
+    out = replace(out, gap=replace(out.gap, motion=_motion(view, held_logs, seen, inputs.noted)))
     progress("measuring the gap", 1, 1)
     if separate:
         progress("designing an experiment", 0, 1)
@@ -140,6 +149,14 @@ def diagnose(
     out.provenance["references"] = logged if view.mode == "closed_loop" else None
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
+
+
+def _motion(
+    view: View, logs: Sequence[Log], seen: _Seen, noted: Sequence[Finding]
+) -> MotionErrors | None:
+    """Return the errors of position and velocity on the validation logs, where positions are compared."""
+    refitted, after = Variant(seen.found.baseline.robot_values), seen.reach.simulator
+    return motion_errors(view, logs, refitted, after, velocity_from(logs, noted))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from axisight.display import html
 from axisight.effects import Effect
-from axisight.gap.compared import Compared
+from axisight.gap.compared import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.faults import Finding
 from axisight.gap.separate.experiment import Experiment
 from axisight.storage import write_whole
@@ -49,6 +49,46 @@ class Pooled:
 
 
 @dataclass(frozen=True)
+class AxisStages:
+    """Errors of the simulator at each stage, by axis (n_axes,); ``before`` to ``floor`` as in `Gap`."""
+
+    before: Array
+    refitted: Array
+    after: Array
+    floor: Array
+
+
+@dataclass(frozen=True)
+class MotionErrors:
+    """Errors of position and velocity on the validation logs where positions are compared, rms over time and logs.
+
+    Motor side, ``position_rad`` without its mean along a log [rad], ``velocity_rad_s`` [rad/s] (m and m/s of an
+    axis that slides without a gear), both below the frequency up to which positions are compared.
+    ``velocity_from``: ``"logged"``, or ``"positions"`` where a log has no velocity, or one that is not that of
+    its position.
+    """
+
+    position_rad: AxisStages
+    velocity_rad_s: AxisStages
+    velocity_from: VelocityFrom
+
+    def rows(self) -> list[tuple[float, ...]]:
+        """Return of each axis position before, after and noise alone, then velocity; as `MOTION_HEAD` says."""
+        stages = [
+            getattr(of, stage)
+            for of in (self.position_rad, self.velocity_rad_s)
+            for stage in ("before", "after", "floor")
+        ]
+        return [tuple(map(float, row)) for row in zip(*stages, strict=True)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what stands in the verdict."""
+        of = {"position_rad": self.position_rad, "velocity_rad_s": self.velocity_rad_s}
+        told = {k: {s: getattr(v, s).tolist() for s in _STAGES} for k, v in of.items()}
+        return {**told, "velocity_from": self.velocity_from}
+
+
+@dataclass(frozen=True)
 class Gap:
     """Relative torque error on the validation logs, rms over axes and logs [1].
 
@@ -57,7 +97,8 @@ class Gap:
     ``floor``: what a perfect model would still leave (sensor noise). The
     ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where axes that turn
     and axes that slide cannot be summed. Where ``compared`` is ``"positions"``, torques are what the stated gains
-    command along those of machine and simulator.
+    command along those of machine and simulator, and ``motion`` has the errors of positions and velocities
+    themselves; None of torques.
     """
 
     before: float
@@ -70,6 +111,7 @@ class Gap:
     floor_per_axis: Array
     pooled: Pooled | None = None
     compared: Compared = "torques"
+    motion: MotionErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -296,12 +338,18 @@ class Diagnosis:
         ]
         whole = (gap.before, gap.refitted, gap.after, gap.floor)
         rows.append(("all", self.verdict, *map(_percent, whole)))
+        moved = [] if gap.motion is None else gap.motion.rows()
         then = [] if self.next_experiment is None else [f"next experiment: {self.next_experiment}"]
         return html.page(
             f"{self.name}: {self.verdict}",
             html.lines([self.headline]),
             html.table(("cause and its values", "value", "95 % interval", "probability"), causes),
             html.table(("axis", "verdict", "gap before", "re-fitted", "after", "noise"), rows),
+            html.table(
+                ("axis", *MOTION_HEAD),
+                ((str(i), *map(html.number, row)) for i, row in enumerate(moved, start=1)),
+                "" if gap.motion is None else motion_words(gap.motion.velocity_from),
+            ),
             html.lines([*(f"finding: {finding}" for finding in self.findings), *then]),
         )
 
@@ -387,6 +435,7 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "pooled": None if gap.pooled is None else asdict(gap.pooled),
         "per_axis": {stage: getattr(gap, f"{stage}_per_axis").tolist() for stage in _STAGES},
         "compared": gap.compared,
+        "motion": None if gap.motion is None else gap.motion.to_dict(),
     }
 
 

@@ -74,8 +74,13 @@ class Commanded:
         told = []
         for log, other in zip(self.logs, logs, strict=True):
             position = self.fine(other.position_rad[:: self.step])
-            torque = log.torque_nm + self.of_error(position - log.position_rad)
-            told.append(replace(log, position_rad=position, torque_nm=torque))
+            change = position - log.position_rad
+            torque, velocity = log.torque_nm + self.of_error(change), log.velocity_rad_s
+            if velocity is not None:
+                velocity = velocity + np.gradient(change, log.sample_time_s, axis=0)
+            told.append(
+                replace(log, position_rad=position, torque_nm=torque, velocity_rad_s=velocity)
+            )
         return replace(self, logs=tuple(told))
 
     def fine(self, values: Array) -> Array:
@@ -181,6 +186,12 @@ def between(values: Array, step: int) -> Array:
     )
 
 
+def _between_known(velocity: Array | None, step: int) -> Array | None:
+    """Return measured velocities at the controller's rate; None where an axis has none."""
+    known = velocity is not None and bool(np.isfinite(velocity).all())
+    return between(velocity, step) if velocity is not None and known else None
+
+
 def _check(robot: Robot, logs: Sequence[Log]) -> None:
     """Raise InputError naming what keeps a command from following from the logs."""
     for log in logs:
@@ -243,7 +254,7 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
         torque_nm=np.ascontiguousarray(torque),
         position_ref_rad=target,
         velocity_ref_rad_s=np.ascontiguousarray(rate),
-        velocity_rad_s=None,
+        velocity_rad_s=_between_known(log.velocity_rad_s, step),
         joint_position_rad=None,
         temperature_c=None,
     )
@@ -265,6 +276,7 @@ def _fed_dynamics(robot: Robot, position: Array, rate: Array) -> Array:
 def _every(log: Log, step: int) -> Log:
     """Return every ``step``-th sample of a log."""
     reference, target = log.velocity_ref_rad_s, log.position_ref_rad
+    velocity = log.velocity_rad_s
     return replace(
         log,
         sample_time_s=log.sample_time_s * step,
@@ -273,5 +285,6 @@ def _every(log: Log, step: int) -> Log:
         torque_nm=log.torque_nm[::step],
         position_ref_rad=None if target is None else target[::step],
         velocity_ref_rad_s=None if reference is None else reference[::step],
+        velocity_rad_s=None if velocity is None else velocity[::step],
         run_up=None,
     )

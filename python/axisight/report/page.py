@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from axisight.effects import effect_table
-from axisight.gap.compared import torque_of
+from axisight.gap.compared import MOTION_HEAD, motion_words, torque_of
 from axisight.gap.headline import in_order
 from axisight.gap.result import (
     Candidate,
@@ -101,6 +101,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "numbers": _numbers(diagnosis),
         "gap_rows": _gap_rows(diagnosis),
         "pooled": diagnosis.gap.pooled is not None,
+        "motion": _motion(diagnosis.gap),
         "values": _values(diagnosis.causes),
         "findings": [str(finding) for finding in diagnosis.findings],
         "where": _places(diagnosis.where),
@@ -171,6 +172,14 @@ def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
             figures = (whole.before, whole.refitted, whole.after, whole.floor)
             rows.append([name, verdict, *(percent(x) for x in figures)])
     return rows
+
+
+def _motion(gap: Gap) -> dict[str, Any] | None:
+    """Return the errors of position and velocity by axis, where positions are compared."""
+    if gap.motion is None:
+        return None
+    rows = [[str(i), *map(number, row)] for i, row in enumerate(gap.motion.rows(), 1)]
+    return {"head": MOTION_HEAD, "rows": rows, "words": motion_words(gap.motion.velocity_from)}
 
 
 def _places(places: Sequence[Where]) -> list[dict[str, str]]:
