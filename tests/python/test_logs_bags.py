@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sqlite3
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from axisight import Robot, read_log
 from axisight.errors import LogError, MissingExtraError
 from axisight.logs import check_log, parse_column_map
+from axisight.logs.sources import load_arrays
 from axisight.robot_import import import_robot
 from bag_data import START_NS, controller_states, written_states
 from import_data import URDF, written
@@ -168,3 +171,48 @@ def test_the_library_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("axisight.logs.sources_bag.import_module", no)
     with pytest.raises(MissingExtraError, match=r"axisight\[ros\]"):
         read_log(written(tmp_path, b"", "run.mcap"))
+
+
+def test_a_wrench_is_read_beside_joints(tmp_path: Path, robot: Robot):
+    """Every number of a WrenchStamped by its name, for column maps; the log is that of the joints."""
+    wrench = "geometry_msgs/msg/WrenchStamped"
+
+    def more(writer, types):
+        connection = writer.add_connection("/wrist/wrench", wrench, typestore=types)
+        known = types.types
+        vector = known["geometry_msgs/msg/Vector3"]
+        for k in range(50):
+            stamp = START_NS + 20_000_000 * k
+            when = known["builtin_interfaces/msg/Time"](*divmod(stamp, 1_000_000_000))
+            inner = known["geometry_msgs/msg/Wrench"](vector(1.0, 2.0, k), vector(4.0, 5.0, -k))
+            message = known[wrench](known["std_msgs/msg/Header"](when, "tool"), inner)
+            writer.write(connection, stamp + 7_000_000, types.serialize_cdr(message, wrench))
+
+    path = written_states(tmp_path / "run", "mcap", TIME, NAMES, STATES, more=more)
+    arrays = load_arrays(path)
+    np.testing.assert_array_equal(arrays["wrist.wrench.wrench.force.z"], np.arange(50))
+    np.testing.assert_array_equal(arrays["wrist.wrench.wrench.torque.z"], -np.arange(50))
+    np.testing.assert_allclose(arrays["wrist.wrench.time_s"], 0.02 * np.arange(50))
+    assert sum(name.startswith("wrist.") for name in arrays) == 7
+    assert read_log(path, robot=robot).n_samples == len(TIME)
+
+
+@pytest.mark.parametrize("with_effort", [True, False])
+def test_types_that_nobody_defines_are_named(tmp_path: Path, robot: Robot, with_effort: bool):
+    """Recordings before ROS 2 Iron have no definitions, and the states of controllers none in the library."""
+    states = STATES if with_effort else (POSITION, VELOCITY, [])
+    more = controller_states(NAMES, TIME, POSITION, POSITION, "new")
+    path = written_states(tmp_path / "run", "rosbag2", TIME, NAMES, states, more=more)
+    (database,) = path.glob("*.db3")
+    with sqlite3.connect(database) as tables:
+        tables.execute("DELETE FROM message_definitions")
+    said = (
+        "left out topic /arm/state: nobody defines its type "
+        "'?control_msgs/msg/JointTrajectoryControllerState"
+    )
+    if with_effort:
+        assert any(re.match(said, note) for note in read_log(path, robot=robot).notes)
+        assert any(re.match(said, finding.message) for finding in check_log(path).findings)
+    else:
+        with pytest.raises(LogError, match=f"got none .*; {said}"):
+            read_log(path, robot=robot)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from axisight import Effect, Robot, load_robot, simulate
+from axisight import Effect, Robot, _core, load_robot, simulate
 from axisight.effects import core_effects
 from axisight.errors import ConvergenceError, InputError
 from axisight.mujoco import apply
@@ -217,3 +217,12 @@ def test_what_cannot_be_remembered_is_said():
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.raises(InputError, match="Euler or implicit, got RK4"):
         apply(model, data, [HYSTERESIS], gears=GEARS)
+
+
+def test_states_of_another_shape_are_refused():
+    core = load_robot("two_mass_axis").with_effects([]).core
+    assert _core.state_at_rest(core, [], [0.0]).tolist() == [0.0] * 4
+    with pytest.raises(InputError, match=r"state: expected shape \(n, 4\), got \(1, 3\)"):
+        _core.state_rates(core, [], np.zeros((1, 3)), [0.0])
+    with pytest.raises(InputError, match="torque: expected 1 numbers, got 2"):
+        _core.state_rates(core, [], np.zeros((1, 4)), [0.0, 0.0])

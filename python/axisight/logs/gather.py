@@ -22,7 +22,7 @@ from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.mean_rate import mean_rate_hz
 from axisight.logs.native import native_map
 from axisight.logs.patterns import ColumnPattern
-from axisight.logs.sources import Arrays, load_arrays
+from axisight.logs.sources import load_arrays
 from axisight.logs.sources_bag import is_bag
 from axisight.logs.sources_lerobot import is_lerobot
 from axisight.logs.units import si_factor, si_offset
@@ -123,11 +123,13 @@ def _used_names(columns: ColumnMap) -> set[str]:
     return {a.name for a in (columns.time, *signals) if a is not None}
 
 
-def _usual_map(arrays: Arrays, robot: Robot | None, path: Path) -> AnyMap:
+def _usual_map(arrays: LazyArrays, robot: Robot | None, path: Path) -> AnyMap:
     """Return the map of a file that comes without one: of ROS, of LeRobot, or of native columns."""
     if is_lerobot(path):
         return load_column_map("lerobot")
-    return joint_state_map(arrays, robot, path) if is_bag(path) else native_map(arrays, str(path))
+    if is_bag(path):
+        return joint_state_map(arrays, robot, path, arrays.doubts)
+    return native_map(arrays, str(path))
 
 
 # How a motor's signal follows from the joint's, by the power of the gear ratio r (joint per motor angle).

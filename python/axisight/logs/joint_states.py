@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,14 +39,17 @@ _UNITS = {
 
 
 def joint_state_map(
-    arrays: Mapping[str, NDArray[Any]], robot: Robot | None, where: Path
+    arrays: Mapping[str, NDArray[Any]],
+    robot: Robot | None,
+    where: Path,
+    left_out: Sequence[str] = (),
 ) -> ColumnMap:
     """Return the column map, joint side, of the topic with position and effort of joints, or targets of theirs.
 
     Axes stand in the order of ``robot``, found by the names of its joints, or as the topic has them without
     one. Targets, of the state of a trajectory controller, are looked for where no topic has efforts. Stamps
     that are not uniform are resampled at their usual rate, which the log's notes say. Raises LogError where
-    no topic, or more than one, has what is needed.
+    no topic, or more than one, has what is needed, with what was left out of the recording (``left_out``).
     """
     wanted = None if robot is None else robot.axis_names
     shown_topics: list[str] = []
@@ -65,10 +68,11 @@ def joint_state_map(
     if len(usable) != 1:
         shown = "; ".join(shown_topics) or "none"
         joints = "joints" if wanted is None else ", ".join(wanted)
+        besides = "".join(f"; {said}" for said in left_out)
         raise LogError(
             f"{where}: expected one topic with position and effort of {joints}, or with targets of their "
             f"positions, got {'several' if len(usable) > 1 else 'none'} (topics that have both: {shown}); name the "
-            f"joints of the model as the recording does, or give a column map"
+            f"joints of the model as the recording does, or give a column map{besides}"
         )
     ((topic, found),) = usable.items()
     slides = [False] * len(found) if robot is None else robot.axis_is_prismatic

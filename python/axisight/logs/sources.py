@@ -46,8 +46,8 @@ def load_arrays(
 ) -> LazyArrays:
     """Return the arrays of a file by (dotted) name, read as they are asked for; scalars are 0-dimensional.
 
-    The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording of
-    ROS (.mcap, .bag, .db3, or the folder of a rosbag2). A folder of LeRobot is another log, of one
+    The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording
+    (.mcap, .bag, .db3, or the folder of a rosbag2). A folder of LeRobot is another log, of one
     episode (`folder#3`). What the file declares counts against `budget`, by default one by its size.
     Raises MissingExtraError for one without the library that reads it, LogError for a missing file, an
     unknown suffix, an episode that is not there, a truncated or corrupt file, and one that is too large.
@@ -90,8 +90,5 @@ def _loaders(csv: CsvOptions) -> dict[str, _Loader]:
         ".hdf5": load_hdf5,
         ".npz": load_npz,
         ".lerobot": load_lerobot,
-        **dict.fromkeys(
-            BAG_SUFFIXES,
-            lambda file, budget: LazyArrays.of(load_bag(file, budget)),
-        ),
+        **dict.fromkeys(BAG_SUFFIXES, load_bag),
     }

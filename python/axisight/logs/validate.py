@@ -78,19 +78,23 @@ def check_finite(found: Gathered) -> list[Finding]:
     """Check every signal for NaN and infinities."""
     findings = []
     for channel, values in found.signals.items():
-        findings += not_finite(values, found.labels[channel], channel[1] + 1)
+        findings += not_finite(values, found.labels[channel], channel[1] + 1, found.time_s)
     return findings
 
 
-def not_finite(values: Floats, label: str, axis: int) -> list[Finding]:
-    """Return a finding if `values` (n,) of an axis (from 1) hold NaN or infinities."""
+def not_finite(
+    values: Floats, label: str, axis: int, time_s: Floats | None = None
+) -> list[Finding]:
+    """Return a finding if `values` (n,) of an axis (from 1), at times if known, hold NaN or infinities."""
     bad = np.flatnonzero(~np.isfinite(values))
     if not bad.size:
         return []
     nan = int(np.isnan(values).sum())
+    first = bad[0]
+    when = "" if time_s is None or first >= time_s.size else f", {time_s[first]:.9g} s"
     message = (
         f"expected finite values, got {nan} NaN and {bad.size - nan} inf among {values.size}, "
-        f"first at index {bad[0]}"
+        f"first at index {first}{when}"
     )
     return [Finding("error", label, message, "not_finite", axis)]
 

@@ -32,7 +32,7 @@ _USUAL_HZ = 250.0
 def take_time(draft: Draft, arrays: Arrays) -> None:
     """Put the time into a draft that has positions. Raises LogError listing the columns without one."""
     draft.rate_name = _rate_name(arrays)
-    rate = None if draft.rate_name is None else float(arrays[draft.rate_name].reshape(-1)[0])
+    rate = rate_of(arrays)
     found = _candidates(draft)
     if not found and rate is None:
         raise draft.refusal(
@@ -52,6 +52,12 @@ def take_time(draft: Draft, arrays: Arrays) -> None:
     if rate is not None and abs(draft.sample_time_s * rate - 1.0) > 0.01:
         draft.rate_name = None
     draft.resample = _irregular(draft, draft.time.values * si_factor(unit))
+
+
+def rate_of(arrays: Arrays) -> float | None:
+    """Return the rate that a number of a file says [Hz]."""
+    name = _rate_name(arrays)
+    return None if name is None else float(arrays[name].reshape(-1)[0])
 
 
 def _rate_name(arrays: Arrays) -> str | None:

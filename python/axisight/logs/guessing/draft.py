@@ -21,7 +21,8 @@ class Draft:
 
     ``fields`` holds one (signal, unit) per axis, ``torques`` those of which a person has to choose one, or
     to state its scale (``scaled``: even of a torque). ``why`` gives the reason of a field, ``unused`` that
-    of a name that was left out. ``doubts`` are choices that others might be right for.
+    of a name that was left out. ``doubts`` are choices that others might be right for. ``by_numbers``: no
+    name said which columns are positions.
     """
 
     path: Path
@@ -40,6 +41,7 @@ class Draft:
     fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)
     torques: list[list[tuple[Series, str]]] = field(default_factory=list)
     scaled: bool = False
+    by_numbers: bool = False
     why: dict[str, str] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)

@@ -8,7 +8,8 @@ from pathlib import Path
 from axisight.errors import LogError
 from axisight.logs.columns import CsvOptions
 from axisight.logs.guessing.angles import find_positions, settle_positions
-from axisight.logs.guessing.clock import take_time
+from axisight.logs.guessing.clock import rate_of, take_time
+from axisight.logs.guessing.derived import name_by_derivatives
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, families_of
 from axisight.logs.guessing.named import Fit, named_map
@@ -59,9 +60,10 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     """Propose a column map for a log without one, from the names of its columns and their numbers.
 
     Names give quantity, axis and, with a suffix or in brackets, unit. Numbers give units that no name says: of
-    the time by its steps, of angles and speeds as one is the derivative of the other, or by size.
-    Velocities that are no such derivatives, and what could be one of several columns, are left out and
-    said. ``robot`` gives the number, names and kinds of the axes.
+    the time by its steps, of angles and speeds as one is the derivative of the other, or by size. Where names
+    say no position, a column whose derivative another one goes with is proposed for one, if no other is as
+    likely. Velocities that are no such derivatives, and what could be one of several columns, are left out
+    and said. ``robot`` gives the number, names and kinds of the axes.
 
     Raises LogError, listing the columns seen, when no time or no position of any axis is found, and when
     there are fewer axes than those of the robot; for a file that needs no map; and as `read_log` for a
@@ -83,6 +85,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
         joints = []
     families = families_of(series, joints)
     draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
+    name_by_derivatives(draft, rate_of(arrays))
     family = find_positions(draft)
     take_time(draft, arrays)
     settle_positions(draft, family)

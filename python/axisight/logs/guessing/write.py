@@ -40,11 +40,12 @@ def text_of(draft: Draft) -> str:
             lines += ['resample_hz = "mean"  # stamps are not uniform']
     lines += ["", *_comments("axes: ", [draft.why.get("axes", "one")])]
     lines += _comments("", [f"{name}: {draft.why[name]}" for name in _FIELDS if name in draft.why])
+    check = "  # proposed, check: no name says so" if draft.by_numbers else ""
     for axis in range(len(draft.axes)):
         lines += ["", "[[axis]]"]
         for name in _FIELDS:
             if name in draft.fields:
-                lines.append(f"{name} = {_inline(*draft.fields[name][axis])}")
+                lines.append(f"{name} = {_inline(*draft.fields[name][axis])}{check}")
         for signals in draft.torques:
             series, unit = signals[axis]
             scale = ", scale = ..." if unit in "AV" or draft.scaled else ""

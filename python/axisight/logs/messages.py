@@ -1,0 +1,204 @@
+"""Messages of recordings as numbers by name, whoever wrote them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from operator import index
+from typing import Any, SupportsIndex
+
+import numpy as np
+
+from axisight.arguments import short
+from axisight.logs.budget import Budget
+from axisight.logs.lazy import Reader, given, refusing
+
+# Fields that hold the names of what the other arrays of a message have in order.
+_NAMES = ("name", "joint_names", "names")
+# Arrays that have one number a joint, or none.
+_OF_JOINTS = (
+    *("position", "velocity", "effort", "acceleration"),
+    *("positions", "velocities", "efforts", "accelerations"),
+)
+_JOINTS = "joints"
+# Where the time of a message stands: it is no signal.
+_STAMPS = ("header", "stamp", "timestamp")
+_SECONDS, _NANOSECONDS = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos")
+_DEEPEST = 4
+_MOST_UNNAMED = 64
+# Bytes that a number of a message takes until all messages are there.
+_NUMBER_COST = 64
+
+
+class Topics:
+    """What messages of all topics say, each topic and set of joints a series.
+
+    Numbers count against ``budget`` as messages come. ``numbered``: arrays without names have numbers for
+    names, from 0 on.
+    """
+
+    def __init__(self, budget: Budget, *, numbered: bool = False) -> None:
+        self._budget = budget
+        self._numbered = numbered
+        self._series: dict[tuple[str, frozenset[str]], _Series] = {}
+
+    def add(self, topic: str, received_ns: int, message: Any) -> None:
+        """Add a message, a dataclass or a dictionary; its time is its stamp, or when it was received.
+
+        What is wrong with a field is said, by topic and time, to those who ask for it.
+        """
+        names = _names(message)
+        walk = _Walk(names, numbered=self._numbered and not names)
+        row = dict(walk.numbers(message))
+        self._budget.take(_NUMBER_COST * len(row))
+        label = topic.strip("/").replace("/", ".")
+        key = (label, frozenset([*names, *walk.found]))
+        self._series.setdefault(key, _Series()).add(_stamp_ns(message, received_ns), row)
+
+    def readers(self) -> dict[str, Reader]:
+        """Return what reads the columns of all series; of a topic those of other joints are ``topic#2``."""
+        out: dict[str, Reader] = {}
+        seen: dict[str, int] = {}
+        for (topic, _), one in self._series.items():
+            columns = one.columns(topic)
+            if columns:
+                seen[topic] = seen.get(topic, 0) + 1
+                label = topic if seen[topic] == 1 else f"{topic}#{seen[topic]}"
+                out |= {f"{label}.{name}": read for name, read in columns.items()}
+        return out
+
+
+def said_of(topic: str, time_ns: int) -> str:
+    """Return how a message is called."""
+    return f"topic {short(topic)}: message of {time_ns * 1e-9:.6f} s"
+
+
+# A number, or why there is none.
+_Value = float | str
+
+
+@dataclass
+class _Series:
+    """Messages of one topic about the same joints."""
+
+    stamps_ns: list[int] = field(default_factory=list)
+    rows: list[dict[str, _Value]] = field(default_factory=list)
+
+    def add(self, stamp_ns: int, row: dict[str, _Value]) -> None:
+        self.stamps_ns.append(stamp_ns)
+        self.rows.append(row)
+
+    def columns(self, topic: str) -> dict[str, Reader]:
+        """Return what reads the columns that any message has; none without a column."""
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        if not names:
+            return {}
+        stamps = np.array(self.stamps_ns, dtype=np.int64)
+        out = {"time_s": given((stamps - stamps[0]) * 1e-9)}
+        for name in names:
+            values = [
+                row.get(name, "expected it as in other messages, got none") for row in self.rows
+            ]
+            bad = [k for k, value in enumerate(values) if isinstance(value, str)]
+            if bad:
+                few = f"{len(bad)} of {len(values)} messages are so"
+                said = said_of(topic, self.stamps_ns[bad[0]])
+                out[name] = refusing(f"{said}: {name}: {values[bad[0]]}; {few}")
+            else:
+                out[name] = given(np.array(values, dtype=np.float64))
+        return out
+
+
+def _names(message: Any) -> list[str]:
+    for key in _NAMES:
+        found = _fields(message).get(key)
+        if isinstance(found, list | tuple) and all(isinstance(name, str) for name in found):
+            return list(found)
+    return []
+
+
+def _fields(message: Any) -> Mapping[str, Any]:
+    if isinstance(message, dict):
+        return message
+    keys = getattr(message, "__dataclass_fields__", {})
+    return {key: getattr(message, key) for key in keys if not key.startswith("__")}
+
+
+def _stamp_ns(message: Any, received_ns: int) -> int:
+    """Return when a message says that it was, when it was recorded where it does not."""
+    fields = _fields(message)
+    stamps = [_fields(fields.get("header")).get("stamp"), *map(fields.get, _STAMPS[1:])]
+    for stamp in stamps:
+        parts = _fields(stamp)
+        seconds = next((parts[key] for key in _SECONDS if key in parts), None)
+        rest = next((parts[key] for key in _NANOSECONDS if key in parts), 0)
+        # Numbers of NumPy are whole by this too.
+        if isinstance(seconds, SupportsIndex) and isinstance(rest, SupportsIndex):
+            said = index(seconds) * 1_000_000_000 + index(rest)
+            if 0 < said < 2**63:
+                return said
+    return received_ns
+
+
+class _Walk:
+    """A way through a message; ``found``: names of objects in lists, that each have one."""
+
+    def __init__(self, names: Sequence[str], *, numbered: bool) -> None:
+        self.names = names
+        self.numbered = numbered
+        self.found: list[str] = []
+
+    def numbers(
+        self, message: Any, prefix: str = "", depth: int = 0
+    ) -> Iterator[tuple[str, _Value]]:
+        """Yield every number of a message with its name; of an array as long as the joints by joint."""
+        for key, value in _fields(message).items():
+            if key in _NAMES or (key in _STAMPS[: 1 if depth else None] and _fields(value)):
+                continue
+            label = f"{prefix}{key}"
+            if isinstance(value, bool | int | float | np.number):
+                yield label, _number(value)
+            elif isinstance(value, np.ndarray):
+                if value.ndim == 1 and value.dtype.kind in "biuf":
+                    yield from self._array(key, label, value.tolist())
+            elif isinstance(value, list | tuple):
+                if all(isinstance(one, bool | int | float) for one in value):
+                    yield from self._array(key, label, value)
+                elif depth < _DEEPEST:
+                    # The joints of foxglove.JointStates are called as those of ROS.
+                    place = "" if key == _JOINTS and not depth else f"{label}."
+                    yield from self._objects(place, value, depth)
+            elif _fields(value) and depth < _DEEPEST:
+                yield from self.numbers(value, f"{label}.", depth + 1)
+
+    def _array(self, key: str, label: str, values: Sequence[float]) -> Iterable[tuple[str, _Value]]:
+        names = self.names
+        if len(values) == len(names):
+            return ((f"{label}.{n}", _number(v)) for n, v in zip(names, values, strict=True))
+        if names and values and key in _OF_JOINTS:
+            why = f"expected as many numbers as names, {len(names)}, got {len(values)}"
+            return ((f"{label}.{name}", why) for name in names)
+        if self.numbered and len(values) <= _MOST_UNNAMED:
+            return ((f"{label}.{k}", _number(value)) for k, value in enumerate(values))
+        return ()
+
+    def _objects(
+        self, place: str, values: Sequence[Any], depth: int
+    ) -> Iterator[tuple[str, _Value]]:
+        """Yield the numbers of objects that each have a name of their own: ``place.field.NAME``."""
+        names = [_fields(one).get("name") for one in values]
+        if not all(isinstance(name, str) for name in names) or len(set(names)) != len(names):
+            return
+        for one, name in zip(values, names, strict=True):
+            assert isinstance(name, str)
+            self.found.append(name)
+            inside = _Walk((), numbered=False)
+            for said, number in inside.numbers(one, place, depth + 1):
+                yield f"{said}.{name}", number
+
+
+def _number(value: Any) -> _Value:
+    try:
+        return float(value)
+    except OverflowError:
+        return "expected a number, got one with more digits than any measured"

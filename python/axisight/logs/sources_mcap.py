@@ -1,0 +1,146 @@
+"""MCAP files that are not of ROS: messages in JSON or protobuf."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from axisight.arguments import short
+from axisight.errors import LogError, MissingExtraError
+from axisight.logs.budget import Budget
+from axisight.logs.messages import Topics, said_of
+
+_MAGIC = b"\x89MCAP0\r\n"
+# Magic, kind of the record, its length, length of the profile.
+_HEAD, _LONGEST_PROFILE = 8 + 1 + 8 + 4, 64
+# A message that is longer is a picture or a cloud of points.
+_LONGEST_BYTES = 2**20
+_DEEPEST = 8
+_Decoder = Callable[[bytes], Any]
+
+
+def is_of_ros(path: Path) -> bool:
+    """Whether an MCAP file says that its messages are those of ROS 2, or is none at all."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD + _LONGEST_PROFILE)
+    length = int.from_bytes(head[_HEAD - 4 : _HEAD], "little")
+    profile = head[_HEAD : _HEAD + length]
+    return not head.startswith(_MAGIC) or len(head) < _HEAD or profile == b"ros2"
+
+
+def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]]:
+    """Read all messages in JSON and protobuf, and return the topics that were left out by the reason.
+
+    Raises LogError naming topic and time for messages that are not of their encoding, MissingExtraError
+    without the library of one that is there.
+    """
+    make_reader = _library("mcap.reader", "MCAP files that are not of ROS").make_reader
+    decoders: dict[int, _Decoder | str] = {}
+    left_out: dict[str, list[str]] = {}
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        chunks = summary.chunk_indexes if summary is not None else []
+        # One is there at a time, as long as it says.
+        budget.take(max((chunk.uncompressed_size for chunk in chunks), default=0))
+        for schema, channel, message in reader.iter_messages():
+            if channel.id not in decoders:
+                decoders[channel.id] = _decoder(schema, channel)
+            decode = decoders[channel.id]
+            if len(message.data) > _LONGEST_BYTES:
+                decode = f"it has messages of more than {_LONGEST_BYTES} bytes"
+            if isinstance(decode, str):
+                names = left_out.setdefault(decode, [])
+                if channel.topic not in names:
+                    names.append(channel.topic)
+                continue
+            said = said_of(channel.topic, message.log_time)
+            topics.add(channel.topic, message.log_time, _decoded(decode, message.data, said))
+    return left_out
+
+
+def _decoded(decode: _Decoder, data: bytes, said: str) -> Any:
+    """Return a message as dictionaries, lists and numbers."""
+    try:
+        return decode(data)
+    except RecursionError:
+        raise LogError(f"{said}: expected a message, got one that is nested too deeply") from None
+    except Exception as error:  # damaged messages make decoders raise nearly anything
+        raise LogError(
+            f"{said}: expected a whole message, got one that cannot be decoded: {short(str(error), 120)}"
+        ) from None
+
+
+def _decoder(schema: Any, channel: Any) -> _Decoder | str:
+    """Return what decodes the messages of a channel, or why nothing does."""
+    encoding = channel.message_encoding
+    if encoding == "json":
+        return _of_json
+    if encoding != "protobuf":
+        return f"expected messages in json or protobuf, got {short(encoding)!r}"
+    library = _library(
+        "mcap_protobuf.decoder", f"topic {short(channel.topic)}: messages in protobuf"
+    )
+    try:
+        found = library.DecoderFactory().decoder_for(encoding, schema)
+    except Exception as error:  # nor are damaged schemas refused by one kind of error
+        raise LogError(
+            f"topic {short(channel.topic)}: expected a schema of protobuf, got one that cannot be used: "
+            f"{short(str(error), 120)}"
+        ) from None
+    if found is None:
+        return "expected a schema of protobuf with messages in protobuf, got none"
+    return lambda data: _plain(found(data))
+
+
+def _of_json(data: bytes) -> Any:
+    """Return a message in JSON; what stands for no number (null in arrays of numbers, too) is NaN."""
+    return _with_nan(json.loads(data.decode("utf-8")))
+
+
+def _with_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_nan(one) for key, one in value.items()}
+    if isinstance(value, list):
+        numbers = all(one is None or isinstance(one, bool | int | float) for one in value)
+        if numbers:
+            return [float("nan") if one is None else one for one in value]
+        return [_with_nan(one) for one in value]
+    return value
+
+
+def _plain(message: Any, depth: int = 0) -> Mapping[str, Any]:
+    """Return a message of protobuf as a dictionary, numbers that are not sent as the zeros they mean."""
+    out: dict[str, Any] = {}
+    if depth > _DEEPEST:
+        return out
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        nested = field.message_type is not None
+        if nested and field.message_type.GetOptions().map_entry:
+            continue
+        if _repeated(field):
+            out[field.name] = [_plain(one, depth + 1) for one in value] if nested else list(value)
+        elif field.has_presence and not message.HasField(field.name):
+            continue
+        else:
+            out[field.name] = _plain(value, depth + 1) if nested else value
+    return out
+
+
+def _repeated(field: Any) -> bool:
+    """Whether a field holds several values; younger libraries have no labels."""
+    said = getattr(field, "is_repeated", None)
+    return bool(field.label == field.LABEL_REPEATED if said is None else said)
+
+
+def _library(name: str, what: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtraError(
+            f"{what} are read by the libraries of MCAP: pip install 'axisight[mcap]'"
+        ) from error
