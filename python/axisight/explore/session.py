@@ -16,6 +16,7 @@ from axisight.errors import InputError
 from axisight.explore.choices import in_bounds
 from axisight.explore.measured import measured_gains
 from axisight.fitting import robot_parameters
+from axisight.gap.currents import unknown_axes
 from axisight.gap.howfar import stage
 from axisight.gap.pipeline import behind_gate
 from axisight.gap.settings import Settings
@@ -97,6 +98,11 @@ class Session:
         self.name, self.given = name, robot
         self.estimation, self.validation = tuple(estimation), tuple(validation)
         self.settings = settings or Settings()
+        if unknown_axes([*estimation, *validation]):
+            raise InputError(
+                'explore: expected torques, got currents of scale = "unknown": their constant is found by '
+                "`axisight diagnose`, and is a scale in the column map then"
+            )
         inputs = behind_gate(robot, estimation, validation, self.settings.despite, simulated)
         self.view: View
         inputs, self.view = inputs.compared(self.settings)

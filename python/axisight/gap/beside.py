@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.begun import from_rest
 from axisight.gap.by_targets import what_is_compared
+from axisight.gap.currents import in_torques
 from axisight.gap.faults import Finding, refused
 from axisight.gap.gate import check_by_targets, check_inputs
 from axisight.gap.recovered import SAYS, with_references
@@ -28,15 +29,18 @@ def look_beside(robot: Robot, log: Log) -> Beside:
 
     Raises InputError as `with_commands`, where a log without torque cannot be compared with this robot.
     """
+    read = in_torques(robot, [log], [])
+    (log,) = read.estimation
+    unknown = tuple(nominal.finding() for nominal in read.nominal)
     commanded = with_commands(robot, [log])
     if commanded is not None:
         alone = check_by_targets(commanded.robot, commanded.as_logged(), [])
-        findings = (*commanded.findings(), *alone)
+        findings = (*unknown, *commanded.findings(), *alone)
         compared = what_is_compared(log.sample_rate_hz)
     else:
         begun = from_rest(robot, [log], [], [])
         (log,) = begun.estimation
-        findings = (*begun.findings, *check_inputs(robot, [log], []))
+        findings = (*unknown, *begun.findings, *check_inputs(robot, [log], []))
         compared = "" if refused(findings) else _torques(robot, log)
     return Beside("" if refused(findings) else compared, findings)
 

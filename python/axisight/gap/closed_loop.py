@@ -15,6 +15,7 @@ from axisight.effects import Effect, EffectTuple, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.gap.constants import with_values
 from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.encoder_steps import encoder_steps
@@ -141,11 +142,12 @@ class ClosedLoopView(View):
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
         """Return the torque that sensor noise causes through the loop, for every log."""
-        effects = {e.label: e for e in (*self._noisy.effects, *variant.effects)}.values()
+        machine = with_values(self._noisy, variant.robot_values)
+        effects = {e.label: e for e in (*machine.effects, *variant.effects)}.values()
         # Steps are no white noise: what they make of a slow motion is run.
         stated = self.robot.position_noise_std
         return noise_torques(
-            self._noisy.with_parameters(variant.robot_values).with_effects(list(effects)),
+            machine.with_effects(list(effects)),
             logs,
             np.where(self._step_rad > 0, stated, self.floor.position_std_rad),
             self.settings.seed,

@@ -65,6 +65,7 @@ MEANINGS: dict[str, str] = {
     "torque_in_knm": "torque in kNm instead of Nm",
     "torque_joint_side": "joint-side instead of motor-side torque",
     "torque_scaled": "torque by an unknown factor off: A, V or per cent of the rated torque",
+    "torque_constant_unknown": "a current whose torque constant nobody knows",
     "torque_off_control_law": "a torque that is not what the robot file's controller gives",
     "gravity_flipped": "gravity of the robot file with the other sign",
     "begins_in_motion": "a log of a loop that begins in motion",

@@ -103,7 +103,7 @@ def read_beside(
     """
     # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
     robot = bare(model) if is_model_file(model) else load(model)
-    logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in paths]
+    logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes, currents=True) for p in paths]
     return _loaded(load, model, logs) if is_model_file(model) else robot, logs
 
 
@@ -132,10 +132,15 @@ def _read(
             raise InputError(f"{model}: expected logs beside the model, got none")
     if len(paths) == 1 and paths[0].is_dir() and not is_folder_log(paths[0]):
         own = bare if model is None else load_robot
-        case = read_case(paths[0], columns, untrusted=untrusted, max_bytes=max_bytes, load=own)
+        case = read_case(
+            paths[0], columns, untrusted=untrusted, max_bytes=max_bytes, load=own, currents=True
+        )
         source = model if model is not None else case.robot_path
         robot = _loaded(load, source, case.logs)
-        extra = [read_log(p, columns, robot=robot, max_bytes=max_bytes) for p in validation]
+        extra = [
+            read_log(p, columns, robot=robot, max_bytes=max_bytes, currents=True)
+            for p in validation
+        ]
         return Inputs(case.name, robot, source, tuple(case.estimation), (*case.validation, *extra))
     if model is None:
         if paths and not paths[0].exists() and not is_folder_log(paths[0]):

@@ -20,6 +20,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.gap.constants import for_core, own_constants
 from axisight.gap.evidence import Evidence, FreeEffect, Linearized
 from axisight.gap.rank import deviations_seen
 from axisight.gap.scales import NaturalSizes
@@ -62,6 +63,7 @@ class ModelFitter(ABC):
         self.cancel = _core.CancelToken()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
+        self.constants: Mapping[str, Effect] = {}
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
@@ -70,6 +72,11 @@ class ModelFitter(ABC):
             and value != 0
             and self.takes_part(name)
         ]
+
+    def free_constants(self, axes: Sequence[int]) -> None:
+        """Fit the torque constants of ``axes`` (from 1) with the simulator's own parameters."""
+        self.constants, parameters = own_constants(self.robot, axes)
+        self.own += parameters
 
     def within_tolerance(self, effect: Effect) -> bool:
         """Whether an effect is no more than ordinary scatter of a parameter."""
@@ -176,7 +183,10 @@ class ModelFitter(ABC):
         """
         held = [False] * len(model.free)
         setup = self._setup(model.free, model, robot_values, held, lazy=False)
-        return self.run(setup.effects, setup.parameters, self._options())
+        return self.run(*self._for_core(setup), self._options())
+
+    def _for_core(self, setup: _Setup) -> tuple[list[Effect], list[Parameter]]:
+        return for_core(setup.effects, setup.parameters, self.constants)
 
     def run(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
@@ -231,7 +241,7 @@ class ModelFitter(ABC):
         *,
         renewed: bool,
     ) -> Evidence:
-        result = self.solve(setup.effects, setup.parameters, options, setup.warm, near)
+        result = self.solve(*self._for_core(setup), options, setup.warm, near)
         return _evidence(result, setup, list(free), renewed=renewed, counted=self.counted())
 
     def evaluate(
@@ -277,7 +287,7 @@ class ModelFitter(ABC):
 
     def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> Linearized:
         options = self._options()
-        result = self.linearize(setup.effects, setup.parameters, options, setup.warm, near)
+        result = self.linearize(*self._for_core(setup), options, setup.warm, near)
         return replace(_linearized(result, setup), jacobian=tuple(result.columns))
 
     def replaced(self, free: Sequence[FreeEffect]) -> set[str]:

@@ -24,6 +24,8 @@ from axisight.gap.carried import carried_over, open_check
 from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.coarse import with_coarse_encoders
 from axisight.gap.compared import Compared
+from axisight.gap.constants import constant_name, nominal_error
+from axisight.gap.currents import Nominal, in_torques
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
@@ -144,7 +146,9 @@ def diagnose(
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
     checks = (*out.checks, *inputs.says(view.mode, view.compared))
-    out = replace(out, simulator=inputs.simulator, checks=checks)
+    constants = [n.finding(out.refit[constant_name(machine, n.axis)]) for n in inputs.nominal]
+    found_faults = (*constants, *out.findings)
+    out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)
     logged = "recovered" if inputs.recovered else "logged"
     out.provenance["references"] = logged if view.mode == "closed_loop" else None
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
@@ -164,6 +168,7 @@ class _Inputs:
     """A simulator and logs that passed the gate, as they are compared.
 
     ``commanded``: logs without torque with what the controller commands along them, where they have none;
+    ``nominal``: the torque constants by which currents were read whose constant nobody knows;
     ``recovered``: whether the references are those that the controller must have had; ``simulator``: how
     far the robot reproduces the user's own simulator, where its logs were given; ``beside``: these logs, from
     where the others are taken.
@@ -175,6 +180,7 @@ class _Inputs:
     noted: tuple[Finding, ...]
     commanded: Commanded | None
     recovered: bool
+    nominal: tuple[Nominal, ...] = ()
     simulator: Reproduction | None = None
     beside: tuple[Log, ...] = ()
 
@@ -238,7 +244,12 @@ def behind_gate(
 
     ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
     """
-    begun = from_rest(robot, estimation, validation, simulated, despite)
+    read = in_torques(robot, estimation, validation)
+    if read.nominal and simulated:
+        raise InputError(
+            'simulated: expected logs of torques beside logs of a simulator, got currents of scale = "unknown"'
+        )
+    begun = from_rest(robot, read.estimation, read.validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
     found, beside = begun.findings, begun.simulated
     commanded = with_commands(robot, logs)
@@ -254,7 +265,14 @@ def behind_gate(
     logs = logs if recovered is None else recovered
     noted = (*found, *noted)
     return _Inputs(
-        robot, logs[:n], logs[n:], noted, commanded, recovered is not None, beside=tuple(beside)
+        robot,
+        logs[:n],
+        logs[n:],
+        noted,
+        commanded,
+        recovered is not None,
+        read.nominal,
+        beside=tuple(beside),
     )
 
 
@@ -266,7 +284,7 @@ def _inputs(
 ) -> tuple[str, Robot | Path | str, list[Log], list[Log]]:
     source: Robot | Path | str | None
     if case is not None:
-        read = case if isinstance(case, Case) else read_case(Path(case))
+        read = case if isinstance(case, Case) else read_case(Path(case), currents=True)
         name, source = read.name, robot if robot is not None else read.robot_path
         fit_logs, held_logs = list(read.estimation), list(read.validation)
     elif robot is not None:
@@ -488,7 +506,7 @@ def _assemble(
         band_map=bands,
         regime_maps=regimes,
         overlays=reach.overlays,
-        refit={k: _relative(fitted, k, nominal[k]) for k in fitted.robot_values},
+        refit={k: _relative(robot, fitted, k) for k in fitted.robot_values},
         checks=(
             *conclusion.checks,
             *chance_check(reach.stages, reach.judged),
@@ -554,9 +572,11 @@ def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | N
     return OwnAxes(axes, reach.stages.given, reach.stages.after, reach.change)
 
 
-def _relative(model: Evidence, name: str, nominal: float) -> Interval:
+def _relative(robot: Robot, model: Evidence, name: str) -> Interval:
     """Return the relative change of a re-fitted parameter with its 95 % interval."""
-    size = abs(nominal) or 1.0
+    error = nominal_error(robot, name)
+    nominal = robot_parameters(robot)[name] if error is None else error
+    size = (abs(nominal) or 1.0) if error is None else 1.0 + error
     change = (model.robot_values[name] - nominal) / size
     spread = 1.96 * model.std.get((None, name), 0.0) / size
     return Interval(change, change - spread, change + spread)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from axisight import _core
 from axisight.effects import core_effects
 from axisight.fitting import FitOptions, Weighting
+from axisight.gap.constants import with_values
 from axisight.gap.motion import Motion
 from axisight.gap.torques import Variant
 from axisight.robot import Robot
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
     """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
-    changed = robot.with_parameters(variant.robot_values)
+    changed = with_values(robot, variant.robot_values)
     result = _core.evaluate_inverse_dynamics(
         changed.core,
         core_effects(variant.effects),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.effects.stated import STEPS
 from axisight.errors import InputError
+from axisight.gap.constants import with_values
 from axisight.gap.poses import starts_of
 from axisight.gap.torques import Variant
 from axisight.logs import Log
@@ -27,7 +28,7 @@ def simulated_torques(
 
     Where the simulation fails (an unstable model), the rest is NaN.
     """
-    changed = robot.with_parameters(variant.robot_values)
+    changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects)
 
 
@@ -35,13 +36,13 @@ def simulated_positions(
     robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
 ) -> list[Array]:
     """Return the same of the motor positions (n, n_axes) [rad]."""
-    changed = robot.with_parameters(variant.robot_values)
+    changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
 
 
 def simulated_run(robot: Robot, variant: Variant, log: Log) -> tuple[Array, Array]:
     """Return torque [Nm] and motor position [rad] of one run along a log's references, (n, n_axes) each."""
-    changed = robot.with_parameters(variant.robot_values)
+    changed = with_values(robot, variant.robot_values)
     out, lead = _runs(changed, [log], 1, variant.effects), log.lead
     return out["torque_cmd_nm"].values[0, lead:], out["position_rad"].values[0, lead:]
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.compared import Compared
+from axisight.gap.constants import absorbed
+from axisight.gap.currents import unknown_axes
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
@@ -53,6 +55,9 @@ class View(ABC):
     def __post_init__(self) -> None:
         """Tell the fitter what is large on this robot."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
+        unknown = unknown_axes(self.logs)
+        self.fitter.free_constants(unknown)
+        self._absorbed = absorbed(unknown)
         self._turned: Sequence[Sequence[Turning]] = ()
 
     def candidates(
@@ -83,7 +88,8 @@ class View(ABC):
             by_targets=self.by_targets,
             threads=self.settings.threads,
         )
-        return [f for f in found if f.effect.label not in self.not_offered]
+        none = self.not_offered | self._absorbed
+        return [f for f in found if f.effect.label not in none]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         weighting = self.fitter.weighting

@@ -95,10 +95,11 @@ def read_case(
     untrusted: bool = False,
     max_bytes: int | None = None,
     load: Callable[..., Robot] = load_robot,
+    currents: bool = False,
 ) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
-    `columns` and `max_bytes`, which holds for each log, are what `read_log` takes. Raises CaseError naming
+    `columns`, `max_bytes`, which holds for each log, and `currents` are what `read_log` takes. Raises CaseError naming
     file and field: case.toml missing or invalid, unknown keys, no estimation log, robot file missing, one
     file listed twice, logs with different numbers of axes, a period that is not a whole number of samples
     or is longer than the log. Raises LogError for a log that cannot be read or has another sample rate.
@@ -140,7 +141,7 @@ def read_case(
     )
     robot = load(robot_path) if needed or recorded else None
     logs = tuple(
-        _read_entry(path, number, entry, given, robot, max_bytes)
+        _read_entry(path, number, entry, given, robot, max_bytes, currents)
         for number, entry in enumerate(content.log)
     )
     for number, log in enumerate(logs):
@@ -180,13 +181,14 @@ def _read_entry(
     columns: AnyMap | None,
     robot: Robot | None,
     max_bytes: int | None,
+    currents: bool,
 ) -> Log:
     file = path.parent / entry.file
     if not file.is_file() and not is_folder_log(file):
         raise CaseError(
             f"{path}: log.{number}.file: expected an existing file, got {shown(entry.file)}"
         )
-    log = read_log(file, columns, robot=robot, max_bytes=max_bytes)
+    log = read_log(file, columns, robot=robot, max_bytes=max_bytes, currents=currents)
     if entry.period_s is not None:
         samples = entry.period_s / log.sample_time_s
         if not np.isfinite(samples) or round(samples) < 1 or abs(samples - round(samples)) > 0.01:

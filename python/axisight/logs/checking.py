@@ -117,9 +117,15 @@ def _without_torque(found: Gathered) -> list[Finding]:
 
 def _currents(found: Gathered) -> list[Finding]:
     """Say what currents without a scale need."""
-    message = "a current without a scale: read with a robot that states its torque constant; figures here are in A"
+    known = "a current without a scale: read with a robot that states its torque constant; figures here are in A"
+    unknown = (
+        "a current whose torque constant nobody knows: a diagnosis finds it; figures here are in A"
+    )
     return [
-        Finding("warning", found.labels["torque", axis], message) for axis in sorted(found.currents)
+        Finding(
+            "warning", found.labels["torque", axis], unknown if axis in found.unknown else known
+        )
+        for axis in sorted(found.currents)
     ]
 
 

@@ -21,6 +21,9 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 
 
+UNKNOWN = "unknown"
+"""Scale of a current whose torque constant nobody knows."""
+
 # Faults of one file that a message tells.
 _SHOWN = 8
 
@@ -97,7 +100,8 @@ class VelocityColumn(_Signal):
 class TorqueColumn(_Signal):
     """Torque or force; for A and V, `scale` states Nm (or N) per A or V.
 
-    A without one is a current of the motor, which is read with a robot that states its torque constant.
+    A without one is a current of the motor, which is read with a robot that states its torque constant; with
+    "unknown" it is one whose constant nobody knows, for a diagnosis to find.
     """
 
     unit: TorqueUnit
@@ -111,7 +115,12 @@ class TorqueColumn(_Signal):
     @property
     def is_current(self) -> bool:
         """Whether it is a current of the motor, which its torque constant turns into torque."""
-        return self.unit == "A" and self.scale is None
+        return self.unit == "A" and (self.scale is None or self.is_unknown)
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether nobody knows the torque constant of the motor."""
+        return self.unit == "A" and self.scale == UNKNOWN
 
 
 class TemperatureColumn(_Signal):

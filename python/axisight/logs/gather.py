@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from axisight.arguments import short, shown, usable_path
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
-from axisight.logs.columns import Address, AxisColumns, ColumnMap
+from axisight.logs.columns import UNKNOWN, Address, AxisColumns, ColumnMap
 from axisight.logs.findings import Finding
 from axisight.logs.joint_states import joint_state_map
 from axisight.logs.lazy import LazyArrays
@@ -43,7 +43,8 @@ class Gathered:
 
     `doubts` are about whole files; a grid of more than `most_samples` would not keep to the budget.
     `mapped`: by a column map that was given; `currents`: axes (from 0) whose torque is a current of the motor,
-    [A] without a robot.
+    [A] without a robot; `unknown`: of them those whose constant nobody knows, with what they were read by
+    [Nm/A], NaN where they are as they were logged [A].
     """
 
     path: Path
@@ -59,6 +60,7 @@ class Gathered:
     most_samples: int = 2**62
     mapped: bool = False
     currents: set[int] = field(default_factory=set)
+    unknown: dict[int, float] = field(default_factory=dict)
 
     @property
     def notes(self) -> list[str]:
@@ -143,9 +145,14 @@ def _to_torques(result: Gathered, robot: Robot | None) -> None:
         if signal is None or not signal.is_current:
             continue
         result.currents.add(number)
-        if robot is None or number >= robot.n_axes:  # which is said by those who need one
+        there = robot is not None and number < robot.n_axes
+        constant = robot.torque_constants[number] if robot is not None and there else None
+        if signal.is_unknown:
+            result.unknown[number] = np.nan if constant is None else constant
+        if robot is None or not there:  # which is said by those who need one
             continue
-        constant = robot.torque_constants[number]
+        if constant is None and signal.is_unknown:
+            continue
         if constant is None:
             joint = robot.axis_names[number]
             result.findings.append(Finding("error", signal.label, _no_constant(joint)))
@@ -156,7 +163,7 @@ def _to_torques(result: Gathered, robot: Robot | None) -> None:
 def _no_constant(joint: str) -> str:
     return (
         f"expected scale (Nm or N per A) with unit 'A', or joint.{joint}.torque_constant in the drive data of a "
-        f"model file, got neither"
+        f'model file, got neither; with scale = "{UNKNOWN}" a diagnosis finds the constant'
     )
 
 
@@ -229,7 +236,8 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     try:
         arrays = files.of(signal)
         values = _vector(arrays, signal, files.budget)
-        scale = 1.0 if signal.scale is None else _scalar(arrays, signal.scale)
+        unscaled = signal.scale is None or (signal.unit == "A" and signal.is_unknown)
+        scale = 1.0 if unscaled else _scalar(arrays, signal.scale)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
         return

@@ -58,6 +58,10 @@ class Log:
     rest; None is the robot's operating point. `run_up` is what a simulation goes through before this
     run where that begins in motion; None where it begins at rest.
 
+    `nominal_nm_a` (axes,) is, of an axis whose torque is a current that was read by a torque constant nobody
+    knows, that constant (Nm/A), NaN where `torque_nm` is still the current (A), and None of other axes; it may be
+    left out where all torques are known.
+
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
     (time grid replaced, resampled). Raises InputError when shapes disagree.
     """
@@ -79,6 +83,7 @@ class Log:
     period_s: float | None = None
     axis_kinds: tuple[AxisKind, ...] = ()
     notes: tuple[str, ...] = ()
+    nominal_nm_a: tuple[float | None, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the shapes and fill in revolute axes."""
@@ -102,18 +107,22 @@ class Log:
             object.__setattr__(self, "axis_kinds", ("revolute",) * shape[1])
         if len(self.axis_kinds) != shape[1]:
             raise InputError(f"axis_kinds: expected {shape[1]} entries, got {len(self.axis_kinds)}")
+        if len(self.nominal_nm_a) not in (0, shape[1]):
+            raise InputError(
+                f"nominal_nm_a: expected {shape[1]} entries, got {len(self.nominal_nm_a)}"
+            )
 
     def _repr_html_(self) -> str:
         """Signals with unit and range on every axis, for notebooks."""
         rows = []
-        for field, (name, revolute, prismatic) in _VARIABLES.items():
+        for field, (name, _, _) in _VARIABLES.items():
             found = getattr(self, field)
             if found is None:
                 continue
-            for i, kind in enumerate(self.axis_kinds):
+            for i in range(self.n_axes):
                 there = found[np.isfinite(found[:, i]), i]
                 span = (there.min(), there.max()) if there.size else (math.nan, math.nan)
-                unit = revolute if kind == "revolute" else prismatic
+                unit = self._unit(field, i)
                 if there.size:
                     rows.append((name, str(i + 1), unit, *map(html.number, span)))
         return html.page(
@@ -122,6 +131,14 @@ class Log:
             html.table(("signal", "axis", "unit", "least", "largest"), rows),
             html.lines([f"from {self.source}", *self.notes]),
         )
+
+    def _unit(self, field: str, axis: int) -> str:
+        """Return the unit of a field on an axis (from 0)."""
+        _, revolute, prismatic = _VARIABLES[field]
+        nominal = self.nominal_nm_a[axis] if self.nominal_nm_a else None
+        if field == "torque_nm" and nominal is not None and math.isnan(nominal):
+            return "A"
+        return revolute if self.axis_kinds[axis] == "revolute" else prismatic
 
     @property
     def has_torque(self) -> bool:
@@ -214,11 +231,11 @@ class Log:
         Where axes of both kinds are mixed, `units` lists one unit per axis.
         """
         variables = {}
-        for field, (name, revolute, prismatic) in _VARIABLES.items():
+        for field, (name, _, _) in _VARIABLES.items():
             values = getattr(self, field)
             if values is None:
                 continue
-            per_axis = [revolute if kind == "revolute" else prismatic for kind in self.axis_kinds]
+            per_axis = [self._unit(field, axis) for axis in range(self.n_axes)]
             units = per_axis[0] if len(set(per_axis)) == 1 else ", ".join(per_axis)
             variables[name] = (("time", "axis"), values, {"units": units})
         attrs: dict[str, object] = {

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from axisight.errors import LogError
+from axisight.logs.columns import UNKNOWN
 from axisight.logs.findings import raise_errors
 from axisight.logs.gather import Gathered, gather
 from axisight.logs.grid import Grid, make_grid
@@ -27,6 +28,7 @@ def read_log(
     n_axes: int | None = None,
     robot: Robot | None = None,
     max_bytes: int | None = None,
+    currents: bool = False,
 ) -> Log:
     """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or .db3.
 
@@ -38,7 +40,8 @@ def read_log(
     of joints into those of motors, and its torque constants currents without a scale into torques.
     `n_axes` is the number of driven axes the caller expects, those of the robot unless given. Only columns
     that are mapped are read, and none that would take more than `max_bytes` together, as they are read and
-    as signals; by default 64 MiB and sixteen times the size of the files.
+    as signals; by default 64 MiB and sixteen times the size of the files. `currents`: a current whose torque
+    constant nobody knows (scale "unknown") is taken, for a diagnosis, which finds it.
     The result is in SI units on a uniform grid that starts at 0.
 
     Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
@@ -52,11 +55,7 @@ def read_log(
             f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "
             f"motors, got none"
         )
-    if found.currents and robot is None:
-        raise LogError(
-            f"{found.path}: axis {min(found.currents) + 1}: torque: expected scale (Nm or N per A) with unit 'A', or a "
-            f"robot that states its torque constants (of a model file, in its drive data), got neither"
-        )
+    _check_currents(found, robot, taken=currents)
     if n_axes is None and robot is not None:
         n_axes = robot.n_axes
     problems = [*found.findings, *check_axes(found, n_axes), *check_lengths(found)]
@@ -64,6 +63,21 @@ def read_log(
     grid = grid_of(found)
     raise_errors(found.path, [*check_finite(found), *grid.findings])
     return _assemble(found, grid)
+
+
+def _check_currents(found: Gathered, robot: Robot | None, *, taken: bool) -> None:
+    """Raise LogError for currents that nothing turns into torques; ``taken``: but for those of unknown constants."""
+    stated = found.currents - found.unknown.keys()
+    if stated and robot is None:
+        raise LogError(
+            f"{found.path}: axis {min(stated) + 1}: torque: expected scale (Nm or N per A) with unit 'A', or a "
+            f"robot that states its torque constants (of a model file, in its drive data), got neither"
+        )
+    if found.unknown and not taken:
+        raise LogError(
+            f"{found.path}: axis {min(found.unknown) + 1}: torque: expected scale (Nm or N per A), got "
+            f'"{UNKNOWN}", with which only a diagnosis can do, and `read_log` for one with currents=True'
+        )
 
 
 def grid_of(found: Gathered) -> Grid:
@@ -115,7 +129,14 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
             "prismatic" if axis.prismatic else "revolute" for axis in found.columns.axis
         ),
         notes=(*grid.notes, *found.notes, *found.doubts),
+        nominal_nm_a=_nominal(found),
     )
+
+
+def _nominal(found: Gathered) -> tuple[float | None, ...]:
+    """Return what `Log.nominal_nm_a` says."""
+    axes = range(len(found.columns.axis))
+    return tuple(map(found.unknown.get, axes)) if found.unknown else ()
 
 
 def _on_grid(values: Floats, grid: Grid, time_s: Floats) -> Floats:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from axisight.excitation import References
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
+from axisight.gap.constants import with_values
 from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.search import Search
@@ -119,7 +120,7 @@ def _repeats(rivals: Rivals, seen: Sequence[_Seen], enough: float, most: int) ->
 
 
 def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most: Array) -> _Runs:
-    robot = view.robot.with_parameters(machine.robot_values)
+    robot = with_values(view.robot, machine.robot_values)
     out = simulate_batch(
         robot,
         np.stack([m.reference for m in tried]),
