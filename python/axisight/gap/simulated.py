@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.effects.stated import STEPS
 from axisight.errors import InputError
+from axisight.gap.gains import with_values
 from axisight.gap.poses import starts_of
 from axisight.gap.torques import Variant
 from axisight.logs import Log
@@ -34,8 +35,8 @@ def simulated_torques(
 def simulated_positions(
     robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
 ) -> list[Array]:
-    """Return the same of the motor positions (n, n_axes) [rad]."""
-    changed = robot.with_parameters(variant.robot_values)
+    """Return the same of the motor positions (n, n_axes) [rad]; the variant may change gains."""
+    changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
 
 
