@@ -40,11 +40,12 @@ from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
+from axisight.gap.gains import gains_of
 from axisight.gap.inputs import Inputs, read_inputs
 from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
-from axisight.gap.tolerances import with_tolerances
+from axisight.gap.tolerances import GAINS, with_tolerances
 from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
@@ -69,7 +70,10 @@ EXIT_CODES: dict[VerdictKind, int] = {
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
     """Return the tolerances given by quantity or name; raises InputError naming the option."""
-    own = [n for n in robot_parameters(robot) if n.rsplit(".", 1)[1] in DEFAULT_TOLERANCES]
+    gains = gains_of(robot)
+    quantities = [*DEFAULT_TOLERANCES, *(GAINS if gains else ())]
+    known = [*robot_parameters(robot), *gains]
+    own = [n for n in known if n.rsplit(".", 1)[1] in quantities]
     changed = {}
     for item in given:
         name, _, value = item.partition("=")
@@ -77,9 +81,9 @@ def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
             changed[name] = float(value)
         except ValueError:
             raise InputError(f"--tolerance: expected NAME=VALUE, got {item!r}") from None
-        if name not in DEFAULT_TOLERANCES and name not in own:
+        if name not in quantities and name not in own:
             raise InputError(
-                f"--tolerance: expected one of {', '.join(DEFAULT_TOLERANCES)}, or one of a joint "
+                f"--tolerance: expected one of {', '.join(quantities)}, or one of a joint "
                 f"({own[0]}), got {name!r}"
             )
         if not 0 < changed[name] < 1:
@@ -111,7 +115,7 @@ def diagnose_command(
         list[str] | None,
         typer.Option(
             help="Relative tolerance of a simulator parameter, e.g. mass=0.02, instead of that of "
-            "the robot file or the default."
+            "the robot file or the default; of gains of a controller of targets too, e.g. kp=0.5."
         ),
     ] = None,
     cutoff_hz: CutoffHz = None,

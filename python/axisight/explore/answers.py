@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from axisight.errors import AxisightError
 from axisight.explore.regard import Against, in_bins, order_spectrum, quantity, responses
 from axisight.explore.session import AS_GIVEN, Seen, Session, Version
+from axisight.gap.gains import with_values
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
@@ -86,7 +87,7 @@ def _with_responses(session: Session, last: Answer, out: Rest) -> Rest:
     problem = ""
     try:
         for key, version in (("given", AS_GIVEN), ("now", last.version)):
-            robot = session.robot.with_parameters(dict(version.robot_values))
+            robot = with_values(session.robot, dict(version.robot_values))
             own = {e.label: e for e in (*robot.effects, *version.effects)}
             found = responses(robot, tuple(own.values()), frequency_hz)
             curves[key] = (frequency_hz, np.abs(found[:, :, out.axis]))

@@ -11,6 +11,7 @@ import matplotlib.figure
 
 from axisight import palette
 from axisight.explore.session import Seen, Session, Version
+from axisight.gap.gains import split
 from axisight.report.curves import thin
 from axisight.robot_file import Provenance, identified
 from axisight.robot_file.document import render
@@ -19,11 +20,13 @@ from axisight.robot_file.document import render
 def robot_text(session: Session, made: Version) -> str:
     """Return the robot file of a version; raises RobotError for values that no body has."""
     own = {e.label for e in session.robot.effects}
-    acting = [e for e in made.effects if e.acts]
+    values, gains = split(session.robot, dict(made.robot_values))
+    # One put in by hand takes the place of what was fitted.
+    by_hand = {e.label for e in made.effects}
+    fitted = [e for e in gains if e.label not in by_hand]
+    acting = [e for e in (*made.effects, *fitted) if e.acts]
     removed = [e for e in made.effects if not e.acts and e.label in own]
-    found = identified(
-        dict(made.robot_values), Provenance("explorer"), effects=acting, removed=removed
-    )
+    found = identified(values, Provenance("explorer"), effects=acting, removed=removed)
     text = render(session.robot, found, "")
     # The head of an identification names a file of errors beside it, which values by hand have not.
     body = "".join(text.splitlines(True)[1:])

@@ -15,8 +15,8 @@ from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.explore.choices import in_bounds
 from axisight.explore.measured import measured_gains
-from axisight.fitting import robot_parameters
 from axisight.gap.currents import unknown_axes
+from axisight.gap.gains import nominal_values, with_values
 from axisight.gap.howfar import stage
 from axisight.gap.pipeline import behind_gate
 from axisight.gap.settings import Settings
@@ -133,7 +133,8 @@ class Session:
     def check(self, version: Version) -> None:
         """Raise InputError for effects or values that the robot cannot have."""
         own = {e.label: e for e in (*self.robot.effects, *version.effects)}
-        self.robot.with_parameters(dict(version.robot_values)).with_effects(own.values())
+        changed = with_values(self.robot, dict(version.robot_values))
+        changed.with_effects({e.label: e for e in (*changed.effects, *own.values())}.values())
 
     def see(self, log: int, version: Version = AS_GIVEN) -> Seen:
         """Return a simulator on one log, by number, the same object again while it is kept.
@@ -202,7 +203,7 @@ class Session:
 
         Raises InputError for a parameter that the robot does not have.
         """
-        own = robot_parameters(self.robot)
+        own = nominal_values(self.robot)
         unknown = sorted(set(relative) - set(own))
         if unknown:
             raise InputError(f"refit: expected parameters of this robot, got {unknown[0]!r}")

@@ -6,20 +6,22 @@ whole band, comparable with torques of causes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.fitting import Weighting
-from axisight.gap.closed_loop import ClosedLoopFitter, Record
+from axisight.fitting import Parameter, Weighting
+from axisight.gap.closed_loop import ClosedLoopFitter, Problem, Record
 from axisight.gap.feedback import (
     controller_response,
     inertia_of_motors,
     loop_responses,
     periodic_response,
 )
+from axisight.gap.gains import as_effects, labels_of, uncertain_gains
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
@@ -38,6 +40,8 @@ Complex = NDArray[np.complex128]
 # Of the rate of the logs: what is compared lies below, where a spline between samples is a motion, and
 # noise, which gains of speed make the more of the faster it is, does not drown it.
 _BAND = 0.2
+# How often what a motion does between samples is taken from the gains that were found.
+_ROUNDS = 2
 # Samples of a segment of a density, at the rate of the logs.
 _SEGMENT = 256
 # Of the slowest frequency that a log holds, half a wave of it: what is slower is constant.
@@ -57,20 +61,28 @@ class TargetsView(View):
         std = np.maximum(position_noise_std(commanded.as_logged()), robot.position_noise_std)
         self._std_rad = std
         floor = self._floor(robot, logs, settings)
+        self._like = AS_GIVEN
         records = _records(logs, self._between_samples(logs, settings))
         fitter = TargetsFitter(
             robot, records, floor.weighting, _tolerances(robot, settings), settings.block_s
         )
+        for _ in range(_ROUNDS if fitter.gains else 0):
+            # Gains say most of what a motion does between samples.
+            self._like = Variant(fitter.fit([]).robot_values)
+            fitter.records = _records(logs, self._between_samples(logs, settings))
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+        self.not_offered = labels_of(robot, fitter.own)
 
     def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:
-        """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator as given.
+        """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator.
+
+        As given, but for uncertain gains, which are as they are found.
 
         Targets are steps, and a joint answers each of them within a sample: a spline through positions
         that were logged just before the next step knows nothing of it, and lags the motion.
         """
         of, step = self._commanded, self._commanded.step
-        positions = simulated_positions(of.robot, AS_GIVEN, logs, threads=settings.threads)
+        positions = simulated_positions(of.robot, self._like, logs, threads=settings.threads)
         return [x - of.fine(x[::step]) for x in positions]
 
     def removed_there(self, found: Search, logs: Sequence[Log]) -> float | None:
@@ -260,3 +272,24 @@ class TargetsFitter(ClosedLoopFitter):
 
     driven_by = "reference"
     compared = "position"
+
+    def __init__(
+        self,
+        robot: Robot,
+        records: list[Record],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, records, weighting, tolerances, block_s)
+        gains = uncertain_gains(robot, tolerances)
+        self.own += gains
+        self.gains = frozenset(p.name for p in gains)
+
+    def bends(self, name: str) -> bool:
+        """Whether a parameter changes what others do, by much more than masses and stiffness."""
+        return name in self.gains
+
+    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> Problem:
+        """Return the problem as the core takes it, gains as effects."""
+        return super()._problem(*as_effects(self.robot, effects, parameters))

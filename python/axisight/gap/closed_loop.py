@@ -50,7 +50,7 @@ TRACKING_SPEED = 1 / 3
 # where its run begins [rad], (n_axes,), None at the operating point, and how many samples lead to it.
 Record = tuple[Array, Array, Array, Array | None, int]
 # Robot, effects, parameters, records and weights, as the core takes them.
-_Problem = tuple[
+Problem = tuple[
     _core.Robot,
     list[EffectTuple],
     list[Spec],
@@ -304,7 +304,7 @@ class ClosedLoopFitter(ModelFitter):
             ]
         )
 
-    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> _Problem:
+    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> Problem:
         """Return the problem as the core takes it."""
         specs = [core_spec(p, effects) for p in parameters]
         return self.robot.core, core_effects(effects), specs, self.records, self.weighting.core()

@@ -8,6 +8,7 @@ from dataclasses import replace
 from axisight.effects import Effect
 from axisight.effects.stated import TORQUE_CONSTANT, TORQUE_SENSOR
 from axisight.fitting import Parameter, effect_parameter
+from axisight.gap import gains
 from axisight.robot import Robot
 
 UNKNOWN = 1.0
@@ -45,9 +46,9 @@ def for_core(
 
 
 def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with its own parameters as they were fitted, constants among them."""
+    """Return a robot with its own parameters as they were fitted, constants and gains among them."""
     axes = {constant_name(robot, axis): axis for axis in robot.axis_numbers()}
-    changed = robot.with_parameters({n: x for n, x in values.items() if n not in axes})
+    changed = gains.with_values(robot, {n: x for n, x in values.items() if n not in axes})
     found = [Effect(_QUANTITY, axes[n], {_ERROR: x}) for n, x in values.items() if n in axes]
     if not found:
         return changed

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from axisight.fitting import robot_parameters
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
+from axisight.gap.gains import nominal_values
 from axisight.gap.model import ModelFitter
 from axisight.gap.tolerances import tolerance_of
 
@@ -50,5 +50,5 @@ def bent(fitter: ModelFitter, model: Evidence) -> float:
     """
     if fitter.adds_up:
         return 0.0
-    edge = parameters_at_edge(model, robot_parameters(fitter.robot), fitter.tolerances)
+    edge = parameters_at_edge(model, nominal_values(fitter.robot), fitter.tolerances)
     return len(edge) / max(len(model.robot_values), 1)

@@ -105,6 +105,11 @@ class ModelFitter(ABC):
         """Whether a robot parameter matters to this error."""
         return bool(name)
 
+    def bends(self, name: str) -> bool:
+        """Whether a parameter of the simulator changes what others do too much to keep their sensitivities."""
+        del name
+        return False
+
     @abstractmethod
     def solve(
         self,
@@ -334,7 +339,7 @@ class ModelFitter(ABC):
             else replace(
                 p,
                 initial=min(max(begin.get(p.name, p.initial), p.lower), p.upper),
-                nuisance=not fresh,
+                nuisance=not fresh and (lazy or not self.bends(p.name)),
             )
             for p in self.own
         ]

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
-from axisight.fitting import robot_parameters
 from axisight.gap import own_simulator
 from axisight.gap.begun import from_rest
 from axisight.gap.beyond import beyond_torque
@@ -30,6 +29,7 @@ from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
+from axisight.gap.gains import nominal_values
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
@@ -468,7 +468,7 @@ def _assemble(
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     judged = gap_figures(reach.judged)
     names = [log.name for log in held_logs]
-    nominal, tolerances = robot_parameters(robot), view.fitter.tolerances
+    nominal, tolerances = nominal_values(robot), view.fitter.tolerances
     share = bent_for(view.fitter, found)
     left = remainder_of(reach.judged, judged, reach.left, settings)
     removed = view.removed_there(found, held_logs) if conclusion.causes else None

@@ -35,7 +35,7 @@ def simulated_torques(
 def simulated_positions(
     robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
 ) -> list[Array]:
-    """Return the same of the motor positions (n, n_axes) [rad]."""
+    """Return the same of the motor positions (n, n_axes) [rad]; the variant may change gains."""
     changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
 

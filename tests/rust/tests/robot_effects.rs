@@ -45,6 +45,17 @@ fn effects_and_tolerances_are_read() {
 }
 
 #[test]
+fn gains_have_a_tolerance_where_they_are_those_of_targets() {
+    let servo = second("[tolerances]\nkp = 0.5\nmass = 0.1\n")
+        .replacen("kind = \"pi_velocity\"", "kind = \"pd_position\"", 1)
+        .replacen("ki = [", "kd = [", 1);
+    let stated = [("mass".to_owned(), 0.1), ("kp".to_owned(), 0.5)];
+    assert_eq!(robot(&servo).tolerances, stated);
+    let message = refusal("[tolerances]\nkp = 0.5");
+    assert!(message.contains("unknown key `tolerances.kp`"), "{message}");
+}
+
+#[test]
 fn version_one_has_no_effects() {
     assert!(robot(PRESET).effects.is_empty());
     let error = read_robot(&format!("{PRESET}\n{FRICTION}")).map_err(|e| e.to_string());

@@ -3,10 +3,10 @@
 use super::document::{Entry, Section};
 use super::error::RobotError;
 use crate::effects::{Acts, EFFECTS, EffectInfo, Scope};
-use crate::robot::description::Bound;
+use crate::robot::description::{Bound, Controller};
 use crate::robot::{EffectSetting, Place, RobotDescription};
 
-/// Quantities that may have a tolerance.
+/// Quantities that may have a tolerance; gains those of a controller of targets.
 const TOLERATED: [&str; 6] = [
     "mass",
     "inertia_scale",
@@ -15,6 +15,7 @@ const TOLERATED: [&str; 6] = [
     "motor_inertia",
     "viscous_friction",
 ];
+const TOLERATED_GAINS: [&str; 2] = ["kp", "kd"];
 
 pub(super) fn read_effects(
     root: &Section,
@@ -144,13 +145,20 @@ fn read_parameters(section: &Section, info: &EffectInfo) -> Result<Vec<f64>, Rob
     Ok(out)
 }
 
-pub(super) fn read_tolerances(root: &Section) -> Result<Vec<(String, f64)>, RobotError> {
+pub(super) fn read_tolerances(
+    root: &Section,
+    robot: &RobotDescription,
+) -> Result<Vec<(String, f64)>, RobotError> {
     let Some(entry) = root.find("tolerances") else {
         return Ok(Vec::new());
     };
     let section = entry.section()?;
-    section.only(&TOLERATED)?;
-    let stated = TOLERATED.iter().filter(|name| section.find(name).is_some());
+    let mut tolerated = TOLERATED.to_vec();
+    if matches!(robot.controller, Controller::PdPosition { .. }) {
+        tolerated.extend(TOLERATED_GAINS);
+    }
+    section.only(&tolerated)?;
+    let stated = tolerated.iter().filter(|name| section.find(name).is_some());
     stated
         .map(|name| {
             Ok((

@@ -94,7 +94,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
     robot.position_noise_std = read_noise(&root)?;
     robot.operating_point = read_operating_point(&root, n_axes)?;
     robot.effects = read_effects(&root, &robot)?;
-    robot.tolerances = read_tolerances(&root)?;
+    robot.tolerances = read_tolerances(&root, &robot)?;
     Ok(robot)
 }
 
