@@ -119,6 +119,11 @@ def test_a_load_is_named_beside_constants_that_nobody_knows(tmp_path: Path):
     assert mass.low < 0.8 < mass.high
     for axis in (1, 2):
         within(found, robot, axis, CONSTANTS[axis - 1])
+    # Masses and constants do much the same: never certain.
+    assert found.verdict == "undecidable"
+    assert found.equivalent == (("payload", "torque_constant@1", "torque_constant@2"),)
+    assert found.causes[0].probability <= 0.5
+    assert "State the torque constants" in found.next_experiment
 
 
 def test_friction_everywhere_on_six_axes():

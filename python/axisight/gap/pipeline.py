@@ -37,6 +37,7 @@ from axisight.gap.intervals import with_own_scatter
 from axisight.gap.misfit import with_balanced_values
 from axisight.gap.modes import view_of
 from axisight.gap.motion_errors import motion_errors, velocity_from
+from axisight.gap.open_constants import open_with_constants
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
@@ -129,7 +130,12 @@ def diagnose(
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
-    said = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
+    told = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
+    unknown = [one.axis for one in inputs.nominal]
+
+    def said(one: Search) -> Conclusion:
+        return open_with_constants(told(one), unknown)
+
     seen = _seen(view, held_logs, found, said, chosen)
     out = _assemble(
         name or found_name, machine, view, held_logs, seen, error_logs, chosen, inputs.noted
@@ -575,7 +581,7 @@ def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | N
 def _relative(robot: Robot, model: Evidence, name: str) -> Interval:
     """Return the relative change of a re-fitted parameter with its 95 % interval."""
     error = nominal_error(robot, name)
-    nominal = robot_parameters(robot)[name] if error is None else error
+    nominal = nominal_values(robot)[name] if error is None else error
     size = (abs(nominal) or 1.0) if error is None else 1.0 + error
     change = (model.robot_values[name] - nominal) / size
     spread = 1.96 * model.std.get((None, name), 0.0) / size
