@@ -20,7 +20,6 @@ from axisight import Diagnosis, Effect, Log, Robot, diagnose, load_robot, simula
 from axisight.blind import Share
 from axisight.blind.drawing import scattered
 from axisight.blind.motions import MOTIONS
-from axisight.effects import effect_info
 from axisight.gap.result import DetectionLimit
 from axisight.gap.twins import twins_of
 
@@ -82,12 +81,10 @@ def machine_of(rng: np.random.Generator, arm: str, motions: str) -> Machine:
 
 
 def at(limit: DetectionLimit, factor: float) -> Effect:
-    """Return the effect of a limit in so many times its size, shapes as usual."""
-    info = effect_info(limit.effect)
-    values = {p.name: p.typical if p.role == "shape" else p.neutral for p in info.parameters}
+    """Return the effect of a limit in so many times its size."""
     size = factor * float(limit.value or 0.0)
     axis = None if limit.axes else limit.axis
-    return Effect(limit.effect, axis, {**values, limit.parameter: size}, limit.axes)
+    return Effect(limit.effect, axis, {**limit.others, limit.parameter: size}, limit.axes)
 
 
 def alike(effect: Effect, n_axes: int) -> set[str]:

@@ -44,6 +44,7 @@ def test_every_effect_that_may_be_nothing_has_a_limit_at_every_place(nothing, li
     assert len(limits) == len(nothing.detection_limits)
     for limit in limits.values():
         info = {p.name: p for p in effect_info(limit.effect).parameters}
+        assert {limit.parameter, *limit.others} == set(info)
         assert info[limit.parameter].role == "amplitude"
         assert limit.unit == info[limit.parameter].unit
         assert limit.value is None or limit.value > 0

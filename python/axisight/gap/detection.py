@@ -87,6 +87,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     effect = s.option.effect
     place = effect.first_axis
     info = next(p for p in effect_info(effect.name).parameters if p.name == s.parameter)
+    others = {n: x for n, x in (effect.parameters or {}).items() if n != s.parameter}
     largest = max(abs(info.lower), abs(info.upper))
 
     def missing(log_size: float) -> float:
@@ -98,7 +99,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         at_most = low - float(np.log1p(missing(low)))
     if at_most > high and missing(high) < 0.0:
         # Larger than the effect can be: these logs do not show it at all.
-        return DetectionLimit(effect.name, place, s.parameter, None, info.unit, effect.axes)
+        return DetectionLimit(effect.name, place, s.parameter, None, info.unit, effect.axes, others)
     at_most = min(at_most, high)
     if at_most > low:
         bounded = missing(at_most) > _PRECISION
@@ -106,7 +107,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     size = max(float(np.exp(low)), tolerated)
     softens = (effect.name, s.parameter) == STIFFER
     value = _of_a_stiffer_gear(size) if softens else size
-    return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes)
+    return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes, others)
 
 
 def _of_a_stiffer_gear(softer: float) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -244,8 +245,9 @@ class Candidate:
 class DetectionLimit:
     """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
 
-    ``parameter`` is the first amplitude, the others nothing, shapes as usual; ``value`` in ``unit``,
-    None where no size that the effect may have would show. ``axis`` from 1, None for the arm.
+    ``parameter`` is the first amplitude that no plainer law has; ``others`` are what the other parameters
+    are then. ``value`` in ``unit``, None where no size that the effect may have would show. ``axis``
+    from 1, None for the arm.
     """
 
     effect: str
@@ -254,6 +256,7 @@ class DetectionLimit:
     value: float | None
     unit: str
     axes: tuple[int, int] | None = None
+    others: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -477,7 +480,7 @@ def _place(item: Cause | Candidate | DetectionLimit) -> dict[str, Any]:
 
 def _limit(limit: DetectionLimit) -> dict[str, Any]:
     rest = {name: getattr(limit, name) for name in ("parameter", "value", "unit")}
-    return {"effect": limit.effect, **_place(limit), **rest}
+    return {"effect": limit.effect, **_place(limit), **rest, "others": dict(limit.others)}
 
 
 def _interval(interval: Interval) -> dict[str, Any]:
