@@ -38,7 +38,9 @@ fn at_work(info: &EffectInfo) -> Vec<f64> {
         // Orders of harmonics that are switched off; different ones.
         Role::Shape if p.neutral <= p.lower && p.name.starts_with("order") => 2.0 + i as f64 / 3.0,
         // Between its bounds.
-        Role::Shape if ["damped", "relaxation_s", "arm_share"].contains(&p.name) => p.typical,
+        Role::Shape if ["damped", "relaxation_s", "arm_share", "sharpness"].contains(&p.name) => {
+            p.typical
+        }
         Role::Shape => p.neutral,
     };
     info.parameters.iter().enumerate().map(value).collect()
