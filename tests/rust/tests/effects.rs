@@ -28,6 +28,15 @@ fn neutral(info: &EffectInfo) -> Vec<f64> {
     info.parameters.iter().map(|p| p.neutral).collect()
 }
 
+/// Shapes that are taken between their bounds, and off the corner of a strain of none.
+const BETWEEN: [&str; 5] = [
+    "damped",
+    "relaxation_s",
+    "arm_share",
+    "sharpness",
+    "strain_at_rest",
+];
+
 /// The effect at work: amplitudes well off neutral, every term on.
 fn at_work(info: &EffectInfo) -> Vec<f64> {
     let value = |(i, p): (usize, &axisight_core::effects::ParameterInfo)| match p.role {
@@ -37,10 +46,7 @@ fn at_work(info: &EffectInfo) -> Vec<f64> {
         Role::Amplitude => p.neutral + 0.7 * p.typical,
         // Orders of harmonics that are switched off; different ones.
         Role::Shape if p.neutral <= p.lower && p.name.starts_with("order") => 2.0 + i as f64 / 3.0,
-        // Between its bounds.
-        Role::Shape if ["damped", "relaxation_s", "arm_share", "sharpness"].contains(&p.name) => {
-            p.typical
-        }
+        Role::Shape if BETWEEN.contains(&p.name) => p.typical,
         Role::Shape => p.neutral,
     };
     info.parameters.iter().enumerate().map(value).collect()
