@@ -241,9 +241,12 @@ def test_the_column_map_says_that_nobody_knows(tmp_path: Path):
     assert "a current whose torque constant nobody knows" in said
     assert "flagged: torque_constant_unknown" in said
     # Others need torques.
-    for command in (("explore", path, *logs, "--check"), ("identify", "rigid-body", path, *logs)):
+    torques = ("simulate", path, logs[0], "--torque", "--out", tmp_path / "out.parquet")
+    others = ("explore", path, *logs), ("identify", "rigid-body", path, *logs), torques
+    for command in others:
         status, said = run(*command, "--columns", columns)
         assert status != 0
+        assert "only a diagnosis" in said or "expected torques, got currents" in said, said
     case = 'schema = "axisight.case/1"\nname = "c"\nrobot = "arm.urdf"\n' + "".join(
         f'[[log]]\nfile = "run{k}.parquet"\nrole = "estimation"\n' for k in (0, 1)
     )

@@ -131,6 +131,37 @@ torque = {name = "state.s.tau.1", unit = "Nm"}
         read_log(path)
 
 
+def nested(k: int) -> dict[str, Any]:
+    """Return the state with its names inside, each second message the other way round."""
+    inside = {"name": NAMES, **{key: flat(k)[key] for key in FIELDS}}
+    turned = {key: values[::-1] for key, values in inside.items()}
+    return {"header": flat(k)["header"], "state": turned if k % 2 else inside}
+
+
+def test_names_inside_an_object_are_those_of_its_arrays(tmp_path: Path):
+    arrays = load_arrays(written_json(tmp_path / "run.mcap", {"/arm": messages(nested)}))
+    for axis, name in enumerate(NAMES):
+        np.testing.assert_array_equal(
+            np.asarray(arrays[f"arm.state.effort.{name}"]), EFFORT[:, axis]
+        )
+    assert "arm.state.effort.0" not in arrays
+
+
+def test_names_that_are_not_different_are_refused(tmp_path: Path, robot: Robot):
+    rows = [(time, {**flat(k), "name": ["elbow", "elbow"]}) for k, time in enumerate(TIME)]
+    path = written_json(tmp_path / "run.mcap", {"/arm": rows})
+    columns = parse_column_map(
+        """[time]
+name = "arm.time_s"
+[[axis]]
+position = {name = "arm.position.elbow", unit = "rad"}
+torque = {name = "arm.effort.elbow", unit = "Nm"}
+"""
+    )
+    with pytest.raises(LogError, match="expected names that differ, got 'elbow' twice"):
+        read_log(path, columns)
+
+
 def without(key: str) -> dict[str, Any]:
     return {name: value for name, value in flat(7).items() if name != key}
 
@@ -178,7 +209,12 @@ def test_what_is_wrong_elsewhere_does_no_harm(tmp_path: Path, robot: Robot):
     deep: Any = 1.0
     for _ in range(30):
         deep = {"in": deep}
-    picture = [(0.0, {"data": "x" * 2**21}), (0.1, deep)]
+    picture = [
+        (0.0, {"exposure": 1.0}),
+        (0.1, {"data": "x" * 2**21}),
+        (0.2, deep),
+        (0.3, {"exposure": 2.0}),
+    ]
     path = written_json(
         tmp_path / "run.mcap", {"/arm": messages(), "/other": other, "/camera": picture}
     )

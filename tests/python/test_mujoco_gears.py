@@ -200,8 +200,32 @@ def test_misuse_is_named():
     for spring, said in (("leg", "'leg'"), ("arm", "'arm'")):
         with pytest.raises(InputError, match=f"gears: arm: expected a hinge.*got {said}"):
             apply(model, data, [], ["arm"], gears={"arm": spring})
+    with pytest.raises(InputError, match=r"none of the axes', .*got 'gear of arm'"):
+        apply(model, data, [], ["arm", "gear of arm"], gears=GEARS)
     with pytest.raises(InputError, match="with stiffness, got 'arm' with 0"):
         apply(model, data, [], ["gear of arm"], gears={"gear of arm": "arm"})
+
+
+ELSEWHERE = """<mujoco><worldbody><body><joint name="arm" axis="0 0 1"/>
+<geom size="0.1" mass="1"/>{inside}<body pos="0.3 0 0">{outside}<geom size="0.1" mass="1"/></body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside"),
+    [
+        ("", '<joint name="spring" axis="0 0 1" stiffness="1e3"/>'),
+        ('<joint name="spring" axis="0 1 0" stiffness="1e3"/>', ""),
+        ('<joint name="spring" axis="0 0 1" pos="0 0.1 0" stiffness="1e3"/>', ""),
+    ],
+    ids=["another body", "another axis", "another line"],
+)
+def test_a_spring_elsewhere_is_none_of_the_gear(inside: str, outside: str):
+    model = mujoco.MjModel.from_xml_string(ELSEWHERE.format(inside=inside, outside=outside))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with pytest.raises(InputError, match="got 'spring', which is elsewhere"):
+        apply(model, data, [], gears={"arm": "spring"})
 
 
 def test_what_cannot_be_remembered_is_said():

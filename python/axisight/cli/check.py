@@ -67,7 +67,13 @@ def _fits(
     load = partial(load_simulator, options=options)
     try:
         robot, (log,) = read_beside(
-            model, [alone.path], columns, load, bare=options.load, max_bytes=max_bytes
+            model,
+            [alone.path],
+            columns,
+            load,
+            bare=options.load,
+            max_bytes=max_bytes,
+            currents=True,
         )
     except LogError as error:
         say(f"refused: {error}")

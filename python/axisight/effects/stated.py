@@ -173,6 +173,12 @@ ONE_FORMULA = frozenset(
 )
 """What weight, inertia and constant errors of torque are: whoever writes them, the formula is the same."""
 
+OF_ITS_AXIS = frozenset({"motor_inertia", "gravity_compensation"})
+"""Of these, what changes the torque of its own axis alone."""
+
+OF_POSES = frozenset({"joint_zero_offset", "link_geometry", "base_tilt"})
+"""Of these, what changes where the arm is, before its axis and behind."""
+
 LOOP_LIKE = ("current_loop", "input_delay")
 """A second-order lag, and what it is like where it is well damped."""
 

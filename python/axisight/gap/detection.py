@@ -104,9 +104,10 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     if at_most > low:
         bounded = missing(at_most) > _PRECISION
         low = scipy.optimize.brentq(missing, low, at_most, xtol=_PRECISION) if bounded else at_most
-    size = max(float(np.exp(low)), tolerated)
+    size = float(np.exp(low))
     softens = (effect.name, s.parameter) == STIFFER
-    value = _of_a_stiffer_gear(size) if softens else size
+    shown = _of_a_stiffer_gear(size) if softens else size
+    value = None if shown is None else max(shown, tolerated)
     return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes, others)
 
 

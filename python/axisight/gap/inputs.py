@@ -69,7 +69,10 @@ def read_inputs(
     read = _read(
         paths, model, validation, columns, (load, bare), untrusted, max_bytes, runs=used.runs
     )
-    sims = [read_log(p, columns, robot=read.robot, max_bytes=max_bytes) for p in simulated]
+    sims = [
+        read_log(p, columns, robot=read.robot, max_bytes=max_bytes, currents=True)
+        for p in simulated
+    ]
     read = replace(read, simulated=tuple(sims))
     return read if used.whole else _used(read, used)
 
@@ -96,14 +99,17 @@ def read_beside(
     *,
     bare: Callable[..., Robot] = load_robot,
     max_bytes: int | None = None,
+    currents: bool = False,
 ) -> tuple[Robot, list[Log]]:
     """Return the robot of a file or preset, which ``load`` makes of it, and logs of it, read by ``bare``'s.
 
-    ``columns`` and ``max_bytes`` as in `read_log`. Raises LogError for a log that is none of this robot.
+    ``columns``, ``max_bytes`` and ``currents`` as in `read_log`. Raises LogError for a log that is none of this robot.
     """
     # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
     robot = bare(model) if is_model_file(model) else load(model)
-    logs = [read_log(p, columns, robot=robot, max_bytes=max_bytes, currents=True) for p in paths]
+    logs = [
+        read_log(p, columns, robot=robot, max_bytes=max_bytes, currents=currents) for p in paths
+    ]
     return _loaded(load, model, logs) if is_model_file(model) else robot, logs
 
 
@@ -149,7 +155,7 @@ def _read(
             "--model: expected a robot.toml, a URDF, an MJCF or a preset when logs are given, got nothing"
         )
     robot, read = read_beside(
-        model, [*paths, *validation], columns, load, bare=bare, max_bytes=max_bytes
+        model, [*paths, *validation], columns, load, bare=bare, max_bytes=max_bytes, currents=True
     )
     logs, held = read[: len(paths)], read[len(paths) :]
     if not held:

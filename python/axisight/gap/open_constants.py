@@ -6,7 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from axisight.effects import Effect
-from axisight.effects.stated import CONSTANT, ONE_FORMULA, TORQUE_CONSTANT
+from axisight.effects.stated import (
+    CONSTANT,
+    OF_ITS_AXIS,
+    OF_POSES,
+    ONE_FORMULA,
+    TORQUE_CONSTANT,
+)
+from axisight.gap.named import NamedCause
 from axisight.gap.verdict import Conclusion
 
 # Torques of gravity and inertia.
@@ -22,18 +29,30 @@ def open_with_constants(conclusion: Conclusion, axes: Sequence[int]) -> Conclusi
 
     ``axes`` (from 1) of these. *Undecidable* instead of *explained*, each such cause open against the constants.
     """
-    scaled = {c.label for c in conclusion.causes if c.effect in _SCALED}
-    if not axes or not scaled or conclusion.verdict not in ("explained", "undecidable"):
+    like = {c.label: found for c in conclusion.causes if (found := _constants_like(c, axes))}
+    if not like or conclusion.verdict not in ("explained", "undecidable"):
         return conclusion
-    constants = tuple(Effect(TORQUE_CONSTANT[0], axis).label for axis in axes)
     causes = tuple(
-        replace(c, probability=0.5 * c.probability) if c.label in scaled else c
+        replace(c, probability=0.5 * c.probability) if c.label in like else c
         for c in conclusion.causes
     )
     return replace(
         conclusion,
         verdict="undecidable",
         causes=causes,
-        equivalent=(*conclusion.equivalent, *((label, *constants) for label in sorted(scaled))),
-        next_experiment=_ADVICE,
+        equivalent=(*conclusion.equivalent, *((label, *like[label]) for label in sorted(like))),
+        next_experiment=" ".join(filter(None, (_ADVICE, conclusion.next_experiment))),
     )
+
+
+def _constants_like(cause: NamedCause, axes: Sequence[int]) -> tuple[str, ...]:
+    """Return the labels of the constants, of ``axes``, whose torques a cause changes."""
+    if cause.effect not in _SCALED:
+        return ()
+    felt = list(axes)
+    if cause.axis is not None and cause.effect in OF_ITS_AXIS:
+        felt = [axis for axis in axes if axis == cause.axis]
+    elif cause.axis is not None and cause.effect not in OF_POSES:
+        # A link weighs on what carries it.
+        felt = [axis for axis in axes if axis <= cause.axis]
+    return tuple(Effect(TORQUE_CONSTANT[0], axis).label for axis in felt)

@@ -147,7 +147,10 @@ def diagnose(
         experiment = separating_experiment_of(view, seen.found)
         progress("designing an experiment", 1, 1)
         if experiment is not None:
-            out = replace(out, experiment=experiment, next_experiment=str(experiment))
+            # What constants leave open no experiment decides.
+            kept = out.next_experiment if unknown and out.verdict == "undecidable" else None
+            advice = " ".join(filter(None, (kept, str(experiment))))
+            out = replace(out, experiment=experiment, next_experiment=advice)
     if signals:
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))

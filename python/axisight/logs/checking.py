@@ -60,7 +60,10 @@ class LogReport:
 
     @property
     def ok(self) -> bool:
-        """True when there is no error, so that `read_log` reads the file; warnings may remain."""
+        """True when there is no error, so that `read_log` reads the file; warnings may remain.
+
+        With the robot and the `currents` that it needs.
+        """
         return not any(finding.severity == "error" for finding in self.findings)
 
 

@@ -55,6 +55,11 @@ class Topics:
         key = (label, frozenset([*names, *walk.found]))
         self._series.setdefault(key, _Series()).add(_stamp_ns(message, received_ns), row)
 
+    def drop(self, topic: str) -> None:
+        """Forget what messages of a topic said."""
+        label = topic.strip("/").replace("/", ".")
+        self._series = {key: one for key, one in self._series.items() if key[0] != label}
+
     def readers(self) -> dict[str, Reader]:
         """Return what reads the columns of all series; of a topic those of other joints are ``topic#2``."""
         out: dict[str, Reader] = {}
@@ -169,10 +174,22 @@ class _Walk:
                     place = "" if key == _JOINTS and not depth else f"{label}."
                     yield from self._objects(place, value, depth)
             elif _fields(value) and depth < _DEEPEST:
-                yield from self.numbers(value, f"{label}.", depth + 1)
+                yield from self._nested(value, f"{label}.", depth + 1)
+
+    def _nested(self, value: Any, prefix: str, depth: int) -> Iterator[tuple[str, _Value]]:
+        """Yield the numbers of an object, by its own names of joints where it has them."""
+        names = _names(value)
+        if not names:
+            yield from self.numbers(value, prefix, depth)
+            return
+        self.found += names
+        yield from _Walk(names, numbered=False).numbers(value, prefix, depth)
 
     def _array(self, key: str, label: str, values: Sequence[float]) -> Iterable[tuple[str, _Value]]:
         names = self.names
+        if names and key in _OF_JOINTS and len(set(names)) < len(names):
+            why = _doubled(names)
+            return ((f"{label}.{name}", why) for name in dict.fromkeys(names))
         if len(values) == len(names):
             return ((f"{label}.{n}", _number(v)) for n, v in zip(names, values, strict=True))
         if names and values and key in _OF_JOINTS:
@@ -187,14 +204,21 @@ class _Walk:
     ) -> Iterator[tuple[str, _Value]]:
         """Yield the numbers of objects that each have a name of their own: ``place.field.NAME``."""
         names = [_fields(one).get("name") for one in values]
-        if not all(isinstance(name, str) for name in names) or len(set(names)) != len(names):
+        if not all(isinstance(name, str) for name in names):
             return
+        why = _doubled([str(name) for name in names]) if len(set(names)) < len(names) else None
         for one, name in zip(values, names, strict=True):
             assert isinstance(name, str)
             self.found.append(name)
             inside = _Walk((), numbered=False)
             for said, number in inside.numbers(one, place, depth + 1):
-                yield f"{said}.{name}", number
+                yield f"{said}.{name}", number if why is None else why
+
+
+def _doubled(names: Sequence[str]) -> str:
+    """Return what is wrong with names that are not all different."""
+    twice = next(name for k, name in enumerate(names) if name in names[:k])
+    return f"expected names that differ, got {short(twice)!r} twice"
 
 
 def _number(value: Any) -> _Value:

@@ -50,8 +50,10 @@ def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]
             if channel.id not in decoders:
                 decoders[channel.id] = _decoder(schema, channel)
             decode = decoders[channel.id]
-            if len(message.data) > _LONGEST_BYTES:
+            if len(message.data) > _LONGEST_BYTES and not isinstance(decode, str):
                 decode = f"it has messages of more than {_LONGEST_BYTES} bytes"
+                decoders[channel.id] = decode
+                topics.drop(channel.topic)
             if isinstance(decode, str):
                 names = left_out.setdefault(decode, [])
                 if channel.topic not in names:

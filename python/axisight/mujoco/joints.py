@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import InputError
+
+# Of numbers of a model file, of the size of one.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,14 @@ def axes_of(
         raise InputError("joints: expected at least one hinge or slide joint, got none")
     if not np.any(data.crb):
         raise InputError("data: expected positions that were computed (mj_forward), got none")
-    springs = {}
+    springs: dict[int, tuple[int, int]] = {}
+    taken = set(found)
     for motor, spring in gears.items():
         if single.get(motor) not in found:
             named = ", ".join(model.joint(i).name for i in found)
             raise InputError(f"gears: expected joints of axes, {named}, got {motor!r}")
-        joint = _spring(model, single, motor, spring)
+        joint = _spring(model, single, motor, spring, taken)
+        taken.add(joint)
         springs[found.index(single[motor])] = _place(model, joint)
     return Axes(model.jnt_qposadr[found].astype(int), model.jnt_dofadr[found].astype(int), springs)
 
@@ -62,19 +67,30 @@ def springs_of(model: Any, axes: Axes) -> tuple[tuple[int, float, float], ...]:
     )
 
 
-def _spring(model: Any, single: Mapping[str, int], motor: str, name: str) -> int:
-    """Return the joint that is the spring of a gear."""
+def _spring(
+    model: Any, single: Mapping[str, int], motor: str, name: str, taken: Collection[int]
+) -> int:
+    """Return the joint that is the spring of a gear, none of those ``taken``."""
     joint = single.get(name)
     like = "hinge or slide joint that is none of the axes', on the axis of the motor and with stiffness"
-    if joint is None or joint == single[motor]:
+    if joint is None or joint in taken:
         raise InputError(f"gears: {motor}: expected a {like}, got {name!r}")
     if model.jnt_type[joint] != model.jnt_type[single[motor]]:
         raise InputError(f"gears: {motor}: expected a {like}, got {name!r}, of another kind")
+    if not _coaxial(model, joint, single[motor]):
+        raise InputError(f"gears: {motor}: expected a {like}, got {name!r}, which is elsewhere")
     if not model.jnt_stiffness[joint] > 0:
         raise InputError(
             f"gears: {motor}: expected a {like}, got {name!r} with {model.jnt_stiffness[joint]:g}"
         )
     return joint
+
+
+def _coaxial(model: Any, one: int, other: int) -> bool:
+    """Whether two joints are of one body and about one line."""
+    same_body = model.jnt_bodyid[one] == model.jnt_bodyid[other]
+    mine, its = (np.concatenate([model.jnt_axis[k], model.jnt_pos[k]]) for k in (one, other))
+    return bool(same_body and np.abs(mine - its).max() < _SAME)
 
 
 def _place(model: Any, joint: int) -> tuple[int, int]:
