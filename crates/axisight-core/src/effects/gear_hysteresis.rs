@@ -76,6 +76,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
 /// Deflections that elements slip at, as shares of their mean, about it: evenly from nought, if most sudden.
 const APART: [f64; 4] = [-0.6, -0.2, 0.2, 0.6];
 
+/// Share of Dahl's way back that a strain takes beyond its yield.
+const SLOWLY: f64 = 0.1;
+
+/// What is above zero.
+fn over<S: Scalar>(x: S) -> S {
+    x.if_positive(x, S::zero())
+}
+
 struct Hysteresis<S> {
     share: S,
     deflection: S,
@@ -120,11 +128,16 @@ impl<S: Scalar> Kernel<S> for Hysteresis<S> {
     fn gear_rates(&self, spring: &Spring<'_, S>, rates: &mut [S]) {
         for ((change, out), apart) in spring.internal.iter().zip(rates).zip(APART) {
             let z = *change + self.strain_at_rest;
-            // Beyond its yield a step too long for the corner brings it: from there it is Dahl's way back.
+            // No strain is beyond its yield but by a step too long for the corner: from there it comes back slowly,
+            // however long the step.
+            let beyond = over(z - 1.0) - over(-z - 1.0);
+            let z = beyond.fma(S::constant(SLOWLY - 1.0), z);
             let short = z.square().square() - 1.0;
             let sudden = short.if_positive(S::zero(), short) * self.sharpness + 1.0;
             let straight = self.sharpness * 0.5;
-            let slip = (spring.rate.abs() * z * (-straight + 1.0) + spring.rate * z.abs() * straight) * sudden;
+            let slip = (spring.rate.abs() * z * (-straight + 1.0)
+                + spring.rate * z.abs() * straight)
+                * sudden;
             *out = (spring.rate - slip) / self.slips_at(apart);
         }
     }
