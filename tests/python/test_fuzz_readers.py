@@ -1,5 +1,7 @@
 """Damage of any kind, seeded: no reader is killed, hangs, swells, or raises what is not the package's."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -93,6 +95,28 @@ def test_damaged_recordings(tmp_path, kind):
                 data = file.read_bytes()
                 data = mutated(data, rng) if file == spoiled else data
                 (paths[-1] / file.name).write_bytes(data)
+    sound(read_in_child(paths, STATES, seconds=10, limit=3 * 10**9))
+
+
+@pytest.mark.parametrize("kind", ["json", "protobuf"])
+def test_damaged_recordings_of_others(tmp_path, kind):
+    """The file, and of JSON the text of a message in a sound file."""
+    data = pytest.importorskip("mcap_data", reason="needs axisight[mcap]")
+    rng, path = np.random.default_rng(12), tmp_path / "good.mcap"
+    times = np.arange(120) / 100.0
+    if kind == "protobuf":
+        flat = data.protobuf_types()["Flat"]
+        rows = [(t, flat(name=["a"], position=[np.sin(t)], effort=[1.0])) for t in times]
+        paths = batch(tmp_path, data.written_protobuf(path, "/joint_states", rows), rng)
+    else:
+        rows = [(t, {"name": ["a"], "position": [np.sin(t)], "effort": [1.0]}) for t in times]
+        paths = batch(tmp_path, data.written_json(path, {"/joint_states": rows}), rng)
+        for number in range(TIMES // 4):
+            text = mutated(json.dumps(rows[5][1]).encode(), rng)
+            spoiled = [*rows[:5], (times[5], text), *rows[6:]]
+            paths.append(
+                data.written_json(tmp_path / f"text{number}.mcap", {"/joint_states": spoiled})
+            )
     sound(read_in_child(paths, STATES, seconds=10, limit=3 * 10**9))
 
 
