@@ -200,7 +200,9 @@ def test_diagnosis_beside_the_page_can_be_stopped_and_run(case, found):
         seen.click("run the diagnosis")
         expect(page.get_by_text(re.compile(r"^running: .*: \d+ of \d+"))).to_be_visible()
         seen.click("stop")
-        expect(page.get_by_text("stopped: stopped; nothing was kept")).to_be_visible()
+        # A fit ends its step first, which takes long where others have the processors.
+        stopped = page.get_by_text("stopped: stopped; nothing was kept")
+        expect(stopped).to_be_visible(timeout=120_000)
         seen.click("run the diagnosis")
         expect(page.locator("p.said")).to_contain_text(found.headline, timeout=400_000)
         assert seen.wrong == []
