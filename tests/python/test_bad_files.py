@@ -125,7 +125,7 @@ def test_every_file_is_in_the_table():
 @pytest.mark.parametrize(("reader", "name"), EVERY, ids=[f"{r}-{n}" for r, n in EVERY])
 def test_it_is_refused_by_name(tmp_path, reader, name):
     if name.endswith(".xml"):
-        pytest.importorskip("mujoco")
+        pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
     kind, files = SAID[reader]
     (source,) = (p for p in (BAD / reader).iterdir() if named(p) == name)
     copy = tmp_path / reader / source.name

@@ -16,8 +16,8 @@ import tomlkit
 from axisight import diagnose, load_robot
 from axisight.cli.demo import write_demo_case
 
-pytest.importorskip("panel")
-pytest.importorskip("playwright")
+pytest.importorskip("panel", reason="Panel comes with the extra `explore`")
+pytest.importorskip("playwright", reason="Playwright comes with the extra `test`")
 
 from playwright.sync_api import expect
 

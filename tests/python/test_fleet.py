@@ -141,7 +141,7 @@ def test_the_command_writes_table_and_page(fleet, tmp_path, verdicts):
 
 
 def test_a_cluster_gives_the_same_bits_though_a_worker_dies(fleet, verdicts, tmp_path):
-    pytest.importorskip("distributed")
+    pytest.importorskip("distributed", reason="Dask comes with the extra `dask`")
     with dask_cluster(tmp_path) as (address, _, workers):
 
         def sabotage(_label, done, _total):

@@ -89,7 +89,7 @@ TEXTS = {
 def test_damaged_texts(tmp_path, name):
     reader, file, text = TEXTS[name]
     if name == "mjcf":
-        pytest.importorskip("mujoco")
+        pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
     good = tmp_path / file
     good.write_text(text)
     rng = np.random.default_rng([21, list(TEXTS).index(name)])
