@@ -199,7 +199,7 @@ BEYOND = {
     "force of a joint": (
         'name="elbow"',
         'name="elbow" actuatorfrcrange="-5 5"',
-        "joint 'elbow': limits of the force of its actuators left out",
+        "joint 'elbow': limits of the force of its actuators left out: no actuator acts on it",
     ),
     "second motor": (
         MOTOR,
@@ -219,8 +219,33 @@ BEYOND = {
     ),
     "force of a motor": (
         MOTOR,
-        '<motor joint="shoulder" name="m" forcerange="-1 1"/>',
-        "actuator 'm': limits of its force left out",
+        '<motor joint="shoulder" name="m" forcerange="-1 2"/>',
+        "actuator 'm': limits of its force left out: expected the same both ways",
+    ),
+    "force of a joint one way": (
+        'name="shoulder"',
+        'name="shoulder" actuatorfrcrange="-5 6"',
+        "joint 'shoulder': limits of the force of its actuators left out: expected the same both ways",
+    ),
+    "force behind a lag": (
+        MOTOR,
+        '<general joint="shoulder" name="m" dyntype="filterexact" dynprm="0.01" forcerange="-1 1"/>',
+        "actuator 'm': limits of its force left out: they act behind its lag",
+    ),
+    "one that is told speeds": (
+        MOTOR,
+        '<velocity joint="shoulder" name="m" kv="7"/>',
+        "actuator 'm' is told speeds: its law, 7 Nm s/rad times the error of speed, is left out",
+    ),
+    "one that sums speeds up": (
+        MOTOR,
+        '<intvelocity joint="shoulder" name="m" kp="9" actrange="-1 1"/>',
+        "actuator 'm' is told speeds, which it sums up to its target: position_ref of logs is its activation",
+    ),
+    "how far it sums up": (
+        MOTOR,
+        '<intvelocity joint="shoulder" name="m" kp="9" actrange="-1 1"/>',
+        "actuator 'm': limits of its target left out",
     ),
     "stiffness": (
         'stiffness="3"',

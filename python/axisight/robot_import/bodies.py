@@ -80,7 +80,9 @@ class Drive:
     ``spring_rest_rad``; ``servo`` of an actuator that is told positions, its gains of position [Nm/rad] and
     speed [Nm s/rad], motor side; ``gain`` is a motor's torque per command, ``limit_nm`` the largest,
     ``delay_s`` and ``lag_s`` by which torque is late; ``effort`` [Nm] the limit of the joint, 0 where none is
-    said; ``of_actuators`` is how much of rotor inertia and damping the file has on actuators.
+    said; ``of_actuators`` is how much of rotor inertia and damping the file has on actuators; ``force_limits``
+    [Nm] of its only actuator, before the gear, and of the joint, not a number where they are not alike both
+    ways; ``speed_gain`` [Nm s/rad] of an actuator that is told speeds, motor side.
     """
 
     gear_ratio: float = 1.0
@@ -96,6 +98,8 @@ class Drive:
     lag_s: float = 0.0
     effort: float = 0.0
     of_actuators: tuple[float, float] = (0.0, 0.0)
+    force_limits: tuple[float, float] = (math.inf, math.inf)
+    speed_gain: float | None = None
 
 
 @dataclass(frozen=True)

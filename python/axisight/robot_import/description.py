@@ -60,7 +60,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
                     JOINT_SPRING[2]: spring * joint.body.drive.spring_rest_rad,
                 }
             )
-        effects += _torque_path(joint.body.drive, number)
+        effects += _torque_path(joint.body.drive, number, ratio)
         if dry > 0:
             effects.append(
                 {
@@ -87,13 +87,12 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         document["tolerances"] = drives.tolerances
     if effects:
         document["effect"] = effects
-    servos = [joint.body.joint for joint in chain.joints if joint.body.drive.servo is not None]
     head = [
         f"imported from {source}",
         *chain.notes,
         *by_class,
         *_constants(chain, drives),
-        *_defaults(tables, drives, controller, servos),
+        *_defaults(chain, tables, drives, controller),
     ]
     return "".join(f"# {_line(note)}\n" for note in head) + tomlkit.dumps(document)
 
@@ -102,46 +101,52 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
     """Return the controller of the drive data, else that of actuators which are all told positions."""
     if drives.controller is not None:
         return drives.controller
-    servos = [joint.body.drive.servo for joint in chain.joints]
-    gains = [servo for servo in servos if servo is not None]
-    if len(gains) < len(servos):
+    said = [joint.body.drive for joint in chain.joints]
+    servos = [(drive, drive.servo) for drive in said if drive.servo is not None]
+    if len(servos) < len(said):
         return None
-    return {
+    # Gains are of the file's motors, by the square of the ratio of those that are taken.
+    given = [drives.joint.get(joint.body.joint, JointDrive()) for joint in chain.joints]
+    by = [
+        (_ratio(joint, drive) / joint.body.drive.gear_ratio) ** 2
+        for joint, drive in zip(chain.joints, given, strict=True)
+    ]
+    out = {
         "kind": "pd_position",
-        "kp": [kp for kp, _ in gains],
-        "kd": [kd for _, kd in gains],
+        "kp": [kp * other for (_, (kp, _)), other in zip(servos, by, strict=True)],
+        "kd": [kd * other for (_, (_, kd)), other in zip(servos, by, strict=True)],
         "velocity_feedforward": False,
         "continuous": True,
-        **_steps(chain),
     }
+    if chain.steps is not None:
+        added = [
+            chain.steps.added_inertia(kd, drive.damping * drive.gear_ratio**2) * other
+            for (drive, (_, kd)), other in zip(servos, by, strict=True)
+        ]
+        out |= {"step": chain.steps.step_s, "step_inertia": added}
+    return out
 
 
-def _steps(chain: Chain) -> dict[str, Any]:
-    """Return what the steps of the simulator make of its actuators; nothing of one that has none."""
-    if chain.steps is None:
-        return {}
-    drives = [joint.body.drive for joint in chain.joints]
-    added = [
-        chain.steps.added_inertia(drive.servo[1], drive.damping * drive.gear_ratio**2)
-        for drive in drives
-        if drive.servo is not None
-    ]
-    return {"step": chain.steps.step_s, "step_inertia": added}
+def _ratio(joint: ChainJoint, drive: JointDrive) -> float:
+    """Return the gear ratio of a joint: that of its drive data, else the file's."""
+    return joint.body.drive.gear_ratio if drive.gear_ratio is None else drive.gear_ratio
 
 
 def _defaults(
+    chain: Chain,
     tables: list[dict[str, Any]],
     drives: DriveData,
     controller: dict[str, Any] | None,
-    servos: list[str],
 ) -> list[str]:
     """Return what was taken where neither the model file nor the drive data say anything."""
     out = []
+    servos = [joint.body.joint for joint in chain.joints if joint.body.drive.servo is not None]
     if all(table["drive"]["gear_ratio"] == 1.0 for table in tables):
         out.append("no gear ratios: angles and torques of motors are those of the joints")
     if all(table["drive"]["motor_inertia"] == 0.0 for table in tables):
         out.append("no rotors: motors have no inertia")
     if controller is None:
+        out += _told_speeds(chain)
         if servos:
             out.append(
                 f"actuators of {', '.join(servos)} are told positions, those of other joints are not: left out, "
@@ -151,6 +156,19 @@ def _defaults(
     elif drives.controller is None:
         out.append("controller: actuators that are told positions")
     return out
+
+
+def _told_speeds(chain: Chain) -> list[str]:
+    """Return what becomes of actuators that are told speeds, whose law no controller is."""
+    gains = [(joint.body.joint, joint.body.drive.speed_gain) for joint in chain.joints]
+    said = [f"{name} {gain:g}" for name, gain in gains if gain is not None]
+    if not said:
+        return []
+    return [
+        f"actuators that are told speeds ({', '.join(said)} Nm s/rad): no controller of a robot file holds "
+        f"between samples and lets an arm sink as they do; log their force as torque, or say p_velocity in the "
+        f"drive data, which is sampled and holds the arm where it begins"
+    ]
 
 
 def torque_constants(chain: Chain, drives: DriveData) -> list[float | None]:
@@ -178,7 +196,7 @@ def _line(text: str) -> str:
 def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dict[str, Any], float]:
     """Return the table of a joint and its gear ratio."""
     said = joint.body.drive
-    ratio = said.gear_ratio if drive.gear_ratio is None else drive.gear_ratio
+    ratio = _ratio(joint, drive)
     rotor = said.rotor_inertia * ratio**2 if drive.motor_inertia is None else drive.motor_inertia
     viscous = said.damping * ratio**2
     if drive.viscous_friction is not None:
@@ -208,10 +226,14 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
     return table, ratio
 
 
-def _torque_path(drive: Drive, axis: int) -> list[dict[str, Any]]:
-    """Return what a motor makes of its command: a limit, a delay, a lag, a gain other than one."""
+def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
+    """Return what a motor makes of its command: a limit, a delay, a lag, a gain other than one.
+
+    ``ratio``: of the gear that is taken, which another one than the file's makes other torques of a motor.
+    """
+    limit = drive.limit_nm * abs(ratio / drive.gear_ratio)
     values = {
-        TORQUE_LIMIT: drive.limit_nm if np.isfinite(drive.limit_nm) else 0.0,
+        TORQUE_LIMIT: limit if np.isfinite(limit) else 0.0,
         TRANSPORT_DELAY: drive.delay_s,
         LAG: drive.lag_s,
         TORQUE_CONSTANT: drive.gain - 1,

@@ -161,6 +161,8 @@ class _Compiled:
                 actuators.servos().get(j),
                 *actuators.torque_path(j),
                 of_actuators=(rotor, damper),
+                force_limits=actuators.force_limits(j),
+                speed_gain=actuators.speed_gains().get(j),
             )
         else:
             drive = Drive()

@@ -29,7 +29,7 @@ def notes_of(model: Any, name: Named) -> list[str]:
                 f"joint {name('joint', j)!r} has {len(own)} motors, {_listed(name, 'actuator', own)}: their gears, "
                 f"gains, limits, delays and lags left out, its torque is taken as one"
             )
-    out += _of_joints(model, name) + _of_bodies(model, name)
+    out += _of_joints(actuators, name) + _of_bodies(model, name)
     counts = {
         "equality constraints": model.neq,
         "tendons": model.ntendon,
@@ -49,37 +49,81 @@ def _of_actuator(actuators: Actuators, i: int) -> list[str]:
     if actuators.joint[i] < 0:
         kind = _TRANSMISSIONS.get(int(model.actuator_trntype[i]), "several axes")
         return [f" acts on {kind}, not on one joint: left out"]
-    out = []
     is_servo = int(actuators.joint[i]) in actuators.servos()
-    if not (actuators.is_motor(i) or is_servo):
-        out.append(
-            " is no plain motor: its gain and bias are the controller's, to be said in the drive data"
-        )
-    if actuators.limited[i] and (is_servo or not actuators.limited_both_ways[i]):
+    out = _of_law(actuators, i, is_servo=is_servo)
+    command = actuators.command_limit[i]
+    if command != np.inf and (np.isnan(command) or not actuators.is_motor(i)):
         out.append(
             ": limits of its command left out: expected those of a torque, the same both ways"
         )
-    if model.actuator_forcelimited[i]:
-        out.append(": limits of its force left out")
+    force = actuators.force_limit[i]
+    if force != np.inf and (why := _limits_out(actuators, i, force)):
+        out.append(f": limits of its force left out{why}")
     if np.any(numbers(model, "actuator_dampingpoly", np.zeros((actuators.n, 1)))[i]):
         out.append(": damping beyond the linear left out")
     return out
 
 
-def _of_joints(model: Any, name: Named) -> list[str]:
+def _of_law(actuators: Actuators, i: int, *, is_servo: bool) -> list[str]:
+    """Return what of the law of an actuator is left out, or to be known of it."""
+    if is_servo and actuators.sums_up(i):
+        out = [
+            " is told speeds, which it sums up to its target: position_ref of logs is its activation (act), "
+            "at the simulator's step"
+        ]
+        return out + [": limits of its target left out"] * bool(
+            actuators.model.actuator_actlimited[i]
+        )
+    if actuators.is_speed_servo(i) and actuators.drives_alone(i):
+        out = [
+            f" is told speeds: its law, {actuators.gain[i]:g} Nm s/rad times the error of speed, is left out"
+        ]
+        return out + [": its delay left out"] * bool(actuators.delay[i] > 0)
+    if actuators.is_motor(i) or is_servo:
+        return []
+    return [
+        " is no plain motor: its gain and bias are the controller's, to be said in the drive data"
+    ]
+
+
+def _limits_out(actuators: Actuators, i: int, limit: float) -> str:
+    """Return why limits of the force of an actuator are left out, or of its joint; nothing where they are not."""
+    if np.isnan(limit):
+        return ": expected the same both ways"
+    if not actuators.drives_alone(i):
+        return ": expected those of the only motor or servo of a joint"
+    if actuators.is_motor(i) and actuators.lag[i] > 0:
+        return ": they act behind its lag"
+    return ""
+
+
+def _limits_of_joint(actuators: Actuators, j: int) -> str:
+    """Return why limits of what acts on a joint are left out; nothing where they are not."""
+    own = np.flatnonzero(actuators.joint == j).tolist()
+    if not own:
+        return ": no actuator acts on it"
+    if np.isnan(actuators.joint_limit[j]) or (len(own) == 1 and actuators.drives_alone(own[0])):
+        return _limits_out(actuators, own[0], actuators.joint_limit[j])
+    return ""
+
+
+def _of_joints(actuators: Actuators, name: Named) -> list[str]:
     """Return what of joints is left out."""
-    out = []
+    out, model = [], actuators.model
     none = np.zeros((model.njnt, 1))
     springs = numbers(model, "jnt_stiffnesspoly", none)
     yields = numbers(model, "jnt_springyield", none[:, 0])
     dampers = numbers(model, "dof_dampingpoly", np.zeros((model.nv, 1)))
     for j in range(model.njnt):
         what = {
-            "limits of the force of its actuators": model.jnt_actfrclimited[j],
             "stiffness beyond the linear": np.any(springs[j]),
             "damping beyond the linear": np.any(dampers[model.jnt_dofadr[j]]),
             "yielding of its spring": yields[j] > 0,
         }
+        if model.jnt_actfrclimited[j] and (why := _limits_of_joint(actuators, j)):
+            out.append(
+                f"joint {name('joint', j)!r}: limits of the force of its actuators left out{why}"
+            )
         out += [
             f"joint {name('joint', j)!r}: {one} left out" for one, there in what.items() if there
         ]

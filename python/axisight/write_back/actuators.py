@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
 from axisight.robot_import.mjcf_actuators import is_gain
 from axisight.robot_import.xml_tree import Element
+from axisight.write_back.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.servos import SERVO, SERVO_EFFECTS, delayed, write_servo
+from axisight.write_back.servos import SERVO_EFFECTS, SERVOS, delayed, write_servo
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
@@ -46,8 +48,17 @@ _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbe
 DRIVE_EFFECTS = frozenset((*_ATTRIBUTES, *SERVO_EFFECTS))
 
 
-def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]) -> Placed:
+def write_drive(
+    edits: Edits,
+    root: Element,
+    joint: tuple[str, Element | None],
+    causes: Sequence[Cause],
+    limits: Limits | None,
+) -> Placed:
     """Write what causes of one joint make of its actuator; ``gear`` stays, which is the gear's.
+
+    ``joint``: its name and where it stands, None in another file; ``limits``: what is limited of it, None
+    where no cause changes that.
 
     MuJoCo delays a command, limits it, lets it lag and takes the gain, as a torque path does.
     A <motor> has no gain and no lag: it becomes the <general> that it is short for, whatever defaults a file
@@ -55,11 +66,15 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     """
     placed = Placed()
     holders = [e for e in root.walk() if e.tag == "actuator"]
-    mine = [e for h in holders for e in h.children if joint in map(e.attributes.get, _JOINTS)]
-    if len(mine) == 1 and mine[0].tag == SERVO:
-        return write_servo(edits, mine[0], causes, _step_s(root))
+    mine = [e for h in holders for e in h.children if joint[0] in map(e.attributes.get, _JOINTS)]
+    beyond = [cause for cause in causes if cause.effect in LIMIT_EFFECTS]
+    if beyond and limits is not None and (why := _cannot_limit(limits, joint[1])):
+        placed.refuse(beyond, why)
+        causes = [cause for cause in causes if cause not in beyond]
+    if len(mine) == 1 and mine[0].tag in SERVOS:
+        return placed.joined(write_servo(edits, (mine[0], joint[1]), causes, _step_s(root), limits))
     stated = [cause for cause in causes if cause.effect not in _ATTRIBUTES]
-    placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
+    placed.refuse(stated, f"expected a <{SERVOS[0]}> of the joint, whose gains the file says")
     causes = [cause for cause in causes if cause.effect in _ATTRIBUTES]
     if not causes:
         return placed
@@ -73,6 +88,13 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     for cause in causes:
         name, attributes = _ATTRIBUTES[cause.effect]
         made |= attributes(cause.parameters[name].value, _step_s(root))
+        if cause.effect == TORQUE_LIMIT[0] and limits is not None:
+            made |= _limit(limits.of_actuator(cause.parameters[name].value), 0.0)
+    if limits is not None:
+        behind, of_joint = limits.set_by(causes, servo=False)
+        made |= behind
+        if of_joint and joint[1] is not None:
+            edits.set(joint[1], of_joint)
     kind = ""
     if made.keys() & {"gainprm", "dyntype"}:
         kind = "general"
@@ -81,6 +103,15 @@ def write_drive(edits: Edits, root: Element, joint: str, causes: Sequence[Cause]
     edits.set(mine[0], made, said(causes), tag=kind)
     placed.take(causes)
     return placed
+
+
+def _cannot_limit(limits: Limits, joint: Element | None) -> str:
+    """Return why a limit cannot be written; nothing where it can."""
+    if not limits.alike:
+        return "expected limits of force in the file that are the same both ways"
+    if joint is None and math.isfinite(limits.drive.force_limits[1]):
+        return "the joint, which limits the force of its actuators, stands in another file"
+    return ""
 
 
 def _step_s(root: Element) -> float:

@@ -13,6 +13,7 @@ from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
+from axisight.robot_import.bodies import Drive
 from axisight.robot_import.drives import DriveData
 from axisight.robot_import.load import bodies_and_chain, drive_data
 from axisight.robot_import.xml_tree import Element, parse_xml
@@ -20,6 +21,7 @@ from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
 from axisight.write_back.frames import FRAME_EFFECTS, write_frames
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
+from axisight.write_back.limits import LIMIT_EFFECTS, limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
 from axisight.write_back.placed import Placed
 from axisight.write_back.xml_edits import Edits
@@ -145,31 +147,41 @@ def _on_axes(
     holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
     joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
     out = []
-    shares = _of_actuators(source, causes) if root.tag == "mujoco" else {}
+    known = _drives_of(source, causes) if root.tag == "mujoco" else {}
     for axis, name in enumerate(robot.axis_names):
         mine = [cause for cause in causes if not cause.axes and cause.axis == axis + 1]
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
             out.append(
-                write_joint(edits, root, joints[name], robot, axis, numbers, shares.get(name, {}))
+                write_joint(
+                    edits, root, joints[name], robot, axis, numbers, _of_actuators(known.get(name))
+                )
             )
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         if drives and root.tag == "mujoco":
-            out.append(write_drive(edits, root, name, drives))
+            limited = name in known and any(c.effect in LIMIT_EFFECTS for c in drives)
+            limits = limits_of(known[name], robot, axis) if limited else None
+            out.append(write_drive(edits, root, (name, joints.get(name)), drives, limits))
     return out
 
 
-def _of_actuators(source: _Source, causes: Sequence[Cause]) -> dict[str, dict[str, float]]:
-    """Return how much of a number of a joint an MJCF has on actuators, by joint and number."""
-    names = ("armature", "damping")
-    if not any(JOINT_NUMBERS["mujoco"].get(cause.effect) in names for cause in causes):
+# Numbers of joints that actuators have too.
+_SHARED = ("armature", "damping")
+
+
+def _drives_of(source: _Source, causes: Sequence[Cause]) -> dict[str, Drive]:
+    """Return what an MJCF has on the drive of each joint, by name; nothing where no cause needs it."""
+    shared = any(JOINT_NUMBERS["mujoco"].get(cause.effect) in _SHARED for cause in causes)
+    if not shared and not any(cause.effect in LIMIT_EFFECTS for cause in causes):
         return {}
     file, drives = source
     _, chain = bodies_and_chain(file, drives or drive_data(file))
-    return {
-        joint.body.joint: dict(zip(names, joint.body.drive.of_actuators, strict=True))
-        for joint in chain.joints
-    }
+    return {joint.body.joint: joint.body.drive for joint in chain.joints}
+
+
+def _of_actuators(drive: Drive | None) -> dict[str, float]:
+    """Return how much of a number of a joint its actuators have, by number."""
+    return {} if drive is None else dict(zip(_SHARED, drive.of_actuators, strict=True))
 
 
 def _on_chain(

@@ -23,6 +23,10 @@ class Placed:
         """Say why causes do not stand in the model."""
         self.why_not |= {cause.label: why for cause in causes}
 
+    def joined(self, other: Placed) -> Placed:
+        """Return both as one."""
+        return Placed(self.there | other.there, self.why_not | other.why_not)
+
     def take(self, causes: Sequence[Cause]) -> None:
         """Say that causes stand in the model."""
         self.there |= {cause.label for cause in causes}
