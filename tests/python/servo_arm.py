@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,14 @@ SETTLED_S = 4.0
 
 @dataclass(frozen=True)
 class ServoArm:
-    """What differs between machines: SI units, joint side; ``late_s`` of all targets."""
+    """What differs between machines: SI units, joint side; ``limit`` of torque, 0 is none; ``late_s`` of targets."""
 
     damping: tuple[float, float, float] = (3.0, 2.0, 0.6)
     dry_friction: tuple[float, float, float] = (0.0, 0.0, 0.0)
     armature: tuple[float, float, float] = (0.8, 0.6, 0.15)
     kp: tuple[float, float, float] = (1800.0, 1800.0, 500.0)
     kd: tuple[float, float, float] = (120.0, 110.0, 25.0)
+    limit: tuple[float, float, float] = (0.0, 0.0, 0.0)
     load_kg: float = 0.0
     late_s: float = 0.0
     step_s: float = 5e-4
@@ -58,11 +60,14 @@ class ServoArm:
                 f'frictionloss="{self.dry_friction[i]}" armature="{self.armature[i]}"/>'
             )
 
+        def force(limit: float) -> str:
+            return f' forcerange="{-limit} {limit}"' if limit else ""
+
         load = ""
         if self.load_kg:
             load = f'<body pos="0.05 0 0.35"><geom size="0.05" mass="{self.load_kg}"/></body>'
         servos = "\n".join(
-            f'    <position joint="j{i + 1}" kp="{self.kp[i]}" kv="{self.kd[i]}"/>'
+            f'    <position joint="j{i + 1}" kp="{self.kp[i]}" kv="{self.kd[i]}"{force(self.limit[i])}/>'
             for i in range(3)
         )
         return f"""<mujoco model="servo arm">
@@ -95,22 +100,9 @@ class ServoArm:
         """Return targets and positions of one run, from where the arm has settled; speeds where they have noise."""
         import mujoco  # noqa: PLC0415 - an extra
 
-        model = mujoco.MjModel.from_xml_string(self.mjcf())
-        data = mujoco.MjData(model)
         wanted = targets(run, home_rad, self.rate_hz)
-        data.qpos[:] = home_rad
-        data.ctrl[:] = wanted[0]
-        mujoco.mj_step(model, data, round(SETTLED_S / self.step_s))
-        steps, late = round(1 / self.rate_hz / self.step_s), round(self.late_s / self.step_s)
-        told = np.concatenate(
-            [np.repeat(wanted[:1], late, axis=0), np.repeat(wanted, steps, axis=0)]
-        )
-        position, speed = np.empty_like(wanted), np.empty_like(wanted)
-        for k in range(len(wanted)):
-            position[k], speed[k] = data.qpos, data.qvel
-            for target in told[k * steps : (k + 1) * steps]:
-                data.ctrl[:] = target
-                mujoco.mj_step(model, data)
+        model = mujoco.MjModel.from_xml_string(self.mjcf())
+        position, speed = moved(model, wanted, self.rate_hz, self.late_s)
         noise = np.random.default_rng(1000 + run).normal(size=position.shape)
         own = np.random.default_rng(2000 + run).normal(size=position.shape)
         return Log(
@@ -123,6 +115,24 @@ class ServoArm:
             velocity_rad_s=None if speed_noise_rad_s is None else speed + speed_noise_rad_s * own,
             source=Path(f"run{run}.parquet"),
         )
+
+
+def moved(model: Any, wanted: Array, rate_hz: float, late_s: float = 0.0) -> tuple[Array, Array]:
+    """Return angles and speeds (n, 3) of a MuJoCo model that is told targets (n, 3), from where it has settled."""
+    import mujoco  # noqa: PLC0415 - an extra
+
+    data, step_s = mujoco.MjData(model), model.opt.timestep
+    data.qpos[:] = data.ctrl[:] = wanted[0]
+    mujoco.mj_step(model, data, round(SETTLED_S / step_s))
+    steps, late = round(1 / rate_hz / step_s), round(late_s / step_s)
+    told = np.concatenate([np.repeat(wanted[:1], late, axis=0), np.repeat(wanted, steps, axis=0)])
+    position, speed = np.empty_like(wanted), np.empty_like(wanted)
+    for k in range(len(wanted)):
+        position[k], speed[k] = data.qpos, data.qvel
+        for target in told[k * steps : (k + 1) * steps]:
+            data.ctrl[:] = target
+            mujoco.mj_step(model, data)
+    return position, speed
 
 
 def targets(run: int, home_rad: Array = HOME_RAD, rate_hz: float = RATE_HZ) -> Array:

@@ -1,10 +1,11 @@
-"""What a verdict promises holds in MuJoCo: machines, models and figures of benches/write_back.py."""
+"""What a verdict promises holds in MuJoCo: machines and figures of benches/write_back.py and write_back_targets.py."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 
@@ -29,3 +30,21 @@ def test_the_gap_in_mujoco_is_the_promised_one(
     text = out.made.path.read_text()
     assert "<!-- as drawn -->" in text
     assert "axis='0 1 0'" in text
+
+
+def test_gains_that_were_fitted_are_the_machines_in_mujoco(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Off by up to a factor of two, dry friction beside: MuJoCo runs the written model under held-out targets."""
+    monkeypatch.syspath_prepend(repository / "benches")
+    bench = import_module("write_back_targets")
+    out = bench.outcome("gains and friction", tmp_path)
+    assert out.made.left_out == ()
+    assert set(out.made.placed) == {
+        "coulomb_friction@2",
+        *(f"j{i}.{gain}" for i in (1, 2, 3) for gain in ("kp", "kd")),
+    }
+    # The law is the same and its steps are in the model: what is left is noise, and corners of friction.
+    np.testing.assert_allclose(out.run[0], out.promised[0], rtol=0.02)
+    assert np.all(out.run[1] < 1.25 * out.promised[1])
+    assert np.all(out.promised[1] < 0.02 * out.promised[0])

@@ -49,6 +49,7 @@ from axisight.gap.tolerances import GAINS, with_tolerances
 from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
+from axisight.write_back.refitted import refitted_gains
 
 # How files end that an output may replace unasked: what the command makes anew.
 _RESULTS = {
@@ -139,7 +140,8 @@ def diagnose_command(
     write_model: Annotated[
         Path | None,
         typer.Option(
-            help="Write the simulator with its causes here: a robot file (.toml), or a URDF or MJCF as the "
+            help="Write the simulator with its causes, and with gains of targets that were re-fitted, here: a "
+            "robot file (.toml), or a URDF or MJCF as the "
             "one that was diagnosed."
         ),
     ] = None,
@@ -295,7 +297,7 @@ def _write_model(
     found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
 ) -> None:
     """Write the simulator with its causes, and say which of them it has no place for."""
-    if not found.causes:
+    if not found.causes and not refitted_gains(inputs.robot, found.refit):
         say("no model was written: no cause was named")
         return
     made = axisight.write_back.write_model(
@@ -303,6 +305,7 @@ def _write_model(
         inputs.robot,
         found.causes,
         target,
+        refit=found.refit,
         overwrite=force,
         drives=options.drives(inputs.robot_source) if options.given() else None,
     )

@@ -47,6 +47,8 @@ _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
     "motor_inertia": (("drive", "motor_inertia"), "kg m^2"),
     "viscous_friction": (("drive", "viscous_friction"), "Nm s/rad"),
 }
+# Gains, which are no parameters of a robot; others have none by these names.
+_GAINS = {"kp": "Nm/rad", "kd": "Nm s/rad"}
 _MARK = "# identified: "
 _HEADER = "# identified by axisight"
 
@@ -163,6 +165,13 @@ def _changes(
             text = _note(name, value, error, unit, before.get(name))
             notes.setdefault(effect_key, []).append(text)
             continue
+        gain = _gain_place(robot, name)
+        if gain is not None:
+            gain_key, unit = gain
+            changes[gain_key] = float(value)
+            old = float(at(document, gain_key))
+            notes.setdefault(gain_key, []).append(_note(name, value, error, unit, old))
+            continue
         joint, quantity = _place(robot, document, name)
         base: Key = ("joint", joint)
         if quantity == "inertia_scale":
@@ -187,9 +196,21 @@ def _changes(
         changes[full] = float(value)
         notes.setdefault(full, []).append(_note(name, value, error, unit, old))
         _refuse(name, quantity, float(value), rigid="stiffness" not in document["joint"][joint])
-    for place in {int(key[1]) for key in changes}:
+    for place in {int(key[1]) for key in changes if key[0] == "joint"}:
         _refuse_inertia(document, changes, place)
     return changes, notes
+
+
+def _gain_place(robot: Robot, name: str) -> tuple[Key, str] | None:
+    """Return place and unit of a gain of targets by its name (``j1.kp``); None of anything else."""
+    joint, _, gain = name.rpartition(".")
+    known = gain in _GAINS and "kd" in robot.controller_gains and joint in robot.axis_names
+    if not known:
+        return None
+    place: Key = ("controller", gain, robot.axis_names.index(joint))
+    if robot.computed_torque:
+        return place, {"kp": "1/s^2", "kd": "1/s"}[gain]
+    return place, _GAINS[gain]
 
 
 def _effect_places(document: dict[str, Any]) -> dict[str, tuple[Key, str]]:

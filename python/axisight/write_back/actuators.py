@@ -11,7 +11,8 @@ from axisight.robot_import.mjcf_actuators import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.servos import SERVO_EFFECTS, SERVOS, delayed, write_servo
+from axisight.write_back.refitted import Refitted
+from axisight.write_back.servos import SERVO, SERVO_EFFECTS, Servo, delayed, is_servo, write_servo
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
@@ -52,33 +53,34 @@ def write_drive(
     edits: Edits,
     root: Element,
     joint: tuple[str, Element | None],
-    causes: Sequence[Cause],
-    limits: Limits | None,
+    found: tuple[Sequence[Cause], Sequence[Refitted]],
+    limits: Limits,
 ) -> Placed:
-    """Write what causes of one joint make of its actuator; ``gear`` stays, which is the gear's.
+    """Write what was found of one joint into its actuator; ``gear`` stays, which is the gear's.
 
-    ``joint``: its name and where it stands, None in another file; ``limits``: what is limited of it, None
-    where no cause changes that.
+    ``joint``: its name and where it stands, None in another file; ``found``: causes and re-fitted gains.
 
     MuJoCo delays a command, limits it, lets it lag and takes the gain, as a torque path does.
     A <motor> has no gain and no lag: it becomes the <general> that it is short for, whatever defaults a file
     has for those.
     """
-    placed = Placed()
+    placed, (causes, refitted) = Placed(), found
     holders = [e for e in root.walk() if e.tag == "actuator"]
     mine = [e for h in holders for e in h.children if joint[0] in map(e.attributes.get, _JOINTS)]
     beyond = [cause for cause in causes if cause.effect in LIMIT_EFFECTS]
-    if beyond and limits is not None and (why := _cannot_limit(limits, joint[1])):
+    if beyond and (why := _cannot_limit(limits, joint[1])):
         placed.refuse(beyond, why)
         causes = [cause for cause in causes if cause not in beyond]
-    if len(mine) == 1 and mine[0].tag in SERVOS:
-        return placed.joined(write_servo(edits, (mine[0], joint[1]), causes, _step_s(root), limits))
+    defaults = any(e.tag in ("default", "include") for e in root.walk())
+    if len(mine) == 1 and is_servo(mine[0], limits):
+        servo = Servo(mine[0], joint[1], limits, _has_ratio_defaults(root))
+        return placed.joined(write_servo(edits, servo, causes, refitted, _step_s(root)))
+    placed.refuse(refitted, f"expected a <{SERVO}> of the joint, whose gains the file says")
     stated = [cause for cause in causes if cause.effect not in _ATTRIBUTES]
-    placed.refuse(stated, f"expected a <{SERVOS[0]}> of the joint, whose gains the file says")
+    placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
     causes = [cause for cause in causes if cause.effect in _ATTRIBUTES]
     if not causes:
         return placed
-    defaults = any(e.tag in ("default", "include") for e in root.walk())
     if len(mine) != 1 or mine[0].children or not _is_motor(mine[0], defaults):
         got = "none" if not mine else ", ".join(f"<{e.tag}>" for e in mine)
         placed.refuse(causes, f"expected one motor of the joint that has a gain, got {got}")
@@ -88,13 +90,12 @@ def write_drive(
     for cause in causes:
         name, attributes = _ATTRIBUTES[cause.effect]
         made |= attributes(cause.parameters[name].value, _step_s(root))
-        if cause.effect == TORQUE_LIMIT[0] and limits is not None:
+        if cause.effect == TORQUE_LIMIT[0]:
             made |= _limit(limits.of_actuator(cause.parameters[name].value), 0.0)
-    if limits is not None:
-        behind, of_joint = limits.set_by(causes, servo=False)
-        made |= behind
-        if of_joint and joint[1] is not None:
-            edits.set(joint[1], of_joint)
+    behind, of_joint = limits.set_by(causes, servo=False)
+    made |= behind
+    if of_joint and joint[1] is not None:
+        edits.set(joint[1], of_joint, said([c for c in causes if c.effect in LIMIT_EFFECTS]))
     kind = ""
     if made.keys() & {"gainprm", "dyntype"}:
         kind = "general"
@@ -118,6 +119,12 @@ def _step_s(root: Element) -> float:
     """Return the time step that a model states."""
     steps = [e.attributes["timestep"] for e in root.all("option") if "timestep" in e.attributes]
     return float(steps[-1]) if steps else _STEP_S
+
+
+def _has_ratio_defaults(root: Element) -> bool:
+    """Whether defaults of the file have a damping ratio, which allows no gain of speed beside it."""
+    defaults = [e for e in root.walk() if e.tag == "default"]
+    return any("dampratio" in e.attributes for d in defaults for e in d.walk())
 
 
 def _is_motor(element: Element, defaults: bool) -> bool:

@@ -55,7 +55,7 @@ class Limits:
             if cause.effect == TORQUE_CONSTANT[0]:
                 gain = 1 + cause.parameters[TORQUE_CONSTANT[1]].value
         given = self.of_actuator(limit) * gain
-        if not math.isfinite(given):
+        if not math.isfinite(given) or not any(c.effect in LIMIT_EFFECTS for c in causes):
             return {}, {}
         of_actuator, of_joint = self.drive.force_limits
         new = any(cause.effect == TORQUE_LIMIT[0] for cause in causes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from axisight import storage
@@ -21,13 +22,14 @@ from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
 from axisight.write_back.frames import FRAME_EFFECTS, write_frames
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
-from axisight.write_back.limits import LIMIT_EFFECTS, limits_of
+from axisight.write_back.limits import limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
-from axisight.write_back.placed import Placed
+from axisight.write_back.placed import Labelled, Placed
+from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.result import Cause, Interval
 
 _KINDS = (".urdf", ".xml", ".mjcf")
 
@@ -38,9 +40,9 @@ _Source = tuple[Path, DriveData | None]
 
 @dataclass(frozen=True)
 class Written:
-    """A model that was written: labels of the causes in it, and of those that it has no place for.
+    """A model that was written: labels of the causes and re-fitted gains in it, and of those that it has no place for.
 
-    ``why``: for each of the latter, by label; ``remaining``: they as effects, of which
+    ``why``: for each of the latter, by label; ``remaining``: causes among them as effects, of which
     `axisight.mujoco.apply` takes those that are torques or inside gears.
     """
 
@@ -57,6 +59,7 @@ def write_model(
     causes: Sequence[Cause],
     target: Path | str,
     *,
+    refit: Mapping[str, Interval] = MappingProxyType({}),
     overwrite: bool = False,
     drives: DriveData | None = None,
 ) -> Written:
@@ -70,7 +73,11 @@ def write_model(
         cause, value, interval and probability: dry and viscous friction of joints; masses, centres of mass and
         inertias of links, and a load on the last one; where an axis lies in its link, where the zero of a joint
         is, how the base is tilted; of an MJCF also rotors (armature), springs of joints, and gains, limits, delays
-        and lags of motors. What was re-fitted within its tolerance stays as it is.
+        and lags of motors.
+    refit
+        `Diagnosis.refit`: relative changes [1] by name. Gains of a controller of targets among them (``j1.kp``)
+        become those of the robot file, or of the actuators of an MJCF; all else that was re-fitted within its
+        tolerance stays as it is.
     overwrite
         Replace a file that exists.
     drives
@@ -79,10 +86,10 @@ def write_model(
     Raises InputError as `check_target`.
     """
     check_target(source, target, overwrite=overwrite)
-    path = Path(target)
+    path, gains = Path(target), refitted_gains(robot, refit)
     if path.suffix.lower() == ".toml":
-        return _as_robot_file(robot, causes, path, overwrite=overwrite)
-    return _as_model(Path(source), robot, causes, path, drives)
+        return _as_robot_file(robot, causes, gains, path, overwrite=overwrite)
+    return _as_model((Path(source), drives), robot, (causes, gains), path)
 
 
 def check_target(source: Path | str, target: Path | str, *, overwrite: bool = False) -> None:
@@ -103,25 +110,38 @@ def check_target(source: Path | str, target: Path | str, *, overwrite: bool = Fa
 
 
 def _as_robot_file(
-    robot: Robot, causes: Sequence[Cause], path: Path, *, overwrite: bool
+    robot: Robot,
+    causes: Sequence[Cause],
+    gains: Sequence[Refitted],
+    path: Path,
+    *,
+    overwrite: bool,
 ) -> Written:
-    effects = [cause.as_effect() for cause in causes]
-    found = identified({}, Provenance("diagnosis of the sim-to-real gap"), effects=effects)
+    found = identified(
+        {gain.label: gain.value for gain in gains},
+        Provenance("diagnosis of the sim-to-real gap"),
+        standard_errors={gain.label: gain.standard_error for gain in gains},
+        effects=[cause.as_effect() for cause in causes],
+    )
     write_identified(robot, path, found, overwrite=overwrite)
-    return Written(path, tuple(c.label for c in causes), ())
+    every: list[Labelled] = [*causes, *gains]
+    return Written(path, tuple(x.label for x in every), ())
 
 
-def _as_model(
-    source: Path, robot: Robot, causes: Sequence[Cause], path: Path, drives: DriveData | None
-) -> Written:
+# Causes, and gains that were re-fitted.
+_Found = tuple[Sequence["Cause"], Sequence[Refitted]]
+
+
+def _as_model(origin: _Source, robot: Robot, found: _Found, path: Path) -> Written:
+    source, (causes, gains) = origin[0], found
     text = source.read_bytes()
     root = parse_xml(text, str(source))
     if root.tag not in JOINT_NUMBERS:
         raise InputError(f"{source}: expected a URDF or MJCF to write back to, got <{root.tag}>")
     edits = Edits(text, str(source))
     done = [
-        *_on_axes(edits, root, (source, drives), robot, causes),
-        *_on_chain(edits, root, (source, drives), robot, causes),
+        *_on_axes(edits, root, origin, robot, found),
+        *_on_chain(edits, root, origin, robot, causes),
     ]
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
@@ -130,24 +150,30 @@ def _as_model(
     except UnicodeDecodeError:
         raise InputError(f"{source}: expected a text in UTF-8 to write back to") from None
     out = [cause for cause in causes if cause.label not in there]
+    reasons = {c.label: why.get(c.label) or _no_number(root, c.as_effect()) for c in out}
+    no_law = "the controller stands in the drive data, the file has no gains of it"
+    reasons |= {g.label: why.get(g.label, no_law) for g in gains if g.label not in there}
+    every: list[Labelled] = [*causes, *gains]
     return Written(
         path,
-        tuple(cause.label for cause in causes if cause.label in there),
-        tuple(cause.label for cause in out),
-        {c.label: why.get(c.label) or _no_number(root, c.as_effect()) for c in out},
+        tuple(x.label for x in every if x.label in there),
+        tuple(reasons),
+        reasons,
         tuple(cause.as_effect() for cause in out),
     )
 
 
 def _on_axes(
-    edits: Edits, root: Element, source: _Source, robot: Robot, causes: Sequence[Cause]
+    edits: Edits, root: Element, source: _Source, robot: Robot, found: _Found
 ) -> list[Placed]:
     """Write what belongs to joints and motors, axis by axis."""
+    causes, gains = found
     # Transmissions, actuators and constraints name joints by elements of the same name.
     holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
     joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
     out = []
-    known = _drives_of(source, causes) if root.tag == "mujoco" else {}
+    is_mjcf = root.tag == "mujoco"
+    known, own_law = _drives_of(source, found) if is_mjcf else ({}, False)
     for axis, name in enumerate(robot.axis_names):
         mine = [cause for cause in causes if not cause.axes and cause.axis == axis + 1]
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
@@ -158,10 +184,11 @@ def _on_axes(
                 )
             )
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
-        if drives and root.tag == "mujoco":
-            limited = name in known and any(c.effect in LIMIT_EFFECTS for c in drives)
-            limits = limits_of(known[name], robot, axis) if limited else None
-            out.append(write_drive(edits, root, (name, joints.get(name)), drives, limits))
+        refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
+        if (drives or refitted) and is_mjcf:
+            limits = limits_of(known[name], robot, axis)
+            joint = (name, joints.get(name))
+            out.append(write_drive(edits, root, joint, (drives, refitted), limits))
     return out
 
 
@@ -169,14 +196,19 @@ def _on_axes(
 _SHARED = ("armature", "damping")
 
 
-def _drives_of(source: _Source, causes: Sequence[Cause]) -> dict[str, Drive]:
-    """Return what an MJCF has on the drive of each joint, by name; nothing where no cause needs it."""
+def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
+    """Return what an MJCF has on the drive of each joint, by name, and whether its law is the controller's.
+
+    Nothing where what was found does not need it.
+    """
+    causes, gains = found
     shared = any(JOINT_NUMBERS["mujoco"].get(cause.effect) in _SHARED for cause in causes)
-    if not shared and not any(cause.effect in LIMIT_EFFECTS for cause in causes):
-        return {}
-    file, drives = source
-    _, chain = bodies_and_chain(file, drives or drive_data(file))
-    return {joint.body.joint: joint.body.drive for joint in chain.joints}
+    if not shared and not gains and not any(cause.effect in DRIVE_EFFECTS for cause in causes):
+        return {}, False
+    file, given = source
+    drives = given or drive_data(file)
+    _, chain = bodies_and_chain(file, drives)
+    return {joint.body.joint: joint.body.drive for joint in chain.joints}, drives.controller is None
 
 
 def _of_actuators(drive: Drive | None) -> dict[str, float]:

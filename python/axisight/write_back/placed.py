@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from axisight.effects import effect_info
 
 if TYPE_CHECKING:
     from axisight.gap.result import Cause
+
+
+class Labelled(Protocol):
+    """A cause, or a gain that was re-fitted."""
+
+    @property
+    def label(self) -> str:
+        """Its name."""
 
 
 @dataclass
@@ -19,7 +27,7 @@ class Placed:
     there: set[str] = field(default_factory=set)
     why_not: dict[str, str] = field(default_factory=dict)
 
-    def refuse(self, causes: Sequence[Cause], why: str) -> None:
+    def refuse(self, causes: Sequence[Labelled], why: str) -> None:
         """Say why causes do not stand in the model."""
         self.why_not |= {cause.label: why for cause in causes}
 
@@ -27,14 +35,14 @@ class Placed:
         """Return both as one."""
         return Placed(self.there | other.there, self.why_not | other.why_not)
 
-    def take(self, causes: Sequence[Cause]) -> None:
+    def take(self, causes: Sequence[Labelled]) -> None:
         """Say that causes stand in the model."""
         self.there |= {cause.label for cause in causes}
 
 
-def said(causes: Sequence[Cause]) -> str:
-    """Return what a comment says of causes: values with intervals, probabilities, as the diagnosis does."""
-    return "axisight: " + "; ".join(_cause(cause) for cause in causes)
+def said(causes: Sequence[Cause], more: Sequence[str] = ()) -> str:
+    """Return what a comment says: of causes values, intervals, probabilities, as the diagnosis does; and ``more``."""
+    return "axisight: " + "; ".join([*map(_cause, causes), *more])
 
 
 def _cause(cause: Cause) -> str:

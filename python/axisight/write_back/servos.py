@@ -4,24 +4,55 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
 from axisight.robot_import.xml_tree import Element
-from axisight.write_back.limits import Limits
+from axisight.write_back.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Placed, said
+from axisight.write_back.refitted import Refitted, factors
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
     from axisight.gap.result import Cause
 
-SERVOS = ("position", "intvelocity", "velocity")
-"""Tags of such actuators, and of one that is told speeds, of which only the limit is known."""
+SERVO = "position"
+"""Tag of the usual such actuator."""
+
+_TOLD_SPEEDS = "velocity"
+# What sums speeds up has a target of positions too.
+_TAGS = (SERVO, "intvelocity", _TOLD_SPEEDS)
+_GENERAL = "general"
 
 SERVO_EFFECTS = (OTHER_GAINS[0], TORQUE_CONSTANT[0], TRANSPORT_DELAY[0], TORQUE_LIMIT[0])
 """What their attributes say: ``kp`` and ``kv`` times what is found, ``delay`` of targets, ``forcerange``."""
 
 _OF_GAINS = (OTHER_GAINS[0], TORQUE_CONSTANT[0])
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The only actuator of a joint: its element and the joint's, None in another file, and its limits.
+
+    ``ratio_defaults``: the file has a damping ratio for all of them.
+    """
+
+    element: Element
+    joint: Element | None
+    limits: Limits
+    ratio_defaults: bool
+
+    @property
+    def known(self) -> Sequence[str]:
+        """Effects that it has attributes for."""
+        return (TORQUE_LIMIT[0],) if self.element.tag == _TOLD_SPEEDS else SERVO_EFFECTS
+
+
+def is_servo(element: Element, limits: Limits) -> bool:
+    """Whether an actuator, the only one of its joint, is no motor but has a target."""
+    of_general = element.tag == _GENERAL and limits.drive.servo is not None
+    return element.tag in _TAGS or of_general
 
 
 def delayed(value: float, step_s: float) -> Mapping[str, Numbers]:
@@ -33,42 +64,58 @@ def delayed(value: float, step_s: float) -> Mapping[str, Numbers]:
 
 def write_servo(
     edits: Edits,
-    elements: tuple[Element, Element | None],
+    servo: Servo,
     causes: Sequence[Cause],
+    refitted: Sequence[Refitted],
     step_s: float,
-    limits: Limits | None,
 ) -> Placed:
-    """Write what causes of one joint make of its only actuator, which has a target of positions.
-
-    ``elements``: actuator and joint; ``limits``: of the joint, where a cause changes them.
-    """
-    placed, (actuator, joint) = Placed(), elements
-    tag = f"<{actuator.tag}>"
-    known = SERVO_EFFECTS if actuator.tag != "velocity" else (TORQUE_LIMIT[0],)
-    other = [cause for cause in causes if cause.effect not in known]
-    has = "gains, a delay and a limit" if len(known) > 1 else "a limit, its law is none here"
+    """Write what causes and re-fitted gains of one joint make of its only actuator, which has a target."""
+    placed, tag = Placed(), f"<{servo.element.tag}>"
+    other = [cause for cause in causes if cause.effect not in servo.known]
+    has = "gains, a delay and a limit" if len(servo.known) > 1 else "a limit, its law is none here"
     placed.refuse(other, f"expected a motor, {tag} has {has}")
-    mine = [cause for cause in causes if cause.effect in known]
+    mine = [cause for cause in causes if cause.effect in servo.known]
     gains = [cause for cause in mine if cause.effect in _OF_GAINS]
-    if gains and ("kp" not in actuator.attributes or "dampratio" in actuator.attributes):
-        placed.refuse(gains, f"expected kp of the {tag}, and kv if any, instead of defaults")
+    found = list(refitted)
+    if (gains or found) and servo.ratio_defaults:
+        placed.refuse(
+            [*gains, *found], f"expected kv of the {tag} instead of a dampratio in defaults"
+        )
         mine = [cause for cause in mine if cause not in gains]
-        gains = []
+        gains, found = [], []
     made: dict[str, Numbers] = {}
     for late in (cause for cause in mine if cause.effect == TRANSPORT_DELAY[0]):
         made |= delayed(late.parameters[TRANSPORT_DELAY[1]].value, step_s)
-    for key, factor in zip(("kp", "kv"), _factors(gains), strict=True):
-        if gains and key in actuator.attributes:
-            made[key] = float(actuator.attributes[key]) * factor
-    if limits is not None and mine:
-        behind, of_joint = limits.set_by(mine, servo=True)
-        made |= behind
-        if of_joint and joint is not None:
-            edits.set(joint, of_joint)
-    if mine:
-        edits.set(actuator, made, said(mine))
-        placed.take(mine)
+    if gains or found:
+        made |= _gains(servo, gains, found)
+    behind, of_joint = servo.limits.set_by(mine, servo=True)
+    made |= behind
+    if of_joint and servo.joint is not None:
+        edits.set(servo.joint, of_joint, said([c for c in mine if c.effect in LIMIT_EFFECTS]))
+    if mine or found:
+        without = {"dampratio"} if "kv" in made else set()
+        comment = said(mine, [gain.words for gain in found])
+        edits.set(servo.element, made, comment, without=without)
+        placed.take([*mine, *found])
     return placed
+
+
+def _gains(
+    servo: Servo, causes: Sequence[Cause], refitted: Sequence[Refitted]
+) -> Mapping[str, Numbers]:
+    """Return the attributes of other gains; those of the file are as MuJoCo has them, defaults with them."""
+    stated = servo.limits.drive.servo
+    assert stated is not None  # of one that has a target of positions
+    by_cause, by_fit = _factors(causes), factors(refitted)
+    kp, kv = (x * a * b for x, a, b in zip(stated, by_cause, by_fit, strict=True))
+    if servo.element.tag == _GENERAL:
+        return {"gainprm": kp, "biasprm": (0.0, -kp, -kv)}
+    made: dict[str, Numbers] = {}
+    if kp != stated[0]:
+        made["kp"] = kp
+    if kv != stated[1] or "dampratio" in servo.element.attributes:
+        made["kv"] = kv
+    return made
 
 
 def _factors(causes: Sequence[Cause]) -> tuple[float, float]:

@@ -1,0 +1,71 @@
+"""Gains of a controller of targets that were re-fitted: no causes, but numbers that a model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from axisight.effects.stated import OTHER_GAINS
+from axisight.gap.gains import gains_of
+from axisight.robot import Robot
+
+if TYPE_CHECKING:
+    from axisight.gap.result import Interval
+
+# Of a normal distribution, what an interval of 95 % is to either side.
+_DEVIATIONS = 1.96
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A gain of an axis (from 1): its name (``j1.kp``), and by what share of the stated one it is another."""
+
+    label: str
+    axis: int
+    stated: float
+    change: Interval
+    of_position: bool
+
+    @property
+    def value(self) -> float:
+        """The gain that was found, motor side [Nm/rad, Nm s/rad]."""
+        return self.stated * (1 + self.change.value)
+
+    @property
+    def standard_error(self) -> float:
+        """Its standard error."""
+        return self.stated * (self.change.high - self.change.low) / (2 * _DEVIATIONS)
+
+    @property
+    def words(self) -> str:
+        """What a comment says of it."""
+        low, value, high = (1 + x for x in (self.change.low, self.change.value, self.change.high))
+        return (
+            f"{self.label}: {value:.4g} ({low:.4g} to {high:.4g}) times the stated gain, re-fitted"
+        )
+
+
+def refitted_gains(robot: Robot, refit: Mapping[str, Interval]) -> list[Refitted]:
+    """Return the gains among what was re-fitted, by name; masses and friction stay as they are."""
+    stated = robot.controller_gains
+    position = OTHER_GAINS[1][0]
+    return [
+        Refitted(
+            name,
+            gain.axis,
+            float(stated[name.rsplit(".", 1)[1]][gain.axis - 1]),
+            refit[name],
+            gain.change == position,
+        )
+        for name, gain in gains_of(robot).items()
+        if name in refit
+    ]
+
+
+def factors(gains: Sequence[Refitted]) -> tuple[float, float]:
+    """Return what gains of position and of speed are times the stated ones."""
+    out = [1.0, 1.0]
+    for gain in gains:
+        out[0 if gain.of_position else 1] *= 1 + gain.change.value
+    return out[0], out[1]
