@@ -37,7 +37,7 @@ UNKNOWN = {**DEFAULT_TOLERANCES, "kp": 0.5, "kd": 0.5}
 # By the cause that is looked for; none where gains alone differ, which are fitted.
 CASES: Mapping[str, ServoArm] = {
     **{k: MACHINES[k] for k in ("coulomb_friction@2", "input_delay", "torque_constant@2")},
-    "torque_saturation@2": NOMINAL.with_changed("limit", 2, 30.0),
+    "torque_saturation@2": NOMINAL.with_changed("limit", 2, 45.0),
     "gains": replace(NOMINAL, kp=(2700.0, 1260.0, 950.0), kd=(96.0, 176.0, 15.0)),
     "gains and friction": replace(
         MACHINES["coulomb_friction@2"], kp=(2700.0, 1260.0, 950.0), kd=(96.0, 176.0, 15.0)

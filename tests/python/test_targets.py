@@ -129,6 +129,18 @@ def test_what_a_machine_lacks_is_named(robot: Robot, lacks: str) -> None:
         assert value.value == pytest.approx(2.5, rel=0.1)
 
 
+@pytest.mark.parametrize("limit_nm", [45.0, 60.0])
+def test_a_limit_of_torque_is_named(robot: Robot, limit_nm: float) -> None:
+    """Reached in a fiftieth of the time, and in a hundredth: what is cut the positions lack."""
+    arm = NOMINAL.with_changed("limit", 2, limit_nm)
+    logs = [arm.log(run) for run in (1, 2, 3)]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    assert found.verdict == "explained"
+    assert [c.label for c in found.causes] == ["torque_saturation@2"]
+    # Half a percent is the noise of an encoder times the gain of position, 0.36 Nm.
+    assert found.causes[0].parameters["limit_nm"].value == pytest.approx(limit_nm, abs=0.36)
+
+
 def test_nothing_is_named_where_nothing_lacks(robot: Robot) -> None:
     logs = [NOMINAL.log(run) for run in (1, 2, 3)]
     found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])

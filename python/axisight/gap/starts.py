@@ -284,10 +284,24 @@ def _axis_share(at: Situation, index: int) -> float:
 
 # Limits that are looked at, as shares of the largest torque.
 _LIMITS = np.geomspace(0.05, 0.98, 40)
+# Share of the time that a law may command more, of positions that lag behind by it.
+_BEYOND = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
 
 def _limit(trial: Trial) -> FreeEffect:
-    """Begin at the limit beyond which the torque explains most of the residual."""
+    """Begin at the limit beyond which the torque explains most of the residual: a command makes up for what is cut."""
+    return _limit_by(trial, -1.0)
+
+
+def _limit_of_targets(trial: Trial) -> FreeEffect:
+    """Begin likewise where positions are compared: what is cut they lack, and commands wind up beyond it."""
+    found = _limit_by(trial, 1.0)
+    levels = np.quantile(np.abs(np.concatenate(trial.torque())), 1 - np.array(_BEYOND))
+    return replace(found, starts=tuple({"limit_nm": float(level)} for level in levels))
+
+
+def _limit_by(trial: Trial, sign: float) -> FreeEffect:
+    """Begin at the limit beyond which the torque, times ``sign``, goes with most of the residual."""
     torques = trial.torque()
     limits = _LIMITS * max(float(np.abs(torque).max()) for torque in torques)
     along, power = np.zeros(len(limits)), np.zeros(len(limits))
@@ -301,8 +315,7 @@ def _limit(trial: Trial) -> FreeEffect:
         seen = passed(beyond, response)
         along += seen @ log.residual
         power += np.sum(seen**2, axis=1)
-    # What the limit takes away the residual lacks.
-    gain = np.maximum(-along, 0.0) ** 2 / np.maximum(power, 1e-300)
+    gain = np.maximum(sign * along, 0.0) ** 2 / np.maximum(power, 1e-300)
     return FreeEffect(trial.effect({"limit_nm": float(limits[np.argmax(gain)])}), ("limit_nm",))
 
 
@@ -560,5 +573,6 @@ TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {
     "presliding_friction": lambda _trial: None,
     # No logged torque tells a controller: a fit has to.
     "controller_gain": _gain_of_position,
+    "torque_saturation": _limit_of_targets,
 }
 """Of those that begin otherwise where positions are compared under the same targets."""
