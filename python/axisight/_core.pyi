@@ -296,7 +296,7 @@ class Robot:
     @property
     def controller_kind(
         self,
-    ) -> Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]:
+    ) -> Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "cascade_position", "none"]:
         """Kind of controller."""
     @property
     def controller_gains(self) -> dict[str, _Array]:

@@ -198,6 +198,9 @@ impl Robot {
             Controller::PdPosition {
                 feeds_speed: false,
                 ..
+            } | Controller::Cascade {
+                told_positions: Some(false),
+                ..
             }
         )
     }
@@ -230,10 +233,14 @@ impl Robot {
     fn with_velocity_feedforward(&self, on: bool) -> PyResult<Self> {
         let mut out = self.clone();
         match &mut out.description.controller {
-            Controller::PdPosition { feeds_speed, .. } => *feeds_speed = on,
+            Controller::PdPosition { feeds_speed, .. }
+            | Controller::Cascade {
+                told_positions: Some(feeds_speed),
+                ..
+            } => *feeds_speed = on,
             _ => {
                 return Err(input_error(format!(
-                    "controller: expected kind pd_position, got {}",
+                    "controller: expected kind pd_position or cascade_position, got {}",
                     self.controller_kind()
                 )));
             }
@@ -359,7 +366,11 @@ impl Robot {
         match self.description.controller {
             Controller::PiVelocity { .. } => "pi_velocity",
             Controller::PVelocity { .. } => "p_velocity",
-            Controller::Cascade { .. } => "cascade",
+            Controller::Cascade {
+                told_positions: None,
+                ..
+            } => "cascade",
+            Controller::Cascade { .. } => "cascade_position",
             Controller::PdPosition { .. } => "pd_position",
             Controller::None => "none",
         }
@@ -375,7 +386,7 @@ impl Robot {
                 set("ki", ki)?;
             }
             Controller::PVelocity { kp } => set("kp", kp)?,
-            Controller::Cascade { kv, kp, ki } => {
+            Controller::Cascade { kv, kp, ki, .. } => {
                 set("kv", kv)?;
                 set("kp", kp)?;
                 set("ki", ki)?;

@@ -292,9 +292,7 @@ def fit(
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
     """Whether a simulation can run as the logs did: a controller of speed, and references to all of them."""
-    return robot.controller_kind not in ("none", "pd_position") and all(
-        log.velocity_ref_rad_s is not None for log in logs
-    )
+    return robot.told_speeds and all(log.velocity_ref_rad_s is not None for log in logs)
 
 
 def records(

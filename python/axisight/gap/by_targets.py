@@ -20,6 +20,7 @@ from axisight.gap.feedback import (
     inertia_of_motors,
     loop_responses,
     periodic_response,
+    told_gain,
 )
 from axisight.gap.gains import as_effects, labels_of, uncertain_gains
 from axisight.gap.noise import Floor, position_noise_std, torque_density
@@ -130,8 +131,7 @@ class TargetsView(View):
     def _gains(self, frequency_hz: Array) -> Array:
         """Return how the controller answers an error of position, (n_axes, n_freq) [Nm/rad]."""
         f = np.maximum(frequency_hz, frequency_hz[1])
-        response = controller_response(self._commanded.robot, f)
-        return np.asarray(np.abs(np.einsum("fii->if", response)))
+        return told_gain(self._commanded.robot, f)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the answer of the loop's position to an effect (n_freq,)."""
@@ -183,7 +183,7 @@ class TargetsView(View):
 
     def _as_torque(self, passed_rad: Array) -> Array:
         """Return an error at the rate of the logs (n, n_axes) [rad] as torque, at the controller's."""
-        return self._commanded.of_error(self._commanded.fine(passed_rad))
+        return self._commanded.told_as(self._commanded.fine(passed_rad))
 
     def position_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
         """Return what is compared of the noise of the sensors, at the samples of every log [rad]."""
@@ -244,7 +244,10 @@ def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
 
 def _stiffness(robot: Robot) -> Array:
     """Return the torque of each motor for its own error of angle (n_axes,) [Nm/rad], at the operating point."""
-    gain = np.asarray(robot.controller_gains["kp"])
+    gains = robot.controller_gains
+    gain = np.asarray(gains["kp"])
+    if "kv" in gains:
+        return np.asarray(gain * gains["kv"])
     return gain * np.diag(inertia_of_motors(robot)) if robot.computed_torque else gain
 
 

@@ -123,7 +123,7 @@ def _nominal(robot: Robot, logs: Sequence[Log], axis: int) -> Nominal:
 
 def _by_the_law(robot: Robot, logs: Sequence[Log], axis: int) -> float | None:
     """Return by what a torque has to be multiplied to be what the controller commands; None where it is not."""
-    if robot.controller_kind in ("none", "pd_position"):
+    if not robot.told_speeds:
         return None
     if not is_closed_loop(robot, logs):
         return _by_the_noise(robot, logs, axis)

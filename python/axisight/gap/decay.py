@@ -58,7 +58,8 @@ def _sampled(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Arra
     kp, ki = gains["kp"], gains.get("ki", none)
     if "kv" in gains:
         error = speed + gains["kv"] @ angle
-        command, summed = kp @ error + ki @ sums, sums + time * error
+        # What is summed up for nothing is never forgotten, nor does it matter.
+        command, summed = kp @ error + ki @ sums, (ki > 0) @ (sums + time * error)
     else:
         command, summed = kp @ speed + ki @ angle, none @ angle
     plant = np.hstack([exact[:n, :n], np.zeros((n, 2 * m))]) + exact[:n, n:] @ command

@@ -73,6 +73,25 @@ def gain_shares(
     return np.asarray(kp * error), np.asarray(ki * before(error) * robot.sample_time_s)
 
 
+def told_as_torque(robot: Robot, speed: Array, angle: Array) -> Array:
+    """Return the torque (n, n_axes) [Nm] that errors of positions are told as: what the gains make of them.
+
+    Of a cascade without its integral, in which noise adds up to a drift.
+    """
+    proportional, other = gain_shares(robot, speed, angle)
+    return proportional if "kv" in robot.controller_gains else np.asarray(proportional + other)
+
+
+def told_gain(robot: Robot, frequency_hz: Array) -> Array:
+    """Return the same over frequency, by each motor for its own error (n_axes, n_freq) [Nm/rad]."""
+    gains, time = robot.controller_gains, robot.sample_time_s
+    if "kv" in gains:
+        rate = (1 - np.exp(-2j * np.pi * frequency_hz * time)) / time
+        return np.asarray(np.abs(gains["kp"][:, None] * (rate + gains["kv"][:, None])))
+    response = controller_response(robot, frequency_hz)
+    return np.asarray(np.abs(np.einsum("fii->if", response)))
+
+
 def inertia_of_motors(robot: Robot) -> Array:
     """Return what motors feel of a rigid robot at its operating point (n_axes, n_axes) [kg m^2], symmetric."""
     at = np.zeros(robot.n_joints)

@@ -124,7 +124,7 @@ def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
     gains = robot.controller_gains
-    if "kd" in gains:
+    if robot.told_positions:
         assert log.position_ref_rad is not None  # a controller of targets
         ahead = log.position_ref_rad - log.position_rad
         return np.asarray(ahead[0] - ahead.mean(axis=0))

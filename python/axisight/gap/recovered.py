@@ -43,8 +43,7 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     where they are as noisy as measured speeds: the torque is not that of this controller.
     """
     missing = all(log.velocity_ref_rad_s is None for log in logs)
-    of_speed = robot.controller_kind not in ("none", "pd_position")
-    if not of_speed or not missing or rigid_below_hz(robot) == np.inf:
+    if not robot.told_speeds or not missing or rigid_below_hz(robot) == np.inf:
         return None
     if np.any(np.asarray(robot.controller_gains["kp"]) <= 0):
         return None

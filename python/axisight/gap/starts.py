@@ -561,8 +561,14 @@ _TURNS_SLOWLY = 0.05
 
 
 def _gain_of_position(trial: Trial) -> FreeEffect:
-    """Begin at the neutral values; another gain of speed is viscous friction, which is tried as such."""
-    return replace(_neutral(trial), free=(trial.info.parameters[0].name,))
+    """Begin at the neutral values; another gain of speed is viscous friction, which is tried as such.
+
+    But in a cascade, whose gains both act on one error.
+    """
+    found = _neutral(trial)
+    if "kv" in trial.robot.controller_gains:
+        return found
+    return replace(found, free=(trial.info.parameters[0].name,))
 
 
 TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {

@@ -15,12 +15,13 @@ from scipy.interpolate import make_interp_spline
 
 from axisight.errors import InputError
 from axisight.gap.faults import Finding
-from axisight.gap.feedback import feedback, rotors
+from axisight.gap.feedback import feedback, rotors, told_as_torque
 from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
 from axisight.gap.poses import at_their_poses
 from axisight.logs import Log
 from axisight.robot import Robot
+from axisight.robot.robot import TOLD_POSITIONS
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,6 @@ _CLOCK = 0.01
 # Share of the top speed with which a log may begin; noise of speeds besides, so many times over.
 _AT_REST = 0.02
 _NOISES = 6.0
-_KIND = "pd_position"
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,10 @@ class Commanded:
         """Return the torque (n, n_axes) [Nm] that the gains make of an error of positions, at the controller's rate."""
         return -feedback(self.robot, _speed(self.robot, error_rad), error_rad)
 
+    def told_as(self, error_rad: Array) -> Array:
+        """Return the torque (n, n_axes) [Nm] that an error of positions is told as, at the controller's rate."""
+        return -told_as_torque(self.robot, _speed(self.robot, error_rad), error_rad)
+
 
 def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     """Return logs without torque with what the controller commands along them; None where torque was logged.
@@ -107,6 +111,7 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     start = np.mean([log.position_rad[0] for log in logs], axis=0)
     # Positions alone have rates too, but who follows these by gains alone need not have taken them.
     known = robot.computed_torque or all(x.velocity_ref_rad_s is not None for x in logs)
+    known = known or (_is_cascade(robot) and step == 1)
     fed = robot.velocity_feedforward and known
     at_start = robot.with_operating_point(start * robot.gear_ratio)
     machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
@@ -117,6 +122,11 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
         (a.n_samples - b.n_samples) * a.sample_time_s for a, b in zip(whole, told, strict=True)
     ]
     return Commanded(machine, tuple(told), step, tuple(short_of_inertia(robot)), tuple(from_s))
+
+
+def _is_cascade(robot: Robot) -> bool:
+    """Whether a controller of targets is a cascade, which is fed rates where its robot file says so alone."""
+    return "kv" in robot.controller_gains
 
 
 def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
@@ -198,10 +208,10 @@ def _check(robot: Robot, logs: Sequence[Log]) -> None:
         if log.has_torque:
             others = ", ".join(x.name for x in logs if not x.has_torque)
             raise InputError(f"torque: expected it in all logs or in none, got none in {others}")
-    if robot.controller_kind != _KIND:
+    if not robot.told_positions:
         raise InputError(
-            f"torque: expected logged torques, or a robot file whose controller is {_KIND}, so that the command "
-            f"follows from targets and positions; got no torque and controller {robot.controller_kind}"
+            f"torque: expected logged torques, or a robot file whose controller is {' or '.join(TOLD_POSITIONS)}, so "
+            f"that the command follows from targets and positions; got no torque and controller {robot.controller_kind}"
         )
     for log in logs:
         if log.position_ref_rad is None:
@@ -209,6 +219,12 @@ def _check(robot: Robot, logs: Sequence[Log]) -> None:
                 f"position_ref: expected targets beside the positions of log {log.name!r}, got none"
             )
         factor = log.sample_time_s / robot.sample_time_s
+        steps = robot.velocity_feedforward and _is_cascade(robot) and round(factor) > 1
+        if steps and log.velocity_ref_rad_s is None:
+            raise InputError(
+                f"velocity_ref: expected the rates that the cascade is fed (velocity_feedforward) beside the "
+                f"targets of log {log.name!r}, which are steps at the controller's {robot.sample_time_s:g} s; got none"
+            )
         if round(factor) < 1 or abs(factor / round(factor) - 1) > _CLOCK:
             raise InputError(
                 f"sample_time: expected a multiple of the controller's {robot.sample_time_s:g} s, got "

@@ -112,7 +112,7 @@ def _without_torque(found: Gathered) -> list[Finding]:
         return []
     message = (
         "none: a diagnosis compares positions under the same targets, with a robot that is told positions: an "
-        "MJCF with <position> actuators, or kp and kd of a controller pd_position in the drive data; torque "
+        "MJCF with <position> actuators, or a controller pd_position or cascade_position in the drive data; torque "
         "sensors and constants do not show"
     )
     return [Finding("ok", "torque", message)]

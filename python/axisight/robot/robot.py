@@ -23,7 +23,11 @@ from axisight.robot.sources import is_model_file, refuse_neither
 
 Array = NDArray[np.float64]
 
-ControllerKind = Literal["pi_velocity", "p_velocity", "cascade", "pd_position", "none"]
+ControllerKind = Literal[
+    "pi_velocity", "p_velocity", "cascade", "pd_position", "cascade_position", "none"
+]
+TOLD_POSITIONS: tuple[ControllerKind, ...] = ("pd_position", "cascade_position")
+"""Controllers whose targets are positions."""
 
 
 class Robot:
@@ -176,14 +180,24 @@ class Robot:
 
     @property
     def controller_kind(self) -> ControllerKind:
-        """``pi_velocity``, ``p_velocity``, ``cascade``, ``pd_position``, or ``none``."""
+        """``pi_velocity``, ``p_velocity``, ``cascade``, ``pd_position``, ``cascade_position``, or ``none``."""
         return self.core.controller_kind
+
+    @property
+    def told_positions(self) -> bool:
+        """Whether the targets of its controller are positions."""
+        return self.controller_kind in TOLD_POSITIONS
+
+    @property
+    def told_speeds(self) -> bool:
+        """Whether the references of its controller are speeds."""
+        return self.controller_kind != "none" and not self.told_positions
 
     @property
     def controller_gains(self) -> dict[str, Array]:
         """Gains by name, shape (n_axes,) each, motor side.
 
-        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; a cascade also has ``kv`` [1/s]. ``pd_position`` has ``kp``
+        ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; cascades also have ``kv`` [1/s]. ``pd_position`` has ``kp``
         [Nm/rad] and ``kd`` [Nm s/rad], [1/s^2] and [1/s] of a `computed_torque`.
         """
         return self.core.controller_gains
@@ -224,7 +238,7 @@ class Robot:
     def velocity_feedforward(self) -> bool:
         """Whether the rate of the references is the reference of the controller's speed.
 
-        Always so but where targets are positions (``pd_position``) and the file says otherwise, or logs
+        Always so but where targets are positions (`told_positions`) and the file says otherwise, or logs
         have no references of speed.
         """
         return self.core.velocity_feedforward
@@ -250,7 +264,7 @@ class Robot:
     def with_velocity_feedforward(self, on: bool) -> Robot:
         """Return the same robot with its speed reference switched on or off.
 
-        Raises InputError unless its controller is ``pd_position``.
+        Raises InputError unless its targets are positions.
         """
         return self._with_core(self.core.with_velocity_feedforward(on))
 

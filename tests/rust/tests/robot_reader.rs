@@ -136,7 +136,8 @@ fn every_controller_kind_reads() {
         Controller::Cascade {
             kv: kv.clone(),
             kp: kp.clone(),
-            ki: ki.clone()
+            ki: ki.clone(),
+            told_positions: None
         }
     );
     assert_eq!(
@@ -144,7 +145,8 @@ fn every_controller_kind_reads() {
         Controller::Cascade {
             kv,
             kp: kp.clone(),
-            ki: vec![0.0; 2]
+            ki: vec![0.0; 2],
+            told_positions: None
         }
     );
     assert_eq!(
@@ -156,6 +158,30 @@ fn every_controller_kind_reads() {
         Controller::PVelocity { kp }
     );
     assert_eq!(with("kind = \"none\"\n"), Controller::None);
+}
+
+#[test]
+fn a_cascade_of_targets_is_fed_rates_where_it_says_so() {
+    let old = "kind = \"cascade\"";
+    let two = small_with("axisight.robot/1", "axisight.robot/2");
+    let kind = "kind = \"cascade_position\"";
+    for (lines, fed) in [
+        (kind.to_owned(), false),
+        (format!("{kind}\nvelocity_feedforward = true"), true),
+    ] {
+        let controller = read(&two.replacen(old, &lines, 1)).controller;
+        assert_eq!(
+            controller,
+            Controller::Cascade {
+                kv: vec![10.0, 11.0],
+                kp: vec![1.0, 1.5],
+                ki: vec![2.0, 2.5],
+                told_positions: Some(fed)
+            }
+        );
+        assert!(controller.has_targets());
+    }
+    assert!(!read(SMALL).controller.has_targets());
 }
 
 #[test]

@@ -287,6 +287,7 @@ enum ControllerKind {
     PVelocity,
     Cascade,
     PdPosition,
+    CascadePosition,
     None,
 }
 
@@ -305,10 +306,11 @@ fn read_controller(
         ("cascade", ControllerKind::Cascade),
         ("none", ControllerKind::None),
         ("pd_position", ControllerKind::PdPosition),
+        ("cascade_position", ControllerKind::CascadePosition),
     ];
     // Files of the first version have the kinds of the first version.
     let kinds = &kinds[..if version == 1 {
-        kinds.len() - 1
+        kinds.len() - 2
     } else {
         kinds.len()
     }];
@@ -329,18 +331,8 @@ fn read_controller(
             section.only(&["kind", "kp"])?;
             Ok(Controller::PVelocity { kp: kp()? })
         }
-        ControllerKind::Cascade => {
-            section.only(&["kind", "kv", "kp", "ki"])?;
-            let kv = gains("kv", "1/s")?;
-            let kp = kp()?;
-            // Without `ki` the velocity loop is P.
-            let ki = if section.find("ki").is_some() {
-                ki()?
-            } else {
-                vec![0.0; n_axes]
-            };
-            Ok(Controller::Cascade { kv, kp, ki })
-        }
+        ControllerKind::Cascade => read_cascade(&section, n_axes, false),
+        ControllerKind::CascadePosition => read_cascade(&section, n_axes, true),
         ControllerKind::PdPosition => {
             let switches = [
                 "velocity_feedforward",
@@ -390,6 +382,37 @@ fn read_controller(
             Ok(Controller::None)
         }
     }
+}
+
+/// A cascade, told positions or speeds; without `ki` its velocity loop is P.
+fn read_cascade(
+    section: &Section,
+    n_axes: usize,
+    of_positions: bool,
+) -> Result<Controller, RobotError> {
+    let keys = ["kind", "kv", "kp", "ki", "velocity_feedforward"];
+    section.only(
+        &keys[..if of_positions {
+            keys.len()
+        } else {
+            keys.len() - 1
+        }],
+    )?;
+    let told_positions = if of_positions {
+        Some(section.flag(keys[4], false)?)
+    } else {
+        None
+    };
+    Ok(Controller::Cascade {
+        kv: section.per_axis("kv", n_axes, "1/s")?,
+        kp: section.per_axis("kp", n_axes, "Nm s/rad")?,
+        ki: if section.find("ki").is_some() {
+            section.per_axis("ki", n_axes, "Nm/rad")?
+        } else {
+            vec![0.0; n_axes]
+        },
+        told_positions,
+    })
 }
 
 fn read_noise(root: &Section) -> Result<f64, RobotError> {

@@ -91,6 +91,9 @@ pub enum Controller {
         kp: Vec<f64>,
         /// Integral gain of the velocity error, zero for a velocity P loop [Nm/rad].
         ki: Vec<f64>,
+        /// `None` where it is told speeds; where it is told positions, whether their rate is the
+        /// reference of speed, which is zero otherwise.
+        told_positions: Option<bool>,
     },
     /// Targets are positions: `u = u_ff + kp (phi_ref - phi) + kd (w_ref - w)`.
     PdPosition {
@@ -135,7 +138,11 @@ pub struct Stepped {
 impl Controller {
     /// Whether it is told positions.
     pub fn has_targets(&self) -> bool {
-        matches!(self, Self::PdPosition { .. })
+        match self {
+            Self::PdPosition { .. } => true,
+            Self::Cascade { told_positions, .. } => told_positions.is_some(),
+            _ => false,
+        }
     }
 
     /// The same controller for a loop `factor` times as fast: damping torque with the factor,
@@ -151,10 +158,16 @@ impl Controller {
             Self::PVelocity { kp } => Self::PVelocity {
                 kp: scaled(kp, factor),
             },
-            Self::Cascade { kv, kp, ki } => Self::Cascade {
+            Self::Cascade {
+                kv,
+                kp,
+                ki,
+                told_positions,
+            } => Self::Cascade {
                 kv: scaled(kv, factor),
                 kp: scaled(kp, factor),
                 ki: scaled(ki, factor * factor),
+                told_positions: *told_positions,
             },
             Self::PdPosition {
                 kp,

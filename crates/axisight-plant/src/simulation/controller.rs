@@ -243,6 +243,10 @@ impl<S: Scalar> ControlLoop<S> {
         match self.kind {
             Controller::PdPosition {
                 feeds_speed: false, ..
+            }
+            | Controller::Cascade {
+                told_positions: Some(false),
+                ..
             } => -speed,
             _ => reference - speed,
         }
@@ -268,7 +272,7 @@ impl<S: Scalar> ControlLoop<S> {
                 own_kp * (speed_error * kp[i]) + own_ki * (angle_error * ki[i])
             }
             Controller::PVelocity { kp } => own_kp * (speed_error * kp[i]),
-            Controller::Cascade { kv, kp, ki } => {
+            Controller::Cascade { kv, kp, ki, .. } => {
                 let error = speed_error + angle_error * kv[i];
                 let integral = self.integral[i];
                 self.integral[i] += error * self.sample_time;

@@ -34,7 +34,7 @@ def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 def _at_its_own_rate(robot: Robot, log: Log, first: Log) -> bool:
     """Whether torque is predicted at the rate of a log: no controller of speed samples it, and all have it."""
     same = abs(log.sample_time_s / first.sample_time_s - 1.0) <= RATE_TOLERANCE
-    return same and robot.controller_kind in ("none", "pd_position")
+    return same and not robot.told_speeds
 
 
 def _another_rate(robot: Robot, log: Log, factor: float) -> Finding:
