@@ -85,6 +85,9 @@ RIGID_BODY_QUANTITIES = {
 DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
 """What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
 
+UNEVEN = ("position_dependent_friction", "mean_nm")
+"""Dry friction that changes with the angle, and its parameter for what does not."""
+
 STRIBECK = (
     "stribeck_friction",
     *("coulomb_nm", "excess_nm", "stribeck_speed_rad_s", "smoothing_rad_s"),
@@ -140,6 +143,9 @@ LAG = ("actuator_bandwidth", "time_constant_s")
 TRANSPORT_DELAY = ("input_delay", "delay_s")
 """What a drive that acts late is, and its parameter."""
 
+CURRENT_LOOP = ("current_loop", "time_constant_s", "damping")
+"""What a drive with a lag of second order is, and its parameters."""
+
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 """What flat tops of a logged torque are, and its parameter."""
 
@@ -178,9 +184,6 @@ OF_ITS_AXIS = frozenset({"motor_inertia", "gravity_compensation"})
 
 OF_POSES = frozenset({"joint_zero_offset", "link_geometry", "base_tilt"})
 """Of these, what changes where the arm is, before its axis and behind."""
-
-LOOP_LIKE = ("current_loop", "input_delay")
-"""A second-order lag, and what it is like where it is well damped."""
 
 STEPS = ("position_quantization", "increment_rad")
 """What an encoder of few lines is, and its parameter."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, EffectTuple, core_effects
+from axisight.effects import Effect, EffectTuple, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
@@ -65,7 +65,9 @@ class ClosedLoopView(View):
     fitter: ClosedLoopFitter
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        self.tracking = robot.with_controller_speed(TRACKING_SPEED)
+        slow = robot.with_controller_speed(TRACKING_SPEED)
+        # What keeps a simulator on a log acts on its motors, past any drive.
+        self.tracking = slow.with_effects([e for e in robot.effects if not _of_drive(e)])
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
         self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
@@ -74,7 +76,7 @@ class ClosedLoopView(View):
         # A torque reported after the limit is what the motor got: it needs no limit once more.
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
-        kept_on_log = self.tracking.with_effects(own)
+        kept_on_log = slow.with_effects(own)
         data = records_of(self.tracking, logs, floor.weighting)
         fitter = ClosedLoopFitter(
             kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
@@ -161,6 +163,10 @@ class ClosedLoopView(View):
         std = np.full(self.robot.n_axes, self.robot.position_noise_std)
         seed, threads = self.settings.seed, self.settings.threads
         return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
+
+
+def _of_drive(effect: Effect) -> bool:
+    return effect_info(effect.name).acts == "torque_path"
 
 
 def _contiguous(x: Array) -> Array:

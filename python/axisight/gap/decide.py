@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import BEHIND_GEAR, LOOP_LIKE, ONE_FORMULA, PLAY, SPRING_CHANGES
+from axisight.effects.stated import (
+    BEHIND_GEAR,
+    CURRENT_LOOP,
+    ONE_FORMULA,
+    PLAY,
+    SPRING_CHANGES,
+    TRANSPORT_DELAY,
+)
 from axisight.gap.amplitude import amplitude_significance
 from axisight.gap.apart import NEXT_TO_NOTHING, held_apart
 from axisight.gap.evidence import Evidence, FreeEffect
@@ -314,7 +321,7 @@ def _costs(trials: Sequence[Trial]) -> Array:
     second number makes it no rarer than that.
     """
     out = _PARAMETER_COST * np.array([t.cost for t in trials])
-    loop, like = LOOP_LIKE
+    loop, like = CURRENT_LOOP[0], TRANSPORT_DELAY[0]
     places = {(t.candidate.effect.name, t.candidate.effect.axis): i for i, t in enumerate(trials)}
     for (name, axis), i in places.items():
         if name == loop and (like, axis) in places:

@@ -170,6 +170,7 @@ def search(
             progress,
             kept,
             out.mends,
+            candidates,
         )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)

@@ -24,7 +24,7 @@ _SIMULATED = 2
 _LEAST_DRIVEN = 1e-3
 # Times the answer to noise, as a linear loop without lags gives it, that counts as answer. A lag of a
 # millisecond amplifies it by a fifth, and the density of the torque is an average of few: half driven is none.
-_AS_ANSWER = 2.0
+_AS_ANSWER = 10.0
 
 
 def tracking_floor(

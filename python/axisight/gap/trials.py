@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import (
-    Ranked,
     Standing,
     Trial,
     as_good_with_less,
@@ -27,7 +26,9 @@ from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.gear_laws import begun_on_curves
 from axisight.gap.kept import KeptColumns
+from axisight.gap.lags import ended, lags_beside
 from axisight.gap.layout import Layout
+from axisight.gap.leading import CLOSE, SETTLED, clear
 from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.screening import Bench, Screen, Start, thinned
@@ -35,6 +36,7 @@ from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
 from axisight.gap.tryout import Tryout
 from axisight.gap.usual import begun_where_it_ended, ended_at_bound, more_usual
+from axisight.gap.wider import begun_wider
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -53,24 +55,15 @@ _LOOKED_AT = 3
 # Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
 # the one found before its shadow on another axis.
 _AS_MUCH = 0.9
-# Leaders of an axis that are refined, and what share of the first one's score the others need: a fit
-# with sensitivities of its own does not make more of the rest.
+# Leaders of an axis that are refined.
 _REFINED = 2
-_CLOSE = 0.6
 # So many are refined at once, whatever the number of threads: what they show decides on the next.
 _AT_ONCE = 2
 # The same where the leader bends the simulator.
 _REFINED_BENT = 4
 _FAR = 0.3
-# One that explains nearly everything, or most of it with none other close, is taken as it is.
-_GOOD_ENOUGH = 0.95
-_ALONE = 0.5
-# A fit that has not settled may gain so many times what its next step promises.
-_STEPS_TO_COME = 3.0
 # How often sensitivities are renewed in a fit that is to last.
 _RENEWALS = 1
-# Share of the loss that it may promise then: where it is more, they are renewed at every step.
-_SETTLED = 1e-3
 # Steps on all data of a fit that was settled on part of them, where it is to be compared only.
 _LOOKS = 2
 # Share of a gain that another candidate may have on the same axis and not count as felt. Nothing gains
@@ -124,7 +117,7 @@ def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evide
 
 def _has_settled(found: Evidence) -> bool:
     """Whether steps of a fit bring no more."""
-    return found.converged or found.stuck or linear_gain(found) < _SETTLED * found.total
+    return found.converged or found.stuck or linear_gain(found) < SETTLED * found.total
 
 
 def _taken_away(found: Evidence, model: Evidence, axis: int) -> float:
@@ -137,8 +130,9 @@ class Trials:
     """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
 
     ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``mends``: whether one only
-    mends a formula of the model; ``kept``: what candidates did to models before, and will have done to
-    this; ``sensitivities`` by label, of candidates that were screened.
+    mends a formula of the model; ``offered``: candidates for what is left of a model; ``kept``: what
+    candidates did to models before, and will have done to this; ``sensitivities`` by label, of
+    candidates that were screened.
     """
 
     def __init__(
@@ -152,9 +146,10 @@ class Trials:
         progress: Progress,
         kept: KeptColumns,
         mends: Callable[[Trial], bool],
+        offered: Callable[[Evidence], Sequence[FreeEffect]],
     ) -> None:
         self.fitter, self.model, self.floor, self.kept = fitter, model, floor, kept
-        self.layout, self.least, self.mends = layout, least, mends
+        self.layout, self.least, self.mends, self.offered = layout, least, mends, offered
         self.settings, self.progress = settings, progress
         self.current = held_out_loss(model)
         self.bench = Bench(fitter, model)
@@ -240,13 +235,32 @@ class Trials:
         """
         led: set[str] = set()
         while begun := begun_on_curves(self.standings(trials), led, options, self.fitter.robot):
-            known = {t.label: t for t in trials}
-            for found in pool.map(lambda one: self._in_its_place(*one), begun):
-                if found is not None:
-                    before = known.get(found.label)
-                    if before is None or found.evidence.total < before.evidence.total:
-                        known[found.label] = found
-            trials = list(known.values())
+            trials = self._with_better(pool, trials, begun)
+        return trials
+
+    def _with_better(
+        self,
+        pool: ThreadPoolExecutor,
+        trials: Sequence[Trial],
+        begun: Sequence[tuple[Evidence, FreeEffect, Mapping[str, float]]],
+    ) -> list[Trial]:
+        """Add what is begun in the place of leaders, or put it where it fits better than it did."""
+        known = {t.label: t for t in trials}
+        for found in pool.map(lambda one: self._in_its_place(*one), begun):
+            if found is not None:
+                before = known.get(found.label)
+                if before is None or found.evidence.total < before.evidence.total:
+                    known[found.label] = found
+        return list(known.values())
+
+    def _with_lags(self, trials: list[Trial], options: Sequence[FreeEffect]) -> list[Trial]:
+        """Put delays and lags of axes that one of them leads on where their fits end."""
+        for standing in self.standings(trials):
+            if lags := lags_beside(standing):
+                found = (
+                    trial(e.free[-1], e, self.model) for e in ended(self.fitter, lags, options)
+                )
+                trials = list(({t.label: t for t in trials} | {t.label: t for t in found}).values())
         return trials
 
     def _in_its_place(
@@ -389,6 +403,9 @@ class Trials:
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
             trials = self._with_gears(pool, trials, options)
+            wider = begun_wider(self.standings(trials), trials, self.offered)
+            trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
+            trials = self._with_lags(trials, options)
         self.progress(label, 1, 1)
         return trials
 
@@ -430,7 +447,7 @@ class Trials:
         begun = settled(self.rough, start.free, start)
         axis = start.free[-1].effect.axis
         if leader is not None and axis is not None:
-            needed = _CLOSE * _taken_away(leader, self.model, axis - 1)
+            needed = CLOSE * _taken_away(leader, self.model, axis - 1)
             if _taken_away(begun, self.screen.model, axis - 1) < needed:
                 return None
         return self._looked_at(begun)
@@ -466,12 +483,12 @@ class Trials:
             if gain < self.least[standing.axis] or self.mends(leader.trial):
                 continue
             bends = standing.axis in crooked
-            count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, _CLOSE)
+            count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, CLOSE)
             # What is more usual than the leader is it at its limits, until its own fit says no.
             special = more_usual(leader.trial) if ended_at_bound(leader.trial) else set()
             usual = self.usual | more_usual(leader.trial)
             rivals = standing.ranked[:count]
-            if _clear(standing) and not bends:
+            if clear(standing) and not bends:
                 # What leads elsewhere, and is fitted there, is held against one that is fitted as well.
                 rivals = rivals[:1] if standing.axis + 1 in away else ()
             usual |= {r.trial.label for r in as_good_with_less(standing)}
@@ -562,32 +579,6 @@ def _best(starts: Sequence[Start], n_axes: int) -> Array:
         if (axis := start.option.effect.axis) is not None:
             best[axis - 1] = max(best[axis - 1], start.gain)
     return np.where(np.isfinite(best), best, 0.0)
-
-
-def _clear(standing: Standing) -> bool:
-    """Whether the first leads whatever a better fit makes of it."""
-    leader = standing.best
-    if len(standing.inseparable()) > 1 or standing.p_unknown > leader.probability:
-        return False
-    close = [r for r in standing.ranked[1:] if r.score >= _CLOSE * leader.score]
-    # What needs fewer numbers may catch up where its fit has not settled; and of lags every one.
-    open_ = (r for r in close if r.trial.cost < leader.trial.cost or _are_lags(r, leader))
-    if any(_may_catch_up(r, leader) for r in open_):
-        return False
-    alone = not close
-    return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
-
-
-def _are_lags(one: Ranked, other: Ranked) -> bool:
-    """Whether both are held against one another by little."""
-    return one.family == other.family == "timing"
-
-
-def _may_catch_up(one: Ranked, leader: Ranked) -> bool:
-    """Whether steps from where the fit of a rival ended may bring it near the leader."""
-    promise = linear_gain(one.trial.evidence) / one.trial.evidence.total
-    share_left = (1.0 - one.score) * max(0.0, 1.0 - _STEPS_TO_COME * promise)
-    return promise > _SETTLED and 1.0 - share_left > _GOOD_ENOUGH * leader.score
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

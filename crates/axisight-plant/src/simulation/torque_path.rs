@@ -1,6 +1,6 @@
 //! From commanded torque to the torque the drive delivers inside a sample.
 //!
-//! Command -> limit -> transport delay -> current-loop lag -> torque constant and offset.
+//! Command -> limit -> transport delay -> current-loop lag -> torque constant and offset -> motor.
 //! Delay and lag make the torque vary inside a sample. It is handed to the
 //! integrator as the straight line with the same mean and first moment over
 //! each sub-step: velocity and position at the end of the step, which depend
@@ -93,12 +93,9 @@ impl<S: Scalar> TorquePath<S> {
         }
     }
 
-    /// Take the command of a new sample; returns what the drive makes of it, and of what is `added` to it.
-    ///
-    /// Limits and deadbands are those of what the machine was told: nothing is cut of what keeps a
-    /// simulation on a log.
-    pub fn push(&mut self, command: S, added: S) -> S {
-        let command = self.kernels.iter().fold(command, |u, k| k.command(u)) + added;
+    /// Take the command of a new sample; returns what limits and deadbands make of it.
+    pub fn push(&mut self, command: S) -> S {
+        let command = self.kernels.iter().fold(command, |u, k| k.command(u));
         if let Some(delay) = &mut self.delay {
             delay.history.rotate_left(1);
             if let Some(newest) = delay.history.last_mut() {
@@ -195,6 +192,8 @@ pub struct SampleTorque<'a, S> {
 /// Memory of [`SampleTorque`] that outlives the samples.
 pub struct TorqueBuffers<S> {
     commands: Vec<S>,
+    /// Torques on the motors that no drive makes.
+    added: Vec<S>,
     /// Lag states at the start of the span in hand and at its end.
     at_start: Vec<States<S>>,
     at_end: Vec<States<S>>,
@@ -207,6 +206,7 @@ impl<S: Scalar> TorqueBuffers<S> {
         let states = vec![[Delivered::settled(S::zero()); 2]; n_axes];
         Self {
             commands: vec![S::zero(); n_axes],
+            added: vec![S::zero(); n_axes],
             at_start: states.clone(),
             at_end: states,
             lines: Vec::with_capacity(n_axes),
@@ -216,15 +216,19 @@ impl<S: Scalar> TorqueBuffers<S> {
 
 impl<'a, S: Scalar> SampleTorque<'a, S> {
     /// Take the commands of a new sample; `added`: what of each is none of the machine's.
+    ///
+    /// That acts on the motor at once: what keeps a simulation on a log answers noise alike, whatever drive is
+    /// tried in it. Through a lag it would answer more, and fits would make lags of too much or too little.
     pub fn new(
         paths: &'a mut [TorquePath<S>],
         commands: &[S],
         added: &[S],
         buffers: &'a mut TorqueBuffers<S>,
     ) -> Self {
+        buffers.added.copy_from_slice(added);
         let told = commands.iter().zip(added);
         for ((taken, path), (u, own)) in buffers.commands.iter_mut().zip(&mut *paths).zip(told) {
-            *taken = path.push(*u - *own, *own);
+            *taken = path.push(*u - *own);
         }
         let varies = paths.iter().any(TorquePath::varies);
         let mut torque = Self {
@@ -235,9 +239,15 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         torque.rewind();
         torque.buffers.lines.clear();
         if !varies {
-            let held = torque.paths.iter().zip(&torque.buffers.commands);
-            torque.buffers.lines.extend(held.map(|(path, u)| Line {
-                mean: path.delivered(*u),
+            let TorqueBuffers {
+                commands,
+                added,
+                lines,
+                ..
+            } = &mut *torque.buffers;
+            let held = torque.paths.iter().zip(commands).zip(added);
+            lines.extend(held.map(|((path, u), own)| Line {
+                mean: path.delivered(*u) + *own,
                 slope: S::zero(),
             }));
         }
@@ -249,14 +259,18 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         if self.varies {
             let TorqueBuffers {
                 commands,
+                added,
                 at_start,
                 at_end,
                 lines,
             } = &mut *self.buffers;
             at_end.copy_from_slice(at_start);
             lines.clear();
-            for ((path, u), state) in self.paths.iter().zip(commands).zip(at_end) {
-                lines.push(path.line(*u, from, to, state));
+            let told = commands.iter().zip(added);
+            for ((path, (u, own)), state) in self.paths.iter().zip(told).zip(at_end) {
+                let mut line = path.line(*u, from, to, state);
+                line.mean += *own;
+                lines.push(line);
             }
         }
         &self.buffers.lines

@@ -1,0 +1,76 @@
+"""Delays and lags of a drive, fitted until their fits end before they are held against one another.
+
+They differ by little, and by less than fits leave open that are good enough for other rivals. A well damped
+current loop is a delay up to the third power of frequency: it is begun there too, not only where a screen does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from axisight.effects import effect_info
+from axisight.effects.stated import CURRENT_LOOP, TRANSPORT_DELAY
+from axisight.errors import InputError
+from axisight.gap.decide import Standing, Trial
+from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.model import ModelFitter
+
+# Of what the leader of an axis explains, which a lag may explain less and still end at as much.
+_NEAR = 0.03
+# Steps of a fit that is to end, and the loss that one more has to bring.
+_STEPS = 12
+_WORTH = 1.0
+# Damping at which a current loop is most like a delay.
+_AS_DELAY = float(np.sqrt(0.5))
+
+
+def lags_beside(standing: Standing) -> list[Trial]:
+    """Return the delays and lags of an axis that one of them leads on, as far as they are near it."""
+    if not _is_lag(standing.best.trial, standing.axis):
+        return []
+    least = standing.best.score - _NEAR
+    return [r.trial for r in standing.ranked if r.score > least and _is_lag(r.trial, standing.axis)]
+
+
+def _is_lag(one: Trial, axis: int) -> bool:
+    effect = one.candidate.effect
+    info = effect_info(effect.name)
+    return effect.axis == axis + 1 and info.family == "timing" and info.acts == "torque_path"
+
+
+def ended(
+    fitter: ModelFitter, lags: Sequence[Trial], options: Sequence[FreeEffect]
+) -> list[Evidence]:
+    """Return fits of lags that have ended; of a current loop the better of two, one begun as the delay among them."""
+    found = {one.candidate.effect.name: _ended(fitter, one.evidence) for one in lags}
+    delay = found.get(TRANSPORT_DELAY[0])
+    loop = found.get(CURRENT_LOOP[0])
+    begun = None if delay is None else _as_delay(delay, options)
+    if delay is not None and begun is not None and (loop is None or loop.total > delay.total):
+        try:
+            again = fitter.fit(begun, delay, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+        except InputError:
+            # No loop holds there: what there is stays.
+            return list(found.values())
+        if loop is None or again.total < loop.total:
+            found[CURRENT_LOOP[0]] = again
+    return list(found.values())
+
+
+def _ended(fitter: ModelFitter, evidence: Evidence) -> Evidence:
+    try:
+        return fitter.fit(evidence.free, evidence, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+    except InputError:
+        return evidence
+
+
+def _as_delay(delay: Evidence, options: Sequence[FreeEffect]) -> list[FreeEffect] | None:
+    """Return a model with a current loop in the place of the delay that it ends with; None where none is tried."""
+    name, time_constant, damping = CURRENT_LOOP
+    effect = delay.effects[-1]
+    late_s = effect.values()[0]
+    shape = {time_constant: late_s / (2 * _AS_DELAY), damping: _AS_DELAY}
+    loops = (o for o in options if (o.effect.name, o.effect.axis) == (name, effect.axis))
+    return next(([*delay.free[:-1], loop.at(shape)] for loop in loops), None)
