@@ -18,8 +18,8 @@ from axisight.errors import InputError, LogError
 from axisight.explore.session import Session
 from axisight.gap import Diagnosis, Settings
 from axisight.gap.beside import look_beside
-from axisight.gap.constants import constant_name, with_values
 from axisight.gap.currents import in_torques, unknown_axes
+from axisight.gap.own_effects import constant_name, with_values
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.logs import check_log, parse_column_map, read_case, read_log

@@ -15,7 +15,7 @@ from axisight.errors import InputError
 from axisight.explore.exports import robot_text
 from axisight.explore.session import Session, Version
 from axisight.fitting import robot_parameter
-from axisight.gap.gains import as_effects, gains_of, labels_of, uncertain_gains, with_values
+from axisight.gap.own_effects import absorbed, for_core, gain_names, uncertain_gains, with_values
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from servo_arm import HOME_RAD, MACHINES, NOMINAL, ServoArm, simulator, targets
 
@@ -51,7 +51,7 @@ def positions(robot: Robot) -> Array:
 
 
 def test_gains_that_have_not_changed_change_nothing(robot: Robot) -> None:
-    same = with_values(robot, dict.fromkeys(gains_of(robot), 0.0))
+    same = with_values(robot, dict.fromkeys(gain_names(robot), 0.0))
     np.testing.assert_array_equal(positions(same), positions(robot))
     assert with_values(robot, {"j1.mass": 9.0}).parameters()["j1.mass"] == 9.0
 
@@ -76,7 +76,7 @@ def test_a_fit_has_them_as_effects_behind_the_others(robot: Robot) -> None:
     mass = robot_parameter(robot, "j2.mass", relative_tolerance=0.1)
     tried = [Effect("coulomb_friction", 1, {"coulomb_nm": 1.0})]
     moved = [mass, *(replace(p, initial=0.1 * i) for i, p in enumerate(gains))]
-    effects, parameters = as_effects(robot, tried, moved)
+    effects, parameters = for_core(robot, tried, moved)
     assert [e.label for e in effects] == [
         "coulomb_friction@1",
         *(f"controller_gain@{i}" for i in (1, 2, 3)),
@@ -89,8 +89,8 @@ def test_a_fit_has_them_as_effects_behind_the_others(robot: Robot) -> None:
         (3, speed, pytest.approx(0.3)),
     ]  # fmt: skip
     assert effects[3].parameters == {proportional: 0.2, speed: pytest.approx(0.3)}
-    assert labels_of(robot, moved) == {f"controller_gain@{i}" for i in (1, 2, 3)}
-    assert as_effects(robot, tried, [mass]) == (tried, [mass])
+    assert absorbed(robot, moved) == {f"controller_gain@{i}" for i in (1, 2, 3)}
+    assert for_core(robot, tried, [mass]) == (tried, [mass])
 
 
 @pytest.mark.parametrize("lacks", ["coulomb_friction@2", None])

@@ -40,12 +40,12 @@ from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
-from axisight.gap.gains import gains_of
 from axisight.gap.inputs import Inputs, read_inputs
+from axisight.gap.own_effects import GAINS, gain_names
 from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
-from axisight.gap.tolerances import GAINS, with_tolerances
+from axisight.gap.tolerances import with_tolerances
 from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
@@ -71,7 +71,7 @@ EXIT_CODES: dict[VerdictKind, int] = {
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
     """Return the tolerances given by quantity or name; raises InputError naming the option."""
-    gains = gains_of(robot)
+    gains = gain_names(robot)
     quantities = [*DEFAULT_TOLERANCES, *(GAINS if gains else ())]
     known = [*robot_parameters(robot), *gains]
     own = [n for n in known if n.rsplit(".", 1)[1] in quantities]

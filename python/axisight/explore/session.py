@@ -16,8 +16,8 @@ from axisight.errors import InputError
 from axisight.explore.choices import in_bounds
 from axisight.explore.measured import measured_gains
 from axisight.gap.currents import unknown_axes
-from axisight.gap.gains import nominal_values, with_values
 from axisight.gap.howfar import stage
+from axisight.gap.own_effects import nominal_values, with_values
 from axisight.gap.pipeline import behind_gate
 from axisight.gap.settings import Settings
 from axisight.gap.torques import Variant, combine

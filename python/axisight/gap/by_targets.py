@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.fitting import Parameter, Weighting
-from axisight.gap.closed_loop import ClosedLoopFitter, Problem, Record
+from axisight.fitting import Weighting
+from axisight.gap.closed_loop import ClosedLoopFitter, Record
 from axisight.gap.feedback import (
     controller_response,
     inertia_of_motors,
@@ -22,8 +21,8 @@ from axisight.gap.feedback import (
     periodic_response,
     told_gain,
 )
-from axisight.gap.gains import as_effects, labels_of, uncertain_gains
 from axisight.gap.noise import Floor, position_noise_std, torque_density
+from axisight.gap.own_effects import uncertain_gains
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import simulated_positions
@@ -72,7 +71,6 @@ class TargetsView(View):
             self._like = Variant(fitter.fit([]).robot_values)
             fitter.records = _records(logs, self._between_samples(logs, settings))
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
-        self.not_offered = labels_of(robot, fitter.own)
 
     def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:
         """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator.
@@ -292,7 +290,3 @@ class TargetsFitter(ClosedLoopFitter):
     def bends(self, name: str) -> bool:
         """Whether a parameter changes what others do, by much more than masses and stiffness."""
         return name in self.gains
-
-    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> Problem:
-        """Return the problem as the core takes it, gains as effects."""
-        return super()._problem(*as_effects(self.robot, effects, parameters))

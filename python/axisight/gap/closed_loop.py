@@ -15,7 +15,6 @@ from axisight.effects import Effect, EffectTuple, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
-from axisight.gap.constants import with_values
 from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.encoder_steps import encoder_steps
@@ -24,6 +23,7 @@ from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
 from axisight.gap.own_controller import other_controllers
+from axisight.gap.own_effects import with_values
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
-from axisight.gap.gains import nominal_values
 from axisight.gap.model import ModelFitter
+from axisight.gap.own_effects import nominal_values
 from axisight.gap.tolerances import tolerance_of
 
 # A parameter this many of its tolerances off is one machine in four hundred: rather something

@@ -20,8 +20,8 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
-from axisight.gap.constants import for_core, own_constants
 from axisight.gap.evidence import Evidence, FreeEffect, Linearized
+from axisight.gap.own_effects import for_core
 from axisight.gap.rank import deviations_seen
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.tolerances import spring_changes, tolerance_of
@@ -63,7 +63,6 @@ class ModelFitter(ABC):
         self.cancel = _core.CancelToken()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
-        self.constants: Mapping[str, Effect] = {}
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
@@ -72,11 +71,6 @@ class ModelFitter(ABC):
             and value != 0
             and self.takes_part(name)
         ]
-
-    def free_constants(self, axes: Sequence[int]) -> None:
-        """Fit the torque constants of ``axes`` (from 1) with the simulator's own parameters."""
-        self.constants, parameters = own_constants(self.robot, axes)
-        self.own += parameters
 
     def within_tolerance(self, effect: Effect) -> bool:
         """Whether an effect is no more than ordinary scatter of a parameter."""
@@ -191,7 +185,7 @@ class ModelFitter(ABC):
         return self.run(*self._for_core(setup), self._options())
 
     def _for_core(self, setup: _Setup) -> tuple[list[Effect], list[Parameter]]:
-        return for_core(setup.effects, setup.parameters, self.constants)
+        return for_core(self.robot, setup.effects, setup.parameters)
 
     def run(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions

@@ -23,13 +23,11 @@ from axisight.gap.carried import carried_over, open_check
 from axisight.gap.chatter import chance_check, with_chance
 from axisight.gap.coarse import with_coarse_encoders
 from axisight.gap.compared import Compared
-from axisight.gap.constants import constant_name, nominal_error
 from axisight.gap.currents import Nominal, in_torques
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
-from axisight.gap.gains import nominal_values
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.headline import headline
 from axisight.gap.howfar import Stage, Stages, gap_figures, gap_reduction, overlays, stage
@@ -38,6 +36,7 @@ from axisight.gap.misfit import with_balanced_values
 from axisight.gap.modes import view_of
 from axisight.gap.motion_errors import motion_errors, velocity_from
 from axisight.gap.open_constants import open_with_constants
+from axisight.gap.own_effects import constant_name, nominal_and_size, nominal_values
 from axisight.gap.poses import SAYS as FROM_OWN_POSES
 from axisight.gap.poses import at_their_poses
 from axisight.gap.recovered import SAYS, with_references
@@ -583,9 +582,7 @@ def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | N
 
 def _relative(robot: Robot, model: Evidence, name: str) -> Interval:
     """Return the relative change of a re-fitted parameter with its 95 % interval."""
-    error = nominal_error(robot, name)
-    nominal = nominal_values(robot)[name] if error is None else error
-    size = (abs(nominal) or 1.0) if error is None else 1.0 + error
+    nominal, size = nominal_and_size(robot, name)
     change = (model.robot_values[name] - nominal) / size
     spread = 1.96 * model.std.get((None, name), 0.0) / size
     return Interval(change, change - spread, change + spread)

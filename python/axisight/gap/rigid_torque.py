@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from axisight import _core
 from axisight.effects import core_effects
 from axisight.fitting import FitOptions, Weighting
-from axisight.gap.constants import with_values
 from axisight.gap.motion import Motion
+from axisight.gap.own_effects import with_values
 from axisight.gap.torques import Variant
 from axisight.robot import Robot
 

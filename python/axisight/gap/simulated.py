@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect
 from axisight.effects.stated import STEPS
 from axisight.errors import InputError
-from axisight.gap.constants import with_values
+from axisight.gap.own_effects import with_values
 from axisight.gap.poses import starts_of
 from axisight.gap.torques import Variant
 from axisight.logs import Log

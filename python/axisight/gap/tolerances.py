@@ -18,9 +18,6 @@ from axisight.robot import Robot
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
 
-GAINS = ("kp", "kd")
-"""Quantities of a controller of targets that may have a tolerance: its gains of position and of speed."""
-
 # Robot files state values to as many digits.
 _SAME = 1e-6
 

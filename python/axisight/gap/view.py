@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.compared import Compared
-from axisight.gap.constants import absorbed
 from axisight.gap.currents import unknown_axes
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.orders import Turning
+from axisight.gap.own_effects import absorbed, unknown_constants
 from axisight.gap.result import Mode
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.search import Search
@@ -55,9 +55,7 @@ class View(ABC):
     def __post_init__(self) -> None:
         """Tell the fitter what is large on this robot."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
-        unknown = unknown_axes(self.logs)
-        self.fitter.free_constants(unknown)
-        self._absorbed = absorbed(unknown)
+        self.fitter.own += unknown_constants(self.robot, unknown_axes(self.logs))
         self._turned: Sequence[Sequence[Turning]] = ()
 
     def candidates(
@@ -88,7 +86,7 @@ class View(ABC):
             by_targets=self.by_targets,
             threads=self.settings.threads,
         )
-        none = self.not_offered | self._absorbed
+        none = self.not_offered | absorbed(self.robot, self.fitter.own)
         return [f for f in found if f.effect.label not in none]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from axisight.excitation import References
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
-from axisight.gap.constants import with_values
 from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.own_effects import with_values
 from axisight.gap.search import Search
 from axisight.gap.separate.experiment import ENOUGH, Experiment
 from axisight.gap.separate.rivals import Rivals, rivals_of
