@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Effect, simulate
+from axisight import Effect, Robot, simulate
+from axisight.errors import InputError
 from axisight.gap.own_controller import other_controllers
 from gap_data import HELD, PLAN, bare_axis, logs_of, reference, scattered
 
@@ -53,6 +54,17 @@ def test_a_filter_is_the_low_pass_that_it_says():
     off = command - asked - (command[0] - asked[0])
     # The start angle is known from a noisy reading here: a constant share of the integral gain.
     assert np.ptp(off) < 1e-9 * np.abs(command).max()
+
+
+def test_a_gain_that_is_all_but_off_is_said_not_taken_for_an_effect():
+    """No effect stands for it: its bounds are a twentieth and eleven times the stated gain."""
+    text = scattered(bare_axis(), 4).toml
+    assert "ki = [180.0]" in text
+    machine = Robot.from_toml(text.replace("ki = [180.0]", "ki = [1.8]"))
+    with pytest.raises(
+        InputError, match=r"axis 1: expected gains .* got 0\.01 times the integral one"
+    ):
+        other_controllers(bare_axis(), logs_of(machine, [], PLAN))
 
 
 @pytest.mark.parametrize(
