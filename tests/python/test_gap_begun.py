@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from axisight import Effect, Log, Settings, diagnose
-from axisight.gap.begun import begins_at_rest, first_rest_s, from_rest
+from axisight.gap.beginning import begins
+from axisight.gap.begun import first_rest_s, from_rest
 from axisight.gap.used import Used
 from gap_data import bare_axis, log_of, logs_of, scattered
 
@@ -38,8 +39,8 @@ def machine_logs() -> list[Log]:
 
 def test_a_start_at_rest_is_told_from_one_in_motion(machine_logs):
     for log in machine_logs:
-        assert begins_at_rest(log, NOISE_RAD)
-        assert not begins_at_rest(log.part(0.7), NOISE_RAD)
+        assert begins(log, NOISE_RAD) == "rest"
+        assert begins(log.part(0.7), NOISE_RAD) == "motion"
         rest = first_rest_s(log.part(0.7))
         # Behind the half of a rest, once the machine has come to it.
         assert REST_S[0] + 0.09 - 0.7 <= rest <= REST_S[1] - 0.7
@@ -56,7 +57,7 @@ def test_what_is_used_while_a_log_moves_begins_at_rest():
     assert moving.duration_s == pytest.approx(8.0 + 0.6, abs=0.25)
     one, two = Used(runs=True).of(log)
     assert two.duration_s == pytest.approx(5.0 + 0.6, abs=0.25)
-    assert all(begins_at_rest(part, NOISE_RAD) for part in (moving, one, two))
+    assert all(begins(part, NOISE_RAD) == "rest" for part in (moving, one, two))
     given = from_rest(bare_axis(), [one], [two], [])
     assert (given.estimation, given.validation, given.findings) == ([one], [two], ())
 

@@ -12,7 +12,9 @@ import numpy as np
 
 from axisight.errors import InputError
 from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.beginning import begins, run_up_is_better
 from axisight.gap.closed_loop import TRACKING_SPEED
+from axisight.gap.encoder_steps import encoder_steps
 from axisight.gap.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
@@ -21,10 +23,6 @@ from axisight.gap.used import REST_S, stands
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Share of its largest speed with which a motor still begins at rest, and how often the noise of a position over
-# a sample that may be: six deviations of the parabola's slope.
-_BEGINS = 0.03
-_BY_NOISE = 15.0
 # Share of a log that has to be left.
 _LEFT = 0.5
 
@@ -61,8 +59,7 @@ def from_rest(
         return given
     if not targets and not is_closed_loop(robot, logs):
         return given
-    noise = float(max(robot.position_noise_std, position_noise_std(logs).max()))
-    moving = [not begins_at_rest(log, noise) for log in logs]
+    moving = _moving(robot, logs, despite, simulates=not targets)
     if not any(moving):
         return given
     starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
@@ -79,13 +76,53 @@ def from_rest(
     return _taken(given, parts)
 
 
+def _moving(
+    robot: Robot, logs: list[Log], despite: Collection[str], *, simulates: bool
+) -> list[bool]:
+    """Return which logs begin in motion; where positions leave it open, by what a simulation has of their torque.
+
+    Where one does, others that leave it open do too: they were logged alike. At rest where it is open and
+    none can be run up to them.
+    """
+    noise = np.maximum(position_noise_std(logs), robot.position_noise_std)
+    noise = np.maximum(noise, encoder_steps(robot, logs) / np.sqrt(12.0))
+    how = [begins(log, noise) for log in logs]
+    moving = [one == "motion" for one in how]
+    if not simulates or "open" not in how:
+        return moving
+    open_logs = [log if one == "open" else None for log, one in zip(logs, how, strict=True)]
+    run_ups = [None if log is None else _run_up_of_open(robot, log, despite) for log in open_logs]
+    better = [
+        found is not None and run_up_is_better(robot, log, found)
+        for log, found in zip(logs, run_ups, strict=True)
+    ]
+    if not any(moving) and not any(better):
+        return moving
+    return [m or found is not None for m, found in zip(moving, run_ups, strict=True)]
+
+
+def _run_up_of_open(robot: Robot, log: Log, despite: Collection[str]) -> Log | None:
+    try:
+        return _run_up(robot, log, despite)
+    except NotRunUpError:
+        return None
+
+
 def _from_start(robot: Robot, log: Log, start_s: float | None, despite: Collection[str]) -> Log:
     """Return a log from where it stands, at ``start_s``, or with a run-up where it never does.
 
-    Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
+    Raises NotRunUpError as `_run_up`.
     """
     if start_s is not None:
         return log.part(start_s) if start_s else log
+    return _run_up(robot, log, despite)
+
+
+def _run_up(robot: Robot, log: Log, despite: Collection[str]) -> Log:
+    """Return a log with a run-up.
+
+    Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
+    """
     for fault in flagged(check_log_alone(log), despite):
         if fault.severity == "refuse":
             raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
@@ -111,17 +148,6 @@ def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
 def _first_s(log: Log, part: Log) -> float:
     """Return where [s] in a log its last part begins."""
     return (log.n_samples - part.n_samples) * log.sample_time_s
-
-
-def begins_at_rest(log: Log, noise_std: float) -> bool:
-    """Whether the motors stand where a log begins, by a parabola through its first positions.
-
-    ``noise_std`` of a position [rad].
-    """
-    step, x = log.sample_time_s, log.position_rad
-    speed = np.abs(4 * x[1] - x[2] - 3 * x[0]) / (2 * step)
-    top = np.abs(np.diff(x, axis=0)).max(axis=0) / step
-    return bool(np.all(speed < np.maximum(_BEGINS * top, _BY_NOISE * noise_std / step)))
 
 
 def first_rest_s(log: Log) -> float | None:

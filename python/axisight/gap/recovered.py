@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from axisight.gap.begun import begins_at_rest
+from axisight.gap.beginning import begins
 from axisight.gap.cutoff import rigid_below_hz
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -48,7 +48,7 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
     if np.any(np.asarray(robot.controller_gains["kp"]) <= 0):
         return None
     if not all(
-        _has_every_sample(log, robot) and begins_at_rest(log, robot.position_noise_std)
+        _has_every_sample(log, robot) and begins(log, robot.position_noise_std) != "motion"
         for log in logs
     ):
         return None

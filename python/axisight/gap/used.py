@@ -19,7 +19,7 @@ Span = tuple[float, float | None]
 # Seconds over which a mean speed is taken; of the largest speed, below which a motor stands; and deviations of
 # the noise of a mean speed.
 REST_S = 0.2
-_STANDS = 0.005
+STANDS = 0.005
 _NOISES = 6.0
 # Rest [s] that is kept before and after a motion, and that between two motions which makes them runs.
 _KEPT_S = 0.2
@@ -112,11 +112,11 @@ def stands(log: Log) -> NDArray[np.bool_]:
     n = max(4, round(REST_S / log.sample_time_s))
     speed = _speeds(log, n)
     noise = position_noise_std([log]) / (log.sample_time_s * n)
-    still = np.all(speed <= _STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
+    still = np.all(speed <= STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
     if log.velocity_ref_rad_s is not None:
         told = np.abs(log.velocity_ref_rad_s)
         told = scipy.ndimage.maximum_filter1d(told, n, axis=0, mode="nearest")
-        still &= np.all(told <= _STANDS * told.max(axis=0), axis=1)
+        still &= np.all(told <= STANDS * told.max(axis=0), axis=1)
     return np.asarray(still)
 
 

@@ -1,0 +1,100 @@
+"""How a log begins: at rest, in motion, or so that positions alone do not tell and a simulation does."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.poses import start_of
+from axisight.gap.used import STANDS
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import simulate
+
+Array = NDArray[np.float64]
+Begins = Literal["rest", "motion", "open"]
+
+# Samples of the shortest parabola through first positions, and seconds of the longest: loops answer a step of
+# their reference in some milliseconds.
+_FEWEST = 4
+_LONGEST_S = 0.01
+# Deviations by which noise moves a term of a parabola, and by which it moves positions off one.
+_NOISES = 6.0
+_OFF = 3.0
+# Share of the largest acceleration below which there is none.
+_STEADY = 0.03
+# Share of what a run-up cuts off along which simulations are compared: what is wrong of a beginning fades. Of what
+# one from rest is off the torque, in squares, what one in motion may be.
+_COMPARED = 0.5
+_BETTER = 0.5
+
+
+def begins(log: Log, noise_std: float | Array) -> Begins:
+    """Return how a log begins, by parabolas through ever more of its first positions.
+
+    ``noise_std`` of positions, one or (n_axes,) [rad]. In motion: with a speed that its acceleration has not
+    made from rest. Open: with an acceleration, as of a motor that turns round, and of one that a step of its
+    reference starts.
+    """
+    found, n = set(_of_first(log, _FEWEST, noise_std)), 2 * _FEWEST
+    while n * log.sample_time_s <= _LONGEST_S:
+        found |= set(_of_first(log, n, noise_std))
+        n *= 2
+    return "motion" if "motion" in found else "open" if "open" in found else "rest"
+
+
+def _of_first(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
+    """Return how every axis of a log begins, by the parabola through its first ``n`` positions."""
+    step, first = log.sample_time_s, log.position_rad[:n]
+    powers = np.vander(step * np.arange(n), 3, increasing=True)
+    solved = np.linalg.pinv(powers)
+    terms = solved @ first
+    speed, acceleration = np.abs(terms[1]), 2 * np.abs(terms[2])
+    of_speed, of_half = np.linalg.norm(solved[1:], axis=1)
+    top = np.abs(np.diff(log.position_rad, axis=0)).max(axis=0) / step
+    moves = speed > STANDS * top + _NOISES * of_speed * noise_std
+    most = _STEADY * _largest_acceleration(log, n)
+    turns = acceleration > most + 2 * _NOISES * of_half * noise_std
+    # Of one that begins at rest a parabola has no speed; what is no parabola has begun within it.
+    told = np.abs(first - powers @ terms).max(axis=0) < _OFF * noise_std + STANDS * top * step
+    sure = moves & told & (speed > 0.5 * acceleration * step * (n - 1))
+    return [
+        "motion" if a else "open" if b else "rest" for a, b in zip(sure, moves | turns, strict=True)
+    ]
+
+
+def _largest_acceleration(log: Log, n: int) -> Array:
+    """Return the largest acceleration (n_axes,) over ``n`` samples along a log."""
+    half, x = n // 2, log.position_rad
+    second = x[2 * half :] - 2 * x[half:-half] + x[: -2 * half]
+    return np.asarray(np.abs(second).max(axis=0) / (half * log.sample_time_s) ** 2)
+
+
+def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
+    """Whether a simulation that is run up to a log's first motion has more of its torque than one from rest.
+
+    ``run_up``: the log as `axisight.gap.in_motion.run_up_to` returns it; compared is the first half of what
+    that cuts off.
+    """
+    cut = log.n_samples - run_up.n_samples
+    lead, n = run_up.lead - cut, round(_COMPARED * cut)
+    references = run_up.led("velocity_ref_rad_s")[: lead + n]
+    assert run_up.start_rad is not None  # it has a run-up
+    moving = _missed(robot, log, references, run_up.start_rad, n)
+    at_rest = start_of(robot, log.position_rad[0])
+    return moving < _BETTER * _missed(robot, log, references[lead:], at_rest, n)
+
+
+def _missed(robot: Robot, log: Log, references: Array, start_rad: Array, n: int) -> float:
+    """Return what a simulation is off the first ``n`` torques of a log, in mean squares of their size.
+
+    Along references (m, n_axes) [rad/s] that end where these do, from rest at joint angles ``start_rad``.
+    """
+    run = simulate(robot, references, method="rk4", start_rad=start_rad)
+    torque = run["torque_cmd_nm"].values
+    if len(torque) < len(references):
+        return float("inf")
+    size = np.maximum(log.torque_nm.std(axis=0), 1e-300)
+    return float(np.mean(((torque[-n:] - log.torque_nm[:n]) / size) ** 2))
