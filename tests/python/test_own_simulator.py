@@ -14,11 +14,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
-from axisight import Effect, Log, Robot, diagnose, load_robot, simulate
+import rigid_arm
+from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, simulate
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.explore.session import Session, Version
 from axisight.gap import verdict_schema
+from axisight.gap.inverse import InverseView
 from axisight.gap.own_simulator import differs, noted, paired
 from gap_data import log_of
 from servo_arm import MACHINES as SERVOS
@@ -26,6 +28,7 @@ from servo_arm import NOMINAL, simulator
 
 Array = NDArray[np.float64]
 
+QUICK = Settings(bootstrap=50)
 THEIRS = Effect("coulomb_friction", 2, {"coulomb_nm": 0.5})
 MACHINES = Effect("viscous_friction", 3, {"viscous_nm_s_rad": 0.05})
 
@@ -117,6 +120,83 @@ def test_by_inverse_dynamics_the_gap_stays_that_of_the_model(
     assert found.simulator is not None
     assert not found.simulator.taken_off
     assert "the gap is that of the model" in " ".join(found.checks)
+
+
+# Of a rigid arm: friction that their simulator has on axis 1, and the machine on axes 1 and 3 [Nm].
+THEIR_COULOMB_NM = (8.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+COULOMB_NM = (8.0, 0.0, 7.0, 0.0, 0.0, 0.0)
+
+
+def rigid_logs(rigid: Robot, late_s: float = 0.0) -> tuple[list[Log], list[Log]]:
+    """Logs of a machine, and of a simulator without noise along the same motion, or somewhat later."""
+    real = [rigid_arm.log_of(rigid, i, COULOMB_NM, np.zeros(6), 10.0) for i in range(3)]
+    return real, [along(rigid, log, i, late_s) for i, log in enumerate(real)]
+
+
+def along(rigid: Robot, log: Log, seed: int, late_s: float) -> Log:
+    """What their simulator has along the motion of a log."""
+    position, speed, acceleration = rigid_arm.motion(seed, 10.0)
+    rotors = np.array([rigid_arm.motor_inertia(mass) for mass in rigid_arm.MASSES])
+    torque = rigid.inverse_dynamics(position, speed, acceleration) + rotors * acceleration
+    torque += rigid_arm.friction_torque(speed, np.array(THEIR_COULOMB_NM), np.zeros(6))
+    samples = round(late_s * rigid_arm.RATE_HZ)
+    return replace(
+        log,
+        torque_nm=np.roll(torque, samples, axis=0),
+        # The motions are periods of ten seconds.
+        position_rad=np.roll(position, samples, axis=0) if samples else log.position_rad,
+    )
+
+
+def test_along_the_same_motion_inverse_dynamics_takes_it_off() -> None:
+    rigid = rigid_arm.arm()
+    real, own = rigid_logs(rigid)
+    found = diagnose(
+        robot=rigid, estimation=real[:2], validation=real[2:], simulated=own, settings=QUICK
+    )
+    assert found.mode == "inverse_dynamics"
+    assert [c.label for c in found.causes] == ["coulomb_friction@3"]
+    assert found.causes[0].parameters["coulomb_nm"].value == pytest.approx(7.0, rel=0.05)
+    assert found.simulator is not None
+    assert found.simulator.taken_off
+    assert differs(found.simulator).tolist() == [0]
+    # On the axis of their friction noise is left.
+    gap = found.gap
+    assert gap.before_per_axis[0] == pytest.approx(gap.floor_per_axis[0], rel=0.1)
+    assert "the gap is that of your simulator" in " ".join(found.checks)
+    seen = Session("along", rigid, real[:2], real[2:], simulated=own)
+    assert seen.held_gap() == pytest.approx(found.gap.before_per_axis)
+
+
+def test_along_another_motion_the_gap_stays_that_of_the_model() -> None:
+    """Thirty milliseconds later: what friction makes of reversals lies beside those of the log."""
+    rigid = rigid_arm.arm()
+    real, own = rigid_logs(rigid, late_s=0.03)
+    found = diagnose(
+        robot=rigid, estimation=real[:2], validation=real[2:], simulated=own, settings=QUICK
+    )
+    assert {c.label for c in found.causes} == {"coulomb_friction@1", "coulomb_friction@3"}
+    assert found.simulator is not None
+    assert not found.simulator.taken_off
+    assert differs(found.simulator).tolist() == [0]
+    assert "your simulator goes other ways" in " ".join(found.checks)
+
+
+def test_motions_lie_apart_by_a_share_of_them() -> None:
+    """Identity, and by hand: a motion that is one per cent larger is one per cent off in speed."""
+    rigid = rigid_arm.arm()
+    real, own = rigid_logs(rigid)
+    view = InverseView(rigid, real[:2], QUICK, real[2:])
+    np.testing.assert_allclose(view.apart(real, own), 0.0, atol=1e-12)
+    larger = [replace(x, position_rad=1.01 * x.position_rad) for x in real]
+    speeds = [view.filtering(x)[1] for x in real]
+    by_hand = np.sqrt((np.concatenate(speeds) ** 2).mean(axis=0)) / np.concatenate(speeds).std(
+        axis=0
+    )
+    apart = view.apart(real, larger)
+    assert np.all(apart >= 0.01 * by_hand * (1 - 1e-9))
+    # Inertia, linear in the motion, and gravity, at most so.
+    assert np.all(apart < 0.03)
 
 
 def test_logs_of_other_motions_are_refused(real: list[Log], theirs: list[Log]) -> None:

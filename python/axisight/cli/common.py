@@ -59,8 +59,8 @@ Model = Annotated[
 Simulated = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Log of your own simulator under the references of a log: one for each estimation log, "
-        "then each validation log (repeatable)."
+        help="Log of your own simulator under the references of a log, or along its motion: one for each "
+        "estimation log, then each validation log (repeatable)."
     ),
 ]
 

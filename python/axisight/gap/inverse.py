@@ -89,6 +89,19 @@ class InverseView(View):
         moved = (self.filtering(x) for x in logs)
         return [self._low_passed(predicted_torque(self.robot, variant, at)) for at in moved]
 
+    def off_model(self, log: Log) -> Array:
+        """Return what the torque of a log is off the predicted one (n, n_axes) [Nm], as others are low-passed later."""
+        return log.torque_nm - predicted_torque(self.robot, AS_GIVEN, self.filtering(log))
+
+    def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
+        """Return how far the motions of others are off those of logs (n_axes,) [1].
+
+        The larger of two: rms of speeds, and of the torques predicted along both, over those of the logs.
+        """
+        speeds, theirs = ([self.filtering(x)[1] for x in each] for each in (logs, others))
+        torques = [self.torques(AS_GIVEN, each) for each in (logs, others)]
+        return np.maximum(_relative(speeds, theirs), _relative(*torques))
+
     def _low_passed(self, torque_nm: Array) -> Array:
         return self.filtering.compared(torque_nm, self._sample_time_s)
 
@@ -128,6 +141,13 @@ class InverseView(View):
         if self.noise.repeated:
             out.append("The floor is what repeats of one motion differ by.")
         return tuple(out)
+
+
+def _relative(these: Sequence[Array], others: Sequence[Array]) -> Array:
+    """Return the rms (n_axes,) of what others are off signals over theirs about its mean [1]."""
+    signal, other = np.concatenate(these), np.concatenate(others)
+    size = np.maximum(signal.std(axis=0), 1e-300)
+    return np.asarray(np.sqrt(np.mean((other - signal) ** 2, axis=0)) / size)
 
 
 # Stretches of time that a gain is compared over need that many blocks, all logs together.

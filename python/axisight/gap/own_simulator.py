@@ -42,7 +42,7 @@ def said(found: Reproduction, compared: Compared = "torques") -> str:
     whose = (
         "the gap is that of your simulator, from the logs less this difference"
         if found.taken_off
-        else "the gap is that of the model"
+        else "the gap is that of the model, for your simulator goes other ways than the machine"
     )
     return f"The model differs from your simulator by {axes} of its {torque_of(compared)}; {whose}."
 
@@ -112,20 +112,22 @@ def _paired(log: Log, own: Log) -> Log:
 class Difference:
     """What the user's simulator is off the model along each log: (n, n_axes) each.
 
-    ``torques_nm`` as they are compared, ``positions_rad`` of the motors; ``theirs_nm``: torques of the
-    user's simulator.
+    ``torques_nm`` as they are compared, and ``taken_nm`` as they are taken off logs; ``positions_rad`` of the
+    motors; ``theirs_nm``: torques of the user's simulator.
     """
 
     theirs_nm: tuple[Array, ...]
     torques_nm: tuple[Array, ...]
+    taken_nm: tuple[Array, ...]
     positions_rad: tuple[Array, ...]
 
     def taken_from(self, logs: Sequence[Log]) -> list[Log]:
         """Return logs with it taken off: what is left to the model is the gap of the user's simulator.
 
-        To first order of the difference, for the loop of the machine answers to both.
+        To first order of the difference, for the loop of the machine answers to both; by inverse dynamics as
+        far as both go the same way.
         """
-        each = zip(logs, self.torques_nm, self.positions_rad, strict=True)
+        each = zip(logs, self.taken_nm, self.positions_rad, strict=True)
         return [_less(log, u, x) for log, u, x in each]
 
 
@@ -142,7 +144,7 @@ def _less(log: Log, torque_nm: Array, position_rad: Array) -> Log:
 def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:
     """Return what ``simulated`` logs are off the model of ``view``.
 
-    By inverse dynamics both go the motion of the log, and positions differ by nothing.
+    By inverse dynamics the model goes the motion of each log, and positions differ by nothing.
     """
     theirs = tuple(view.measured(own) for own in simulated)
     ours = view.torques(AS_GIVEN, simulated)
@@ -152,33 +154,45 @@ def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Diff
     return Difference(
         theirs,
         tuple(their - our for their, our in zip(theirs, ours, strict=True)),
+        tuple(view.off_model(own) for own in simulated),
         tuple(own.position_rad - x for own, x in zip(simulated, moved, strict=True)),
     )
 
 
 def reproduction(
-    view: View, logs: Sequence[Log], off: Difference, settings: Settings
+    view: View, logs: Sequence[Log], simulated: Sequence[Log], off: Difference, settings: Settings
 ) -> Reproduction:
     """Return how far the model of ``view`` reproduces the user's simulator, which is ``off`` it by so much.
 
-    In closed loop the difference can be taken off the logs; by inverse dynamics the two go other ways.
+    In closed loop the difference can be taken off the logs. By inverse dynamics it can where both go the same
+    way: it is known along the motions of ``simulated``, and dry friction, which turns round with the speed, is
+    off by the root of the share by which these lie apart.
     """
     real = [view.measured(log) for log in logs]
-    taken_off = view.mode == "closed_loop"
-    model = off.theirs_nm if taken_off else view.torques(AS_GIVEN, logs)
-    errors = [a - b for a, b in zip(real, model, strict=True)]
+    size = _rms(off.torques_nm)
+    theirs = list(off.theirs_nm)
+    taken_off = True
+    if view.mode == "inverse_dynamics":
+        model = view.torques(AS_GIVEN, logs)
+        theirs = [a + b for a, b in zip(model, off.torques_nm, strict=True)]
+        wrong = size * np.sqrt(view.apart(logs, simulated))
+        taken_off = bool(np.all(wrong <= _HARMLESS * _rms(_less_each(real, theirs))))
+        theirs = theirs if taken_off else model
     about_mean = [their - their.mean(axis=0) for their in off.theirs_nm]
     noises = view.noises(logs, 0)
     items = [ErrorLog(*each) for each in zip(logs, off.torques_nm, noises, strict=True)]
     bands = band_map(items, settings.block_s)
     regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
-    size = _rms(off.torques_nm)
     return Reproduction(
         size / np.maximum(_rms(about_mean), 1e-300),
-        size / np.maximum(_rms(errors), 1e-300),
+        size / np.maximum(_rms(_less_each(real, theirs)), 1e-300),
         taken_off,
         findings(bands, regimes, settings.significance),
     )
+
+
+def _less_each(these: Sequence[Array], others: Sequence[Array]) -> list[Array]:
+    return [a - b for a, b in zip(these, others, strict=True)]
 
 
 def _rms(parts: Sequence[Array]) -> Array:

@@ -98,9 +98,10 @@ def diagnose(
     separate : also design the experiment that tells the causes apart which stay open,
         ``Diagnosis.experiment`` (closed loop only).
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
-    simulated : logs of one's own simulator under the same references, one for each estimation log and
-        then each validation log: how far the model reproduces it, ``Diagnosis.simulator``; in closed
-        loop the gap is then that of this simulator.
+    simulated : logs of one's own simulator under the same references, or along the same motion, one for
+        each estimation log and then each validation log: how far the model reproduces it,
+        ``Diagnosis.simulator``; the gap is then that of this simulator, by inverse dynamics if motions
+        are alike.
 
     Returns
     -------
@@ -214,7 +215,7 @@ class _Inputs:
             as_logged = own_simulator.paired(commanded.as_logged(), simulated)
             beside = commanded.of(as_logged)
         off = own_simulator.difference(view, beside, settings)
-        found = own_simulator.reproduction(view, logs, off, settings)
+        found = own_simulator.reproduction(view, logs, beside, off, settings)
         if found.taken_off:
             logs = off.taken_from(logs)
         if commanded is not None:

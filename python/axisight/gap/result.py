@@ -149,7 +149,8 @@ class Reproduction:
     ``per_axis`` (n_axes,): rms of the difference of torques over the rms of the user's about its mean
     [1]; ``of_gap`` (n_axes,): the same over the rms of the error of the user's simulator, of the model
     where nothing was ``taken_off``: whether the differences were taken off the logs, so that the gap is
-    that of the user's simulator. ``where`` they lie, of what exceeds the noise of the logs.
+    that of the user's simulator; not by inverse dynamics along motions that are too far apart. ``where``
+    they lie, of what exceeds the noise of the logs.
     """
 
     per_axis: Array

@@ -115,6 +115,15 @@ class View(ABC):
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
+    def off_model(self, log: Log) -> Array:
+        """Return what the torque of a log is off the model's, as it is taken off others (n, n_axes) [Nm]."""
+        return np.asarray(self.measured(log) - self.torques(AS_GIVEN, [log])[0])
+
+    def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
+        """Return how far motions that torques are predicted from lie apart (n_axes,) [1], zero where none are."""
+        del logs, others
+        return np.zeros(self.robot.n_axes)
+
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array | None]:
         """Return torque [Nm] and motor position [rad] of a simulator on one log, (n, n_axes) each.
 
