@@ -1,9 +1,10 @@
-"""MCAP files that tests write with its own library: messages in JSON and protobuf."""
+"""MCAP files that tests write with its own library: messages in JSON, protobuf and CDR."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ pytest.importorskip("mcap", reason="needs axisight[mcap]")
 pytest.importorskip("mcap_protobuf", reason="needs axisight[mcap]")
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.writer import Writer as ProtobufWriter
 
@@ -96,4 +98,71 @@ def written_protobuf(path: Path, topic: str, messages: Iterable[tuple[float, Any
         for time_s, message in messages:
             when = START_NS + round(time_s * 1e9) + 300_000
             writer.write_message(topic=topic, message=message, log_time=when, publish_time=when)
+    return path
+
+
+# sensor_msgs/msg/JointState as ROS 2 generates it from its messages.
+JOINT_STATE_IDL = """\
+module builtin_interfaces { module msg {
+  struct Time { int32 sec; uint32 nanosec; };
+}; };
+module std_msgs { module msg {
+  struct Header { builtin_interfaces::msg::Time stamp; string frame_id; };
+}; };
+module sensor_msgs { module msg {
+  struct JointState {
+    std_msgs::msg::Header header;
+    sequence<string> name;
+    sequence<double> position;
+    sequence<double> velocity;
+    sequence<double> effort;
+  };
+}; };
+"""
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What stands of a type beside its messages, by what is other than in a recording of ROS 2."""
+
+    name: str | None = None
+    encoding: str | None = None
+    text: str | None = None
+
+
+def not_of_ros(
+    path: Path,
+    recording: Path,
+    *,
+    profile: str = "",
+    definition: Definition = Definition(),
+    beside: Mapping[str, Iterable[tuple[float, Any]]] | None = None,
+    spoiled: Mapping[int, bytes] | None = None,
+) -> Path:
+    """Write the MCAP file of a recording of ROS 2 as others write it, with JSON topics ``beside``.
+
+    ``spoiled``: other bytes of messages, by their number.
+    """
+    with recording.open("rb") as source, path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile=profile, library="test")
+        channels: dict[int, int] = {}
+        for k, (schema, channel, message) in enumerate(make_reader(source).iter_messages()):
+            assert schema is not None
+            if channel.id not in channels:
+                kept = writer.register_schema(
+                    definition.name or schema.name,
+                    definition.encoding or schema.encoding,
+                    schema.data if definition.text is None else definition.text.encode(),
+                )
+                channels[channel.id] = writer.register_channel(channel.topic, "cdr", kept)
+            data = (spoiled or {}).get(k, message.data)
+            writer.add_message(channels[channel.id], message.log_time, data, message.log_time)
+        for topic, messages in (beside or {}).items():
+            kept = writer.register_schema(topic, "jsonschema", b'{"type": "object"}')
+            other = writer.register_channel(topic, "json", kept)
+            for time_s, value in messages:
+                when = START_NS + round(time_s * 1e9)
+                writer.add_message(other, when, json.dumps(value).encode(), when)
+        writer.finish()
     return path

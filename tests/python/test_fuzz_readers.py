@@ -98,9 +98,9 @@ def test_damaged_recordings(tmp_path, kind):
     sound(read_in_child(paths, STATES, seconds=10, limit=3 * 10**9))
 
 
-@pytest.mark.parametrize("kind", ["json", "protobuf"])
+@pytest.mark.parametrize("kind", ["json", "protobuf", "cdr"])
 def test_damaged_recordings_of_others(tmp_path, kind):
-    """The file, and of JSON the text of a message in a sound file."""
+    """The file, and of JSON and CDR a message in a sound file, of CDR its definition too."""
     data = pytest.importorskip("mcap_data", reason="needs axisight[mcap]")
     rng, path = np.random.default_rng(12), tmp_path / "good.mcap"
     times = np.arange(120) / 100.0
@@ -108,6 +108,19 @@ def test_damaged_recordings_of_others(tmp_path, kind):
         flat = data.protobuf_types()["Flat"]
         rows = [(t, flat(name=["a"], position=[np.sin(t)], effort=[1.0])) for t in times]
         paths = batch(tmp_path, data.written_protobuf(path, "/joint_states", rows), rng)
+    elif kind == "cdr":
+        fields = [np.sin(times)[:, None]] * 3
+        states = written_states(tmp_path / "run", "mcap file", times, ["a"], fields)
+        paths = batch(tmp_path, data.not_of_ros(path, states), rng)
+        text = data.JOINT_STATE_IDL
+        message = bytes(8) + b"\x05\x00\x00\x00abcd\x00" + bytes(64)
+        for number in range(TIMES // 4):
+            spoiled = mutated(text.encode(), rng).decode("latin-1")
+            definition = data.Definition(encoding="ros2idl", text=spoiled)
+            other = tmp_path / f"definition{number}.mcap"
+            paths.append(data.not_of_ros(other, states, definition=definition))
+            other = tmp_path / f"message{number}.mcap"
+            paths.append(data.not_of_ros(other, states, spoiled={5: mutated(message, rng)}))
     else:
         rows = [(t, {"name": ["a"], "position": [np.sin(t)], "effort": [1.0]}) for t in times]
         paths = batch(tmp_path, data.written_json(path, {"/joint_states": rows}), rng)

@@ -228,7 +228,7 @@ def test_other_encodings_are_refused_by_name(tmp_path: Path, robot: Robot):
     path = written_json(tmp_path / "run.mcap", {"/arm": [(0.0, b"123")]}, encoding="flatbuffer")
     with pytest.raises(
         LogError,
-        match="left out topic /arm: expected messages in json or protobuf, got 'flatbuffer'",
+        match="left out topic /arm: expected messages in json, protobuf or cdr, got 'flatbuffer'",
     ):
         read_log(path, robot=robot)
     lying = written_json(tmp_path / "lying.mcap", {"/arm": [(0.0, b"1")]}, encoding="protobuf")

@@ -33,22 +33,21 @@ _NUMBER_COST = 64
 class Topics:
     """What messages of all topics say, each topic and set of joints a series.
 
-    Numbers count against ``budget`` as messages come. ``numbered``: arrays without names have numbers for
-    names, from 0 on.
+    Numbers count against ``budget`` as messages come.
     """
 
-    def __init__(self, budget: Budget, *, numbered: bool = False) -> None:
+    def __init__(self, budget: Budget) -> None:
         self._budget = budget
-        self._numbered = numbered
         self._series: dict[tuple[str, frozenset[str]], _Series] = {}
 
-    def add(self, topic: str, received_ns: int, message: Any) -> None:
+    def add(self, topic: str, received_ns: int, message: Any, *, numbered: bool = False) -> None:
         """Add a message, a dataclass or a dictionary; its time is its stamp, or when it was received.
 
-        What is wrong with a field is said, by topic and time, to those who ask for it.
+        ``numbered``: arrays without names have numbers for names, from 0 on. What is wrong with a field is
+        said, by topic and time, to those who ask for it.
         """
         names = _names(message)
-        walk = _Walk(names, numbered=self._numbered and not names)
+        walk = _Walk(names, numbered=numbered and not names)
         row = dict(walk.numbers(message))
         self._budget.take(_NUMBER_COST * len(row))
         label = topic.strip("/").replace("/", ".")

@@ -34,11 +34,10 @@ def load_bag(path: Path, budget: Budget | None = None) -> LazyArrays:
     MissingExtraError.
     """
     budget = _own_budget(path) if budget is None else budget
+    topics = Topics(budget)
     if path.suffix.lower() == ".mcap" and path.is_file() and not is_of_ros(path):
-        topics = Topics(budget, numbered=True)
         left_out = read_mcap(path, topics, budget)
     else:
-        topics = Topics(budget)
         left_out = _read_ros(path, topics)
     readers = topics.readers()
     doubts = tuple(

@@ -1,4 +1,4 @@
-"""MCAP files that are not of ROS: messages in JSON or protobuf."""
+"""MCAP files that are not of ROS: messages in JSON, protobuf, or CDR by a definition of ROS 2."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 from axisight.arguments import short
 from axisight.errors import LogError, MissingExtraError
 from axisight.logs.budget import Budget
+from axisight.logs.cdr import decoder_of_ros2
 from axisight.logs.messages import Topics, said_of
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -19,6 +20,7 @@ _HEAD, _LONGEST_PROFILE = 8 + 1 + 8 + 4, 64
 # A message that is longer is a picture or a cloud of points.
 _LONGEST_BYTES = 2**20
 _DEEPEST = 8
+_CDR = "cdr"
 _Decoder = Callable[[bytes], Any]
 
 
@@ -32,7 +34,7 @@ def is_of_ros(path: Path) -> bool:
 
 
 def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]]:
-    """Read all messages in JSON and protobuf, and return the topics that were left out by the reason.
+    """Read all messages in JSON, protobuf and CDR, and return the topics that were left out by the reason.
 
     Raises LogError naming topic and time for messages that are not of their encoding, MissingExtraError
     without the library of one that is there.
@@ -60,7 +62,10 @@ def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]
                     names.append(channel.topic)
                 continue
             said = said_of(channel.topic, message.log_time)
-            topics.add(channel.topic, message.log_time, _decoded(decode, message.data, said))
+            # Those of ROS are read as in its own recordings, which have arrays with names only.
+            numbered = channel.message_encoding != _CDR
+            decoded = _decoded(decode, message.data, said)
+            topics.add(channel.topic, message.log_time, decoded, numbered=numbered)
     return left_out
 
 
@@ -81,8 +86,10 @@ def _decoder(schema: Any, channel: Any) -> _Decoder | str:
     encoding = channel.message_encoding
     if encoding == "json":
         return _of_json
+    if encoding == _CDR:
+        return decoder_of_ros2(schema, channel.topic)
     if encoding != "protobuf":
-        return f"expected messages in json or protobuf, got {short(encoding)!r}"
+        return f"expected messages in json, protobuf or cdr, got {short(encoding)!r}"
     library = _library(
         "mcap_protobuf.decoder", f"topic {short(channel.topic)}: messages in protobuf"
     )
