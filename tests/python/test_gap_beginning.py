@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,15 @@ def test_creeping_is_motion_and_standing_is_rest(robot: Robot) -> None:
         assert {begins(x, NOISE_RAD) for x in creeping_logs(robot, withheld)} == {"motion"}
         still = creeping_logs(robot, withheld, STANDS)
         assert {begins(x, NOISE_RAD) for x in still} == {"rest"}
+
+
+@pytest.mark.parametrize("samples", [1, 2, 4, 5, 6, 9, 17])
+def test_a_few_samples_are_told_as_well_as_they_can_be(samples: int) -> None:
+    log = at_once(bare_axis(), "step", "none")
+    cut = {"time_s": log.time_s, "torque_nm": log.torque_nm, "position_rad": log.position_rad}
+    moving = {name: values[4000 : 4000 + samples] for name, values in cut.items()}
+    few = replace(log, velocity_ref_rad_s=None, **moving)
+    assert begins(few, NOISE_RAD) == ("rest" if samples <= 4 else "motion")
 
 
 @pytest.mark.parametrize("kind", ["step", "rise"])

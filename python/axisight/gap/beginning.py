@@ -36,10 +36,12 @@ def begins(log: Log, noise_std: float | Array) -> Begins:
 
     ``noise_std`` of positions, one or (n_axes,) [rad]. In motion: with a speed that its acceleration has not
     made from rest. Open: with an acceleration, as of a motor that turns round, and of one that a step of its
-    reference starts.
+    reference starts. A few samples are at rest, for all that they say.
     """
+    if log.n_samples <= _FEWEST:
+        return "rest"
     found, n = set(_of_first(log, _FEWEST, noise_std)), 2 * _FEWEST
-    while n * log.sample_time_s <= _LONGEST_S:
+    while n * log.sample_time_s <= _LONGEST_S and n < log.n_samples:
         found |= set(_of_first(log, n, noise_std))
         n *= 2
     return "motion" if "motion" in found else "open" if "open" in found else "rest"
