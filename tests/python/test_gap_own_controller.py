@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Effect, Robot, simulate
+from axisight import Effect, Robot, Settings, simulate
 from axisight.errors import InputError
+from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.own_controller import other_controllers
 from gap_data import HELD, PLAN, bare_axis, logs_of, reference, scattered
 
@@ -64,7 +65,7 @@ def test_a_gain_that_is_all_but_off_is_said_not_taken_for_an_effect():
     with pytest.raises(
         InputError, match=r"axis 1: expected gains .* got 0\.01 times the integral one"
     ):
-        other_controllers(bare_axis(), logs_of(machine, [], PLAN))
+        ClosedLoopView(bare_axis(), logs_of(machine, [], PLAN), Settings())
 
 
 @pytest.mark.parametrize(

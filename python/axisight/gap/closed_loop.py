@@ -22,7 +22,7 @@ from axisight.gap.feedback import loop_responses, periodic_response
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
-from axisight.gap.own_controller import other_controllers
+from axisight.gap.own_controller import check_gains, other_controllers
 from axisight.gap.own_effects import with_values
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.search import Search
@@ -70,6 +70,7 @@ class ClosedLoopView(View):
         self.tracking = slow.with_effects([e for e in robot.effects if not _of_drive(e)])
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
+        check_gains(others)
         self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
         self._step_rad = encoder_steps(robot, logs)
         floor, self._weights = tracking_floor(self.tracking, self._noisy, logs, settings)

@@ -113,10 +113,7 @@ class _Law:
 
 
 def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
-    """Return what is different about the controller, axis by axis, where logs show it.
-
-    Raises InputError where a gain is nowhere near the stated one: no effect stands for that.
-    """
+    """Return what is different about the controller, axis by axis, where logs show it."""
     controllers = (OTHER_GAINS[0], SPEED_FILTER[0], FEEDFORWARD[0])
     known = {e.axis for e in robot.effects if e.name in controllers}
     axes = [i for i in range(robot.n_axes) if i + 1 not in known]
@@ -241,7 +238,6 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
     explained = 1.0 - law.total / stated.total
     samples = sum(len(p.torque) for p in pieces)
     if np.any(np.abs(law.factors - 1) > _SAME):
-        _check_factors(axis, law.factors)
         each = np.array([_factors([p], law.lag_s) for p in pieces])
         spread = np.maximum(each.std(axis=0) * 2 / np.sqrt(len(pieces)), _FORMULA)
         values = {
@@ -277,15 +273,17 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
     return out
 
 
-def _check_factors(axis: int, factors: Array) -> None:
+def check_gains(shown: Sequence[ShownCause]) -> None:
     """Raise InputError where a gain is so far from the stated one that no effect of the simulator has it."""
-    shares = ("proportional", "integral")
-    for share, factor, p in zip(
-        shares, factors, effect_info(OTHER_GAINS[0]).parameters, strict=True
-    ):
-        least, most = 1 + p.lower, 1 + p.upper
-        if not least <= factor <= most:
-            raise InputError(
-                f"controller: axis {axis + 1}: expected gains whose shares the logged torque has {least:.3g} to "
-                f"{most:.3g} times, got {factor:.3g} times the {share} one: state the machine's gains in the robot file"
-            )
+    limits = effect_info(OTHER_GAINS[0]).parameters
+    for cause in shown:
+        if cause.name != OTHER_GAINS[0]:
+            continue
+        for share, p in zip(("proportional", "integral"), limits, strict=True):
+            change = cause.values[p.name].value
+            if not p.lower <= change <= p.upper:
+                raise InputError(
+                    f"controller: axis {cause.axis}: expected gains whose shares the logged torque has "
+                    f"{1 + p.lower:.3g} to {1 + p.upper:.3g} times, got {1 + change:.3g} times the {share} one: "
+                    f"state the machine's gains in the robot file"
+                )
