@@ -316,9 +316,9 @@ def test_lags_of_an_axis_are_held_against_one_another_by_less():
     found = standing([delay, lag, friction])
     p = {r.trial.candidate.effect.name: r.probability for r in found.ranked}
     assert p["actuator_bandwidth"] == pytest.approx(p["coulomb_friction"])
-    # Two thousandths of what there was to explain (10), not two hundredths.
-    ratio = (1.05 + 0.02) / (1.02 + 0.02)
-    assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**30)
+    # Three ten-thousandths of what there was to explain (10), not two hundredths; and four times as sure.
+    ratio = (1.05 + 0.003) / (1.02 + 0.003)
+    assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**120)
     # Of another axis they leave what the rest of the model does.
     elsewhere = [a_trial(t.candidate.effect.name, 1, t.held_out, axis=2) for t in (delay, lag)]
     p = {r.trial.candidate.effect.name: r.probability for r in standing(elsewhere).ranked}

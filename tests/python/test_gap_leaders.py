@@ -8,7 +8,7 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.effects import effect_info
-from axisight.gap import trials
+from axisight.gap import leading, trials
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.trials import Trials
 
@@ -55,7 +55,7 @@ def field_of(*standings, waiting=()):
 
 @pytest.fixture(autouse=True)
 def promised(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(trials, "linear_gain", lambda evidence: evidence.promise)
+    monkeypatch.setattr(leading, "linear_gain", lambda evidence: evidence.promise)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def promised(monkeypatch: pytest.MonkeyPatch):
     ids=["may catch up", "has settled", "needs more numbers", "is far behind"],
 )
 def test_a_leader_is_clear_of_what_cannot_catch_up(rival, clear: bool):
-    assert trials._clear(standing(0, ranked(LOAD, 1.0, cost=4), rival)) == clear
+    assert leading.clear(standing(0, ranked(LOAD, 1.0, cost=4), rival)) == clear
 
 
 @pytest.mark.parametrize(("promise", "clear"), [(0.15, False), (1e-4, True)])
@@ -77,7 +77,7 @@ def test_a_lag_is_clear_of_no_other_that_has_not_settled(promise: float, clear: 
     """They are held against one another by little."""
     delay = ranked(Effect("input_delay", 1), 0.999)
     loop = ranked(Effect("current_loop", 1), 0.998, cost=2, promise=promise)
-    assert trials._clear(standing(0, delay, loop)) == clear
+    assert leading.clear(standing(0, delay, loop)) == clear
 
 
 def test_what_is_more_usual_than_a_clear_leader_is_refined():

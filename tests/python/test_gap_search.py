@@ -154,7 +154,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _worth_refining(self, trials, crooked, *, even_felt):
             return [t for t in trials if t.label not in self.done]
 
-        def _with_gears(self, pool, trials, options):
+        def _with_kin(self, pool, trials, options):
             return trials
 
     def settled(fitter, free_, start):

@@ -58,7 +58,7 @@ def test_halves_bring_a_candidate_most_of_the_way(view, whole, friction, screen)
     gain = whole.total - direct.total
     # What a step from there would gain is part of the score.
     fall = float(held_out_loss(whole).sum() - looked_at.held_out.sum())
-    assert 0.9 * gain < fall <= gain * (1 + 1e-3)
+    assert 0.9 * gain < fall <= gain * (1 + 2e-3)
     # A trial is of the candidate as it was offered.
     assert looked_at.candidate is friction
 
@@ -71,8 +71,8 @@ def test_where_a_screen_has_all_data_candidates_are_fitted_to_it(view, whole, fr
     fitted = tryout.ended(begun)
     direct = view.fitter.fit([friction], whole, lazy=True)
     assert fitted is not None
-    # Both end where a step promises less than a thousandth.
-    assert fitted.evidence.total == pytest.approx(direct.total, rel=2e-3)
+    # Both end where a step promises less than a thousandth; of few steps that are left, each may bring that.
+    assert fitted.evidence.total == pytest.approx(direct.total, rel=5e-3)
 
 
 def test_what_stands_elsewhere_stays_as_it_is(view, whole, friction, screen):

@@ -20,13 +20,17 @@ Array = NDArray[np.float64]
 Members = NDArray[np.int64]
 
 # Share of the explained error that the right one leaves, on simulated machines of other engines: of delays and
-# lags one to two thousandths; of laws of friction, where one leaves hardly more than noise, half of one; of what
-# changes rigid bodies or their weight, and of constant errors of torque, less than a ten-thousandth.
-_LAGS, _LAWS, _EXACT = 0.002, 5e-4, 1e-4
+# lags, fitted until they end, one to three ten-thousandths; of laws of friction, where one leaves hardly more
+# than noise, half a thousandth; of what changes rigid bodies or their weight, and of constant errors of torque,
+# less than a ten-thousandth.
+_LAGS, _LAWS, _EXACT = 3e-4, 5e-4, 1e-4
 # Next to nothing, as a share of that: real machines leave more of any law. And hardly more than noise: of a
 # law of friction that leaves more, it is not known what of it the law leaves.
 NEXT_TO_NOTHING = 1e-3
 _HARDLY_MORE = 4.0
+# By how many times more than for other rivals the difference between lags counts: they are linear in the torque, and
+# what is left of the right one is white.
+_LAGS_SURER = 4.0
 # Sums of the same residuals in another order.
 _ROUNDING = 1e-9
 
@@ -47,10 +51,10 @@ def held_apart(
     predicted, less than ``least`` by chance; ``likelihood`` of what some of them leave, logarithmic.
     """
     out = logp.copy()
-    for members, error in _kinds(candidates, axis, losses, explainable, least):
+    for members, error, surer in _kinds(candidates, axis, losses, explainable, least):
         if len(members) > 1:
             left = np.maximum(losses[members], least) + error * explainable
-            sharper = likelihood(left, members)
+            sharper = likelihood(left**surer, members)
             out[members] = logp[members].max() + sharper - sharper.max()
             _tie(out, losses, members)
     return out
@@ -58,8 +62,8 @@ def held_apart(
 
 def _kinds(
     candidates: Sequence[FreeEffect], axis: int, losses: Array, explainable: float, least: float
-) -> Iterator[tuple[Members, float]]:
-    """Yield which are of one kind, and what the right one of them may leave."""
+) -> Iterator[tuple[Members, float, float]]:
+    """Yield which are of one kind, what the right one of them may leave, and how many times as much it counts."""
     effects = [c.effect for c in candidates]
     families = np.array([effect_info(e.name).family for e in effects])
     here = np.array([e.axis == axis + 1 for e in effects])
@@ -68,12 +72,12 @@ def _kinds(
     def leave(kind: NDArray[np.bool_], no_more_than: float) -> bool:
         return bool(losses[kind].min(initial=np.inf) < no_more_than)
 
-    yield np.flatnonzero(here & (families == "timing")), _LAGS
+    yield np.flatnonzero(here & (families == "timing")), _LAGS, _LAGS_SURER
     friction = here & (families == "friction")
     if leave(friction, _HARDLY_MORE * least):
-        yield np.flatnonzero(friction), _LAWS
+        yield np.flatnonzero(friction), _LAWS, 1.0
     nothing = leave(one, least + NEXT_TO_NOTHING * explainable)
-    yield np.flatnonzero(one if nothing else one & (families == "load")), _EXACT
+    yield np.flatnonzero(one if nothing else one & (families == "load")), _EXACT, 1.0
 
 
 def _tie(logp: Array, losses: Array, members: Members) -> None:

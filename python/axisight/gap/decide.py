@@ -309,9 +309,9 @@ def stand(
     return Standing(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
 
 
-# Of machines that a delay describes as well as a current loop, which are delays for one that is a loop:
-# four and two of the development draws (seed 110).
-_RARER = float(np.log(3.0))
+# Of machines that a delay describes as well as a current loop, which are delays for one that is a loop: loops are as
+# frequent, and half of them are not damped like a delay.
+_RARER = float(np.log(2.0))
 
 
 def _costs(trials: Sequence[Trial]) -> Array:
@@ -356,10 +356,17 @@ def _with_those_that_fit_better(
     least = fitted[first] - max(_BETTER, _LEFT_OPEN * fitted[first])
     out = logp.copy()
     for i, t in enumerate(trials):
-        fits = fitted[i] < least and t.cost <= trials[first].cost
+        fits = fitted[i] < least and _no_larger(t, trials[first])
         if fits and score[i] > score[first] - FORMULA_ERROR:
             out[i] = logp[first]
     return out
+
+
+def _no_larger(one: Trial, than: Trial) -> bool:
+    """Whether a trial has no more numbers to it; of lags that counts for little (`_costs`)."""
+    effects = one.candidate.effect, than.candidate.effect
+    lags = {effect_info(e.name).family for e in effects} == {"timing"}
+    return one.cost <= than.cost or (lags and effects[0].axis == effects[1].axis)
 
 
 def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explains: bool) -> float:

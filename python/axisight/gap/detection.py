@@ -87,7 +87,9 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     effect = s.option.effect
     place = effect.first_axis
     info = next(p for p in effect_info(effect.name).parameters if p.name == s.parameter)
-    others = {n: x for n, x in (effect.parameters or {}).items() if n != s.parameter}
+    names = (p.name for p in effect_info(effect.name).parameters)
+    values = dict(zip(names, effect.values(), strict=True))
+    others = {name: value for name, value in values.items() if name != s.parameter}
     largest = max(abs(info.lower), abs(info.upper))
 
     def missing(log_size: float) -> float:

@@ -226,6 +226,15 @@ class Trials:
         self.usual |= {start.option.effect.label for start in begun}
         return [*trials, *self._fitted(pool, begun)]
 
+    def _with_kin(
+        self, pool: ThreadPoolExecutor, trials: list[Trial], options: Sequence[FreeEffect]
+    ) -> list[Trial]:
+        """Add what is like leaders and has to begin where they ended, or end where they did."""
+        trials = self._with_gears(pool, trials, options)
+        wider = begun_wider(self.standings(trials), trials, self.offered)
+        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
+        return self._with_lags(trials, options)
+
     def _with_gears(
         self, pool: ThreadPoolExecutor, trials: list[Trial], options: Sequence[FreeEffect]
     ) -> list[Trial]:
@@ -402,10 +411,7 @@ class Trials:
                 better = dict(zip(map(id, todo), found, strict=True))
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
-            trials = self._with_gears(pool, trials, options)
-            wider = begun_wider(self.standings(trials), trials, self.offered)
-            trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
-            trials = self._with_lags(trials, options)
+            trials = self._with_kin(pool, trials, options)
         self.progress(label, 1, 1)
         return trials
 

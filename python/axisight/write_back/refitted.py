@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from axisight.effects.stated import OTHER_GAINS
-from axisight.gap.gains import gains_of
+from axisight.gap.own_effects import GAINS, gain_names
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
@@ -48,19 +47,14 @@ class Refitted:
 
 def refitted_gains(robot: Robot, refit: Mapping[str, Interval]) -> list[Refitted]:
     """Return the gains among what was re-fitted, by name; masses and friction stay as they are."""
-    stated = robot.controller_gains
-    position = OTHER_GAINS[1][0]
-    return [
-        Refitted(
-            name,
-            gain.axis,
-            float(stated[name.rsplit(".", 1)[1]][gain.axis - 1]),
-            refit[name],
-            gain.change == position,
-        )
-        for name, gain in gains_of(robot).items()
-        if name in refit
-    ]
+    found = []
+    for name in gain_names(robot):
+        if name in refit:
+            joint, gain = name.rsplit(".", 1)
+            axis = robot.axis_names.index(joint) + 1
+            stated = float(robot.controller_gains[gain][axis - 1])
+            found.append(Refitted(name, axis, stated, refit[name], gain == GAINS[0]))
+    return found
 
 
 def factors(gains: Sequence[Refitted]) -> tuple[float, float]:

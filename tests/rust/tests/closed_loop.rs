@@ -527,3 +527,40 @@ fn delays_add() {
     };
     assert!(relative(&run(&[0.4e-3, 1.1e-3]), &run(&[1.5e-3])) < 1e-13);
 }
+
+/// What keeps a simulation on a log acts on the motor past its drive: of the right model it is the answer to the noise
+/// of the log, the same whatever the drive does.
+#[test]
+fn a_right_model_answers_noise_alike_with_any_drive() {
+    let mut robot = robot(ROTOR);
+    robot.controller = Controller::PiVelocity {
+        kp: vec![0.4],
+        ki: vec![4.0],
+    };
+    let method = Method::RungeKutta4 { substeps: 2 };
+    let torque = axisight_tests::Random(11).vector(80, 2.0);
+    let noise = axisight_tests::Random(12).vector(80, 1e-4);
+    let added = |drive: &[EffectSetting<f64>]| -> Vec<f64> {
+        let machine = plant::<f64>(&robot, drive);
+        let open = Drive::Torque(&[&torque]);
+        let motion = trace(&machine, &robot, open, &[], method).measured;
+        let logged: Vec<f64> = motion.iter().zip(&noise).map(|(y, n)| y + n).collect();
+        let log = Drive::Tracking {
+            torque: &[&torque],
+            position: &[&logged],
+        };
+        let kept = trace(&machine, &robot, log, &[], method).command;
+        kept.iter().zip(&torque).map(|(u, own)| u - own).collect()
+    };
+    let expected = added(&[]);
+    assert!(axisight_tests::largest(&expected) > 1e-3);
+    for (name, values) in [
+        ("input_delay", &[1.3e-3][..]),
+        ("actuator_bandwidth", &[2e-3]),
+        ("current_loop", &[1e-3, 0.4]),
+        ("torque_constant", &[-0.2]),
+    ] {
+        let found = added(&[effect(name, Some(0), values)]);
+        assert!(relative(&found, &expected) < 1e-9, "{name}");
+    }
+}

@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Timing,
     contains: &["actuator_bandwidth"],
     parts: &[],
-    usual: &["actuator_bandwidth", "input_delay"],
+    usual: &[],
     twins: &[],
     stands_for: None,
     linear: Linear::Path,
