@@ -309,21 +309,46 @@ def test_many_rivals_leave_a_cause_as_open_as_one():
     )
 
 
-def test_lags_of_an_axis_are_held_against_one_another_by_less():
+def lags() -> list[Trial]:
+    """A delay, and a lag that predicts better and fits better, by more than fits leave open."""
     delay = a_trial("input_delay", 1, np.full(40, 1.05))
-    lag = a_trial("actuator_bandwidth", 1, np.full(40, 1.02))
+    worse = replace(NO_EFFECT, loss=NO_EFFECT.loss + 1.0)
+    return [
+        replace(delay, evidence=worse),
+        a_trial("actuator_bandwidth", 1, np.full(40, 1.02)),
+    ]
+
+
+def test_lags_of_an_axis_are_held_against_one_another_by_less():
+    delay, lag = lags()
     friction = a_trial("coulomb_friction", 1, np.full(40, 1.02))
     found = standing([delay, lag, friction])
     p = {r.trial.candidate.effect.name: r.probability for r in found.ranked}
     assert p["actuator_bandwidth"] == pytest.approx(p["coulomb_friction"])
-    # Three ten-thousandths of what there was to explain (10), not two hundredths; and four times as sure.
+    # Three ten-thousandths of what there was to explain (10), not two hundredths; and twice as sure.
     ratio = (1.05 + 0.003) / (1.02 + 0.003)
-    assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**120)
+    assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**60)
     # Of another axis they leave what the rest of the model does.
-    elsewhere = [a_trial(t.candidate.effect.name, 1, t.held_out, axis=2) for t in (delay, lag)]
+    elsewhere = [
+        replace(t, candidate=replace(t.candidate, effect=Effect(t.candidate.effect.name, 2)))
+        for t in (delay, lag)
+    ]
     p = {r.trial.candidate.effect.name: r.probability for r in standing(elsewhere).ranked}
     ratio = (1.05 + 0.2) / (1.02 + 0.2)
     assert p["actuator_bandwidth"] / p["input_delay"] == pytest.approx(ratio**30)
+
+
+def test_of_lags_that_fit_as_well_none_is_surer():
+    delay, lag = lags()
+    # As a current loop, which is half as likely as a delay like which it is damped.
+    loop = replace(
+        lag,
+        candidate=FreeEffect(Effect("current_loop", 1), ("time_constant_s", "damping")),
+    )
+    same = replace(delay, evidence=loop.evidence)
+    for rival, odds in ((lag, 1.0), (loop, 2.0)):
+        p = {r.trial.label: r.probability for r in standing([same, rival]).ranked}
+        assert p["input_delay@1"] / p[rival.label] == pytest.approx(odds)
 
 
 def test_loads_of_an_axis_and_of_the_arm_are_held_against_one_another_by_next_to_nothing():

@@ -29,8 +29,8 @@ _LAGS, _LAWS, _EXACT = 3e-4, 5e-4, 1e-4
 NEXT_TO_NOTHING = 1e-3
 _HARDLY_MORE = 4.0
 # By how many times more than for other rivals the difference between lags counts: they are linear in the torque, and
-# what is left of the right one is white.
-_LAGS_SURER = 4.0
+# what is left of the right one is white. With four times, a bias by noise of a fortieth of it would be sure.
+_LAGS_SURER = 2.0
 # Sums of the same residuals in another order.
 _ROUNDING = 1e-9
 

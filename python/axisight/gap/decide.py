@@ -289,7 +289,8 @@ def stand(
         least,
         lambda left, which: -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - cost[which],
     )
-    logp = _with_those_that_fit_better(mine, logp, (before - losses) / explainable, fitted)
+    explained = (before - losses) / explainable
+    logp = _with_those_that_fit_better(mine, logp, explained, fitted, cost)
     tried = [t.candidate.effect for t in mine]
     logp = held_to_plainer(tried, [t.evidence for t in mine], logp, layout.stretch)
     probability = np.exp(logp - logp.max())
@@ -344,29 +345,34 @@ def _fitted_loss(evidence: Evidence, here: NDArray[np.bool_]) -> float:
 
 
 def _with_those_that_fit_better(
-    trials: Sequence[Trial], logp: Array, score: Array, fitted: Array
+    trials: Sequence[Trial], logp: Array, score: Array, fitted: Array, cost: Array
 ) -> Array:
     """Return log-probabilities with rivals as probable as the first that fit the logs better than it.
 
     With few logs, what is predicted without one hangs on what the others tell of the simulator's own
     parameters. Where of two that explain the same share the one predicts better and the other, with no more
-    numbers to it, fits better, neither is surer. ``fitted``: loss of the fits on the axis.
+    numbers to it, fits better, neither is surer; of lags, neither is where it fits as well. ``fitted``: loss of
+    the fits on the axis; ``cost``: logarithmic, of what the numbers of each cost.
     """
     first = int(np.argmax(logp[: len(trials)]))
-    least = fitted[first] - max(_BETTER, _LEFT_OPEN * fitted[first])
+    leeway = max(_BETTER, _LEFT_OPEN * fitted[first])
     out = logp.copy()
     for i, t in enumerate(trials):
-        fits = fitted[i] < least and _no_larger(t, trials[first])
-        if fits and score[i] > score[first] - FORMULA_ERROR:
+        if i == first or score[i] <= score[first] - FORMULA_ERROR:
+            continue
+        if _are_lags(t, trials[first]):
+            if fitted[i] < fitted[first] + leeway:
+                out[i] = max(out[i], logp[first] + cost[first] - cost[i])
+        elif fitted[i] < fitted[first] - leeway and t.cost <= trials[first].cost:
             out[i] = logp[first]
     return out
 
 
-def _no_larger(one: Trial, than: Trial) -> bool:
-    """Whether a trial has no more numbers to it; of lags that counts for little (`_costs`)."""
-    effects = one.candidate.effect, than.candidate.effect
-    lags = {effect_info(e.name).family for e in effects} == {"timing"}
-    return one.cost <= than.cost or (lags and effects[0].axis == effects[1].axis)
+def _are_lags(one: Trial, other: Trial) -> bool:
+    """Whether both are delays or lags of one axis."""
+    effects = one.candidate.effect, other.candidate.effect
+    families = {effect_info(e.name).family for e in effects}
+    return families == {"timing"} and effects[0].axis == effects[1].axis
 
 
 def _significance(t: Trial, current: Array, layout: Layout, axis: int, *, explains: bool) -> float:
