@@ -360,7 +360,7 @@ def _with_those_that_fit_better(
     for i, t in enumerate(trials):
         if i == first or score[i] <= score[first] - FORMULA_ERROR:
             continue
-        if _are_lags(t, trials[first]):
+        if are_lags(t, trials[first]):
             if fitted[i] < fitted[first] + leeway:
                 out[i] = max(out[i], logp[first] + cost[first] - cost[i])
         elif fitted[i] < fitted[first] - leeway and t.cost <= trials[first].cost:
@@ -368,7 +368,7 @@ def _with_those_that_fit_better(
     return out
 
 
-def _are_lags(one: Trial, other: Trial) -> bool:
+def are_lags(one: Trial, other: Trial) -> bool:
     """Whether both are delays or lags of one axis."""
     effects = one.candidate.effect, other.candidate.effect
     families = {effect_info(e.name).family for e in effects}

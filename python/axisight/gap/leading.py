@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from axisight.gap.decide import Ranked, Standing
+from axisight.gap.decide import Ranked, Standing, are_lags
 from axisight.gap.score import linear_gain
 
 CLOSE = 0.6
@@ -23,16 +23,13 @@ def clear(standing: Standing) -> bool:
         return False
     close = [r for r in standing.ranked[1:] if r.score >= CLOSE * leader.score]
     # What needs fewer numbers may catch up where its fit has not settled; and of lags every one.
-    open_ = (r for r in close if r.trial.cost < leader.trial.cost or _are_lags(r, leader))
+    open_ = (
+        r for r in close if r.trial.cost < leader.trial.cost or are_lags(r.trial, leader.trial)
+    )
     if any(_may_catch_up(r, leader) for r in open_):
         return False
     alone = not close
     return leader.score > (_ALONE if alone else _GOOD_ENOUGH)
-
-
-def _are_lags(one: Ranked, other: Ranked) -> bool:
-    """Whether both are held against one another by little."""
-    return one.family == other.family == "timing"
 
 
 def _may_catch_up(one: Ranked, leader: Ranked) -> bool:

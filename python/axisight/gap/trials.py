@@ -264,13 +264,13 @@ class Trials:
 
     def _with_lags(self, trials: list[Trial], options: Sequence[FreeEffect]) -> list[Trial]:
         """Put delays and lags of axes that one of them leads on where their fits end."""
+        known = {t.label: t for t in trials}
         for standing in self.standings(trials):
             if lags := lags_beside(standing):
-                found = (
-                    trial(e.free[-1], e, self.model) for e in ended(self.fitter, lags, options)
-                )
-                trials = list(({t.label: t for t in trials} | {t.label: t for t in found}).values())
-        return trials
+                fits = ended(self.fitter, lags, options)
+                found = (trial(fit.free[-1], fit, self.model) for fit in fits)
+                known |= {t.label: t for t in found}
+        return list(known.values())
 
     def _in_its_place(
         self, leader: Evidence, option: FreeEffect, values: Mapping[str, float]

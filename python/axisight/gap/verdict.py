@@ -46,8 +46,8 @@ class Conclusion:
         return replace(self, checks=(*self.checks, *more))
 
 
-# Tolerances of an inertia that a machine's may be off by.
-_EDGE = 3.0
+# Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
+_EDGE = 5.0
 # What the controller's own law shows could still be something else that looks alike: a limit of the
 # supply, not of the drive.
 _SHOWN = 0.99
