@@ -158,6 +158,10 @@ def search(
     out = Search(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
     refused: set[str] = set()
     kept = KeptColumns()
+
+    def offered_beside(model: Evidence) -> list[FreeEffect]:
+        return fresh(candidates(model), model, refused)
+
     for number in range(1, _MOST_ROUNDS + 1):
         least = out.least_falls(settings)
         round_ = Trials(
@@ -170,7 +174,7 @@ def search(
             progress,
             kept,
             out.mends,
-            candidates,
+            offered_beside,
         )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
