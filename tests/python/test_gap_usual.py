@@ -160,7 +160,7 @@ def refined_next(
     monkeypatch, rival, begun: set | None = None, *, mends: bool = False, others: tuple = ()
 ) -> list[str]:
     standing = led(0, rivals=(rival,))
-    monkeypatch.setattr(trials, "_clear", lambda _: True)
+    monkeypatch.setattr(trials, "clear", lambda _: True)
     field = SimpleNamespace(
         standings=lambda _: [standing, *others],
         layout=SimpleNamespace(samples=lambda: np.ones(3)),

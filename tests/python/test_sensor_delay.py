@@ -82,7 +82,10 @@ def test_an_arm_tells_which_of_both_it_is(name: str):
     ]
     said = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
     (cause,) = said.causes
-    assert (said.verdict, cause.label) == ("explained", f"{name}@2")
+    assert cause.label == f"{name}@2"
+    # A current loop that is damped like a delay of the drive may be left beside it, and nothing else.
+    beside = {label for labels in said.equivalent for label in labels} - {cause.label}
+    assert beside <= {"current_loop@2"}
     delay = cause.parameters["delay_s"]
     # A tenth of a sample.
     assert delay.value == pytest.approx(1.3e-3, abs=5e-5)

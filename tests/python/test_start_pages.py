@@ -120,6 +120,7 @@ def test_every_key_of_a_robot_file_is_told(repository: Path) -> None:
     source = repository / "crates" / "axisight-core" / "src" / "robot_file" / "reader.rs"
     text = source.read_text(encoding="utf-8")
     lists = re.findall(r"const \w*KEYS: &\[&str\] = &\[(.*?)\];", text, flags=re.DOTALL)
+    lists += re.findall(r"let keys = \[(\"kind\".*?)\];", text)
     lists += re.findall(r"section\.only\(&\[(\"kind\".*?|\"position_noise_std\")\]\)", text)
     known = {key for keys in lists for key in re.findall(r'"(\w+)"', keys)}
     assert {"mass", "gear_ratio", "kv", "position_noise_std"} <= known

@@ -88,6 +88,8 @@ def one_for_several(
         )
         if standing is None:
             continue
+        # A load is more usual than a link that is not as it was drawn.
+        standing = standing.usual_first() if len(several) == 1 else standing
         standing = replace(standing, axis=axis - 1)
         both, none = (float(held_out_loss(x)[here].sum()) for x in (model, without))
         for ranked in standing.ranked:
