@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.limits import LIMIT_EFFECTS, Limits
-from axisight.write_back.placed import Placed, said
+from axisight.write_back.placed import Labelled, Placed, said
 from axisight.write_back.refitted import Refitted, factors
 from axisight.write_back.xml_edits import Edits, Numbers
 
@@ -70,19 +70,12 @@ def write_servo(
     step_s: float,
 ) -> Placed:
     """Write what causes and re-fitted gains of one joint make of its only actuator, which has a target."""
-    placed, tag = Placed(), f"<{servo.element.tag}>"
-    other = [cause for cause in causes if cause.effect not in servo.known]
-    has = "gains, a delay and a limit" if len(servo.known) > 1 else "a limit, its law is none here"
-    placed.refuse(other, f"expected a motor, {tag} has {has}")
-    mine = [cause for cause in causes if cause.effect in servo.known]
+    placed = Placed()
+    for those, why in _impossible(servo, causes, refitted):
+        placed.refuse(those, why)
+    mine = [cause for cause in causes if cause.label not in placed.why_not]
+    found = [gain for gain in refitted if gain.label not in placed.why_not]
     gains = [cause for cause in mine if cause.effect in _OF_GAINS]
-    found = list(refitted)
-    if (gains or found) and servo.ratio_defaults:
-        placed.refuse(
-            [*gains, *found], f"expected kv of the {tag} instead of a dampratio in defaults"
-        )
-        mine = [cause for cause in mine if cause not in gains]
-        gains, found = [], []
     made: dict[str, Numbers] = {}
     for late in (cause for cause in mine if cause.effect == TRANSPORT_DELAY[0]):
         made |= delayed(late.parameters[TRANSPORT_DELAY[1]].value, step_s)
@@ -100,12 +93,30 @@ def write_servo(
     return placed
 
 
+def _impossible(
+    servo: Servo, causes: Sequence[Cause], refitted: Sequence[Refitted]
+) -> Iterator[tuple[Sequence[Labelled], str]]:
+    """Yield causes and re-fitted gains that an actuator has no place for, and why."""
+    tag = f"<{servo.element.tag}>"
+    has = "gains, a delay and a limit" if len(servo.known) > 1 else "a limit, its law is none here"
+    yield (
+        [cause for cause in causes if cause.effect not in servo.known],
+        f"expected a motor, {tag} has {has}",
+    )
+    gains = [c for c in causes if c.effect in _OF_GAINS and c.effect in servo.known]
+    if servo.limits.drive.servo is None:
+        # Its tag is that of one, but a filter of its command is none of the law of a controller.
+        yield [*gains, *refitted], f"{tag} is no plain servo (timeconst)"
+    elif servo.ratio_defaults:
+        yield [*gains, *refitted], f"expected kv of the {tag} instead of a dampratio in defaults"
+
+
 def _gains(
     servo: Servo, causes: Sequence[Cause], refitted: Sequence[Refitted]
 ) -> Mapping[str, Numbers]:
     """Return the attributes of other gains; those of the file are as MuJoCo has them, defaults with them."""
     stated = servo.limits.drive.servo
-    assert stated is not None  # of one that has a target of positions
+    assert stated is not None  # gains of others were refused
     by_cause, by_fit = _factors(causes), factors(refitted)
     kp, kv = (x * a * b for x, a, b in zip(stated, by_cause, by_fit, strict=True))
     if servo.element.tag == _GENERAL:
