@@ -125,10 +125,9 @@ def test_gains_that_no_file_has_are_told(tmp_path: Path):
     assert made.left_out == ("j1.kp",)
     source = written(tmp_path, NOMINAL.mjcf(), "arm.xml")
     written(tmp_path, CONTROLLER, "arm.drives.toml")
-    made = write_model(source, load_robot(source), [], tmp_path / "other.xml", refit=refit)
-    assert made.why == {
-        "j1.kp": "the controller stands in the drive data, the file has no gains of it"
-    }
+    made = write_model(source, load_robot(source), [OTHER], tmp_path / "other.xml", refit=refit)
+    reason = "the controller stands in the drive data, the file has no gains of it"
+    assert made.why == {"j1.kp": reason, OTHER.label: reason}
     assert made.path.read_bytes() == source.read_bytes()
 
 
@@ -156,6 +155,19 @@ def test_a_servo_with_a_filter_has_a_delay_and_a_limit_but_no_gains(
     np.testing.assert_array_equal(after.actuator_biasprm, before.actuator_biasprm)
     assert after.actuator_delay[0] == pytest.approx(0.0101)
     assert after.actuator_forcerange[0].tolist() == [-30.0, 30.0]
+
+
+def test_an_axis_that_the_file_does_not_have_is_told(tmp_path: Path):
+    """The robot of another file has other names of axes: nothing of the file is its drive."""
+    pytest.importorskip("mujoco")
+    renamed = written(tmp_path, NOMINAL.mjcf().replace('"j1"', '"waist"'), "renamed.xml")
+    source = written(tmp_path, NOMINAL.mjcf(), "arm.xml")
+    weaker = several("torque_constant", 1, relative_error=-0.2)
+    refit = {"waist.kp": Interval(0.25, 0.2, 0.3)}
+    made = write_model(source, load_robot(renamed), [weaker], tmp_path / "new.xml", refit=refit)
+    reason = "the file has no driven joint of this name"
+    assert made.why == {weaker.label: reason, "waist.kp": reason}
+    assert made.path.read_bytes() == source.read_bytes()
 
 
 def test_a_robot_file_gets_the_gains(tmp_path: Path):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from axisight import storage
 from axisight.effects import Effect
+from axisight.effects.stated import OTHER_GAINS
 from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
 from axisight.robot import Robot
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from axisight.gap.result import Cause, Interval
 
 _KINDS = (".urdf", ".xml", ".mjcf")
+# Why the drive of a joint takes nothing, or no gains.
+_NO_LAW = "the controller stands in the drive data, the file has no gains of it"
+_NO_JOINT = "the file has no driven joint of this name"
 
 
 # A model file, and the drive data it was read with; None: what stands beside it.
@@ -151,8 +155,7 @@ def _as_model(origin: _Source, robot: Robot, found: _Found, path: Path) -> Writt
         raise InputError(f"{source}: expected a text in UTF-8 to write back to") from None
     out = [cause for cause in causes if cause.label not in there]
     reasons = {c.label: why.get(c.label) or _no_number(root, c.as_effect()) for c in out}
-    no_law = "the controller stands in the drive data, the file has no gains of it"
-    reasons |= {g.label: why.get(g.label, no_law) for g in gains if g.label not in there}
+    reasons |= {g.label: why.get(g.label, _NO_LAW) for g in gains if g.label not in there}
     every: list[Labelled] = [*causes, *gains]
     return Written(
         path,
@@ -186,9 +189,18 @@ def _on_axes(
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
         if (drives or refitted) and is_mjcf:
-            limits = limits_of(known[name], robot, axis)
-            joint = (name, joints.get(name))
-            out.append(write_drive(edits, root, joint, (drives, refitted), limits))
+            placed, drive = Placed(), known.get(name)
+            if not own_law:
+                gained = [cause for cause in drives if cause.effect == OTHER_GAINS[0]]
+                placed.refuse(gained, _NO_LAW)
+                drives = [cause for cause in drives if cause not in gained]
+            if drive is None:
+                placed.refuse([*drives, *refitted], _NO_JOINT)
+            else:
+                limits, joint = limits_of(drive, robot, axis), (name, joints.get(name))
+                made = write_drive(edits, root, joint, (drives, refitted), limits)
+                placed = placed.joined(made)
+            out.append(placed)
     return out
 
 
