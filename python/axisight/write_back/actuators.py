@@ -28,7 +28,7 @@ _JOINTS = ("joint", "jointinparent")
 _STEP_S = 0.002
 
 
-def _limit(value: float, _step_s: float) -> Mapping[str, Numbers]:
+def _limit(value: float) -> Mapping[str, Numbers]:
     return {"ctrllimited": "true", "ctrlrange": (-value, value)}
 
 
@@ -42,11 +42,12 @@ def _lag(value: float, _step_s: float) -> Mapping[str, Numbers]:
 
 _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbers]]]] = {
     TORQUE_CONSTANT[0]: (TORQUE_CONSTANT[1], _gain),
-    TORQUE_LIMIT[0]: (TORQUE_LIMIT[1], _limit),
     LAG[0]: (LAG[1], _lag),
     TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], delayed),
 }
-DRIVE_EFFECTS = frozenset((*_ATTRIBUTES, *SERVO_EFFECTS))
+# A limit is one before the gear of the file besides.
+_OF_MOTORS = frozenset((*_ATTRIBUTES, TORQUE_LIMIT[0]))
+DRIVE_EFFECTS = _OF_MOTORS.union(SERVO_EFFECTS)
 
 
 def write_drive(
@@ -76,9 +77,9 @@ def write_drive(
         servo = Servo(mine[0], joint[1], limits, _has_ratio_defaults(root))
         return placed.joined(write_servo(edits, servo, causes, refitted, _step_s(root)))
     placed.refuse(refitted, f"expected a <{SERVO}> of the joint, whose gains the file says")
-    stated = [cause for cause in causes if cause.effect not in _ATTRIBUTES]
+    stated = [cause for cause in causes if cause.effect not in _OF_MOTORS]
     placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
-    causes = [cause for cause in causes if cause.effect in _ATTRIBUTES]
+    causes = [cause for cause in causes if cause.effect in _OF_MOTORS]
     if not causes:
         return placed
     if len(mine) != 1 or mine[0].children or not _is_motor(mine[0], defaults):
@@ -88,10 +89,11 @@ def write_drive(
     made: dict[str, Numbers] = {}
     # The last of one kind has taken the place of what the simulator had.
     for cause in causes:
-        name, attributes = _ATTRIBUTES[cause.effect]
-        made |= attributes(cause.parameters[name].value, _step_s(root))
         if cause.effect == TORQUE_LIMIT[0]:
-            made |= _limit(limits.of_actuator(cause.parameters[name].value), 0.0)
+            made |= _limit(limits.of_actuator(cause.parameters[TORQUE_LIMIT[1]].value))
+        else:
+            name, attributes = _ATTRIBUTES[cause.effect]
+            made |= attributes(cause.parameters[name].value, _step_s(root))
     behind, of_joint = limits.set_by(causes, servo=False)
     made |= behind
     if of_joint and joint[1] is not None:
