@@ -152,11 +152,20 @@ def test_an_arm_that_is_told_speeds_is_imported_and_says_so(tmp_path: Path) -> N
     assert "no plain motor" not in robot.toml
 
 
-def test_actuators_that_sum_up_speeds_have_targets(tmp_path: Path) -> None:
-    """What MuJoCo does with them is what their law does with the targets that they summed up."""
+@pytest.mark.parametrize("late", [False, True])
+def test_actuators_that_sum_up_speeds_have_targets(tmp_path: Path, late: bool) -> None:
+    """What MuJoCo does with them is what their law does with the targets that they summed up.
+
+    Speeds that are late are so before they are summed up: the targets in the log are late already.
+    """
     text = NOMINAL.mjcf().replace("<position ", '<intvelocity actrange="-9 9" ')
+    if late:
+        pytest.importorskip("mujoco", minversion="4.0")
+        text = text.replace("<intvelocity ", '<intvelocity delay="0.02" nsample="41" ')
     source = written(tmp_path, text, "arm.xml")
     robot = load_robot(source, sample_time_s=NOMINAL.step_s)
+    assert [e.label for e in robot.effects if e.name == "input_delay"] == []
+    assert ("its delay left out: its activation has it" in robot.toml) == late
     assert robot.controller_kind == "pd_position"
     model = mujoco.MjModel.from_xml_path(str(source))
     data = mujoco.MjData(model)

@@ -170,6 +170,30 @@ def test_an_axis_that_the_file_does_not_have_is_told(tmp_path: Path):
     assert made.path.read_bytes() == source.read_bytes()
 
 
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        '<intvelocity joint="j1" kp="900" kv="50" actrange="-3 3"/>',
+        '<general joint="j1" dyntype="integrator" biastype="affine" gainprm="900" biasprm="0 -900 -50" '
+        'actlimited="true" actrange="-3 3"/>',
+    ],
+)
+def test_a_target_that_is_summed_up_has_no_delay(tmp_path: Path, actuator: str):
+    """A delay of the actuator is one of the speeds, before they are summed up; whatever its tag is."""
+    pytest.importorskip("mujoco")
+    own = f'<position joint="j1" kp="{NOMINAL.kp[0]}" kv="{NOMINAL.kd[0]}"/>'
+    source = written(tmp_path, changed(NOMINAL.mjcf(), own, actuator), "arm.xml")
+    late = [several("input_delay", axis, delay_s=0.0101) for axis in (1, 2)]
+    made = write_model(source, load_robot(source), [*late, OTHER], tmp_path / "new.xml")
+    assert made.placed == (late[1].label, OTHER.label)
+    tag = actuator.split(maxsplit=1)[0]
+    assert made.why == {
+        late[
+            0
+        ].label: f"expected a servo that is told positions, {tag}> delays speeds before it sums them up"
+    }
+
+
 def test_a_robot_file_gets_the_gains(tmp_path: Path):
     """Of the controller, with comments and, beside it, their standard errors; all else stays."""
     source = written(tmp_path, NOMINAL.mjcf(), "servo.xml")

@@ -82,7 +82,8 @@ class Drive:
     ``delay_s`` and ``lag_s`` by which torque is late; ``effort`` [Nm] the limit of the joint, 0 where none is
     said; ``of_actuators`` is how much of rotor inertia and damping the file has on actuators; ``force_limits``
     [Nm] of its only actuator, before the gear, and of the joint, not a number where they are not alike both
-    ways; ``speed_gain`` [Nm s/rad] of an actuator that is told speeds, motor side.
+    ways; ``speed_gain`` [Nm s/rad] of an actuator that is told speeds, motor side; ``sums_up``: an actuator
+    of the joint has as its target the sum of what it is told.
     """
 
     gear_ratio: float = 1.0
@@ -100,6 +101,7 @@ class Drive:
     of_actuators: tuple[float, float] = (0.0, 0.0)
     force_limits: tuple[float, float] = (math.inf, math.inf)
     speed_gain: float | None = None
+    sums_up: bool = False
 
 
 @dataclass(frozen=True)

@@ -163,6 +163,7 @@ class _Compiled:
                 of_actuators=(rotor, damper),
                 force_limits=actuators.force_limits(j),
                 speed_gain=actuators.speed_gains().get(j),
+                sums_up=actuators.has_sum(j),
             )
         else:
             drive = Drive()

@@ -92,6 +92,10 @@ class Actuators:
         """Whether the target of one is the sum of the speeds that it is told: its activation."""
         return bool(self.model.actuator_dyntype[i] == _INTEGRATOR)
 
+    def has_sum(self, j: int) -> bool:
+        """Whether an actuator of a joint sums up what it is told."""
+        return any(self.sums_up(i) for i in np.flatnonzero(self.joint == j).tolist())
+
     def is_speed_servo(self, i: int) -> bool:
         """Whether one is told speeds: ``kv (target - speed)``, without a state of its own."""
         kv, bias = self.gain[i], self.model.actuator_biasprm[i]
@@ -143,7 +147,10 @@ class Actuators:
         }
 
     def torque_path(self, j: int) -> tuple[float, float, float, float]:
-        """Return gain, limit [Nm], delay [s] and lag [s] of the motor of a joint; of a servo limit and delay."""
+        """Return gain, limit [Nm], delay [s] and lag [s] of the motor of a joint; of a servo limit and delay.
+
+        What one is told is late: of one that sums it up, its target is late already, and no delay follows it.
+        """
         own = self.known().get(j, [])
         if len(own) != 1:
             # Without a gear that is taken, a motor is on the side of the joint.
@@ -152,7 +159,8 @@ class Actuators:
         limit = self._limit_nm(i)
         if self.is_motor(i):
             return float(self.gain[i]), limit, float(self.delay[i]), float(self.lag[i])
-        return 1.0, limit, float(self.delay[i]) if j in self.servos() else 0.0, 0.0
+        late = j in self.servos() and not self.sums_up(i)
+        return 1.0, limit, float(self.delay[i]) if late else 0.0, 0.0
 
     def _limit_nm(self, i: int) -> float:
         """Return the largest torque before the gear that the only actuator of a joint is told, or gives."""

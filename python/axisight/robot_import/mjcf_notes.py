@@ -71,9 +71,9 @@ def _of_law(actuators: Actuators, i: int, *, is_servo: bool) -> list[str]:
             " is told speeds, which it sums up to its target: position_ref of logs is its activation (act), "
             "at the simulator's step"
         ]
-        return out + [": limits of its target left out"] * bool(
-            actuators.model.actuator_actlimited[i]
-        )
+        limited = bool(actuators.model.actuator_actlimited[i])
+        out += [": limits of its target left out"] * limited
+        return out + [": its delay left out: its activation has it"] * bool(actuators.delay[i] > 0)
     if actuators.is_speed_servo(i) and actuators.drives_alone(i):
         out = [
             f" is told speeds: its law, {actuators.gain[i]:g} Nm s/rad times the error of speed, is left out"

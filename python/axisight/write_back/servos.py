@@ -103,6 +103,11 @@ def _impossible(
         [cause for cause in causes if cause.effect not in servo.known],
         f"expected a motor, {tag} has {has}",
     )
+    if servo.limits.drive.sums_up:
+        yield (
+            [cause for cause in causes if cause.effect == TRANSPORT_DELAY[0]],
+            f"expected a servo that is told positions, {tag} delays speeds before it sums them up",
+        )
     gains = [c for c in causes if c.effect in _OF_GAINS and c.effect in servo.known]
     if servo.limits.drive.servo is None:
         # Its tag is that of one, but a filter of its command is none of the law of a controller.
