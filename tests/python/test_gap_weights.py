@@ -38,14 +38,14 @@ def test_a_smooth_ratio_to_the_shape_stays():
 def test_noise_leaves_what_it_is_said_to(seconds: float):
     """Of a simulator that is the machine.
 
-    Its few thousand residuals, half of them of little weight, and the noise that the floor was taken from
-    have 5 % of deviation together.
+    Of its few thousand residuals a tenth have weight, at frequencies that are driven; they and the noise that the
+    floor was taken from have 8 % of deviation together.
     """
     robot = bare_axis()
     view = ClosedLoopView(robot, logs_of(robot, [], PLAN, seconds), Settings())
     found = view.fitter.fit([], max_iterations=0)
     left = found.loss.sum() / found.samples.sum()
-    assert left == pytest.approx(view.floor.expected[0], rel=0.15)
+    assert left == pytest.approx(view.floor.expected[0], rel=0.25)
 
 
 def test_logs_may_be_shorter_than_the_segments_of_others():
@@ -111,4 +111,4 @@ def test_a_drive_meets_noise_as_it_was(name: str, parameter: str, size: float):
     found = view.fitter.fit([begin], refreshes=1)
     assert found.effects[0].values()[0] == pytest.approx(size, rel=5e-3)
     left = found.loss.sum() / found.samples.sum()
-    assert left == pytest.approx(view.floor.expected[0], rel=0.15)
+    assert left == pytest.approx(view.floor.expected[0], rel=0.25)
