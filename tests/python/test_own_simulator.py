@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,8 +21,10 @@ from axisight.cli import app
 from axisight.errors import InputError
 from axisight.explore.session import Session, Version
 from axisight.gap import verdict_schema
+from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.inverse import InverseView
-from axisight.gap.own_simulator import differs, noted, paired
+from axisight.gap.own_simulator import difference, differs, noted, paired
+from axisight.gap.torques import Variant
 from gap_data import log_of
 from servo_arm import MACHINES as SERVOS
 from servo_arm import NOMINAL, simulator
@@ -197,6 +200,36 @@ def test_motions_lie_apart_by_a_share_of_them() -> None:
     assert np.all(apart >= 0.01 * by_hand * (1 - 1e-9))
     # Inertia, linear in the motion, and gravity, at most so.
     assert np.all(apart < 0.03)
+
+
+def test_the_model_is_simulated_once_along_the_logs_of_their_simulator(
+    robot: Robot, real: list[Log], theirs: list[Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In closed loop what is taken off the logs is what is compared."""
+    view = ClosedLoopView(robot, real[:2], QUICK)
+    simulated: list[int] = []
+    plain = ClosedLoopView.torques
+
+    def counted(self: ClosedLoopView, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        simulated.append(len(logs))
+        return plain(self, variant, logs)
+
+    monkeypatch.setattr(ClosedLoopView, "torques", counted)
+    off = difference(view, theirs, QUICK)
+    assert simulated == [len(theirs)]
+    for taken, compared in zip(off.taken_nm, off.torques_nm, strict=True):
+        np.testing.assert_array_equal(taken, compared)
+
+
+def test_by_inverse_dynamics_it_is_taken_off_before_the_low_pass() -> None:
+    """Low-passed, what is taken off is what is compared: the low-pass is linear."""
+    rigid = rigid_arm.arm()
+    real, own = rigid_logs(rigid)
+    view = InverseView(rigid, real[:2], QUICK, real[2:])
+    off = difference(view, own, QUICK)
+    for log, taken, compared in zip(own, off.taken_nm, off.torques_nm, strict=True):
+        low = view.filtering.compared(taken, log.sample_time_s)
+        np.testing.assert_allclose(low, compared, atol=1e-9 * np.abs(log.torque_nm).max())
 
 
 def test_logs_of_other_motions_are_refused(real: list[Log], theirs: list[Log]) -> None:

@@ -89,8 +89,9 @@ class InverseView(View):
         moved = (self.filtering(x) for x in logs)
         return [self._low_passed(predicted_torque(self.robot, variant, at)) for at in moved]
 
-    def off_model(self, log: Log) -> Array:
+    def taken_off(self, log: Log, off_nm: Array) -> Array:
         """Return what the torque of a log is off the predicted one (n, n_axes) [Nm], as others are low-passed later."""
+        del off_nm
         return log.torque_nm - predicted_torque(self.robot, AS_GIVEN, self.filtering(log))
 
     def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:

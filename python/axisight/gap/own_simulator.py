@@ -148,13 +148,14 @@ def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Diff
     """
     theirs = tuple(view.measured(own) for own in simulated)
     ours = view.torques(AS_GIVEN, simulated)
+    off = tuple(their - our for their, our in zip(theirs, ours, strict=True))
     moved = [own.position_rad for own in simulated]
     if view.mode == "closed_loop":
         moved = simulated_positions(view.robot, AS_GIVEN, simulated, threads=settings.threads)
     return Difference(
         theirs,
-        tuple(their - our for their, our in zip(theirs, ours, strict=True)),
-        tuple(view.off_model(own) for own in simulated),
+        off,
+        tuple(view.taken_off(own, less) for own, less in zip(simulated, off, strict=True)),
         tuple(own.position_rad - x for own, x in zip(simulated, moved, strict=True)),
     )
 

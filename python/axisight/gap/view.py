@@ -115,9 +115,13 @@ class View(ABC):
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
-    def off_model(self, log: Log) -> Array:
-        """Return what the torque of a log is off the model's, as it is taken off others (n, n_axes) [Nm]."""
-        return np.asarray(self.measured(log) - self.torques(AS_GIVEN, [log])[0])
+    def taken_off(self, log: Log, off_nm: Array) -> Array:
+        """Return what the torque of a log is off the model's, as it is taken off others (n, n_axes) [Nm].
+
+        ``off_nm``: the same as it is compared.
+        """
+        del log
+        return off_nm
 
     def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
         """Return how far motions that torques are predicted from lie apart (n_axes,) [1], zero where none are."""
