@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from axisight import Log, Robot, diagnose
+from axisight import Effect, Log, Robot, diagnose
 from axisight.gap.beginning import begins, run_up_is_better
 from axisight.gap.begun import from_rest
+from axisight.logs import RunUp
 from gap_data import bare_axis, log_of, scattered
 from test_gap_in_motion import QUICK, SECONDS, WITHHELD, rigid_axis, run_up, waves
 
@@ -22,6 +24,8 @@ NOISE_RAD = bare_axis().position_noise_std
 # Of the largest speed of the references: one that is far above the noise, and one that is nothing.
 CREEPS, STANDS = 0.02, 0.002
 CREEP_S, CUT_S = 3.0, 2.0
+# What that of the sensor is in the torque of an axis that stands.
+TORQUE_NOISE_NM = 0.25
 
 
 def creeping(robot: Robot, seed: int, share: float) -> Array:
@@ -63,6 +67,33 @@ def at_once(robot: Robot, kind: str, withheld: str) -> Log:
     return log_of(scattered(robot, 3), WITHHELD[withheld], speed[:, None], 0)
 
 
+def with_a_second_axis(robot: Robot) -> Robot:
+    """The same with a stiff axis at right angles on it that weighs next to nothing."""
+    text = re.sub(r"\[\[effect\]\]\n(.+\n)+", "", robot.toml)
+    head, tail = text.split("[controller]")
+    second = head[head.index("[[joint]]") :].replace('"axis1"', '"axis2"')
+    second = second.replace("axis = [0.0, 0.0, 1.0]", "axis = [1.0, 0.0, 0.0]")
+    second = re.sub(r"^(stiffness|damping) = .*\n", "", second, flags=re.MULTILINE)
+    second = second.replace("mass = 500.0", "mass = 1e-3")
+    second = second.replace("inertia = [1130.0, 1130.0, 1130.0,", "inertia = [1e-3, 1e-3, 1e-3,")
+    tail = re.sub(r"(kp|ki) = \[(.+)\]", r"\1 = [\2, \2]", tail)
+    return Robot.from_toml(f"{head}{second}[controller]{tail}")
+
+
+def beside_standing(log: Log, held_nm: float) -> Log:
+    """A log with a second axis that stands, but for noise."""
+    assert log.velocity_ref_rad_s is not None
+    still = np.zeros_like(log.position_rad)
+    noise = np.random.default_rng(3).standard_normal((2, *still.shape))
+    return replace(
+        log,
+        position_rad=np.hstack([log.position_rad, NOISE_RAD * noise[0]]),
+        torque_nm=np.hstack([log.torque_nm, held_nm + TORQUE_NOISE_NM * noise[1]]),
+        velocity_ref_rad_s=np.hstack([log.velocity_ref_rad_s, still]),
+        axis_kinds=("revolute", "revolute"),
+    )
+
+
 @pytest.mark.parametrize("robot", [bare_axis(), rigid_axis()], ids=["elastic", "rigid"])
 def test_creeping_is_motion_and_standing_is_rest(robot: Robot) -> None:
     for withheld in ("none", "coulomb_friction"):
@@ -97,6 +128,59 @@ def test_one_that_turns_round_is_run_up_to() -> None:
     logs = turning_logs(robot, "none")
     assert {begins(x, NOISE_RAD) for x in logs} == {"open"}
     assert all(run_up_is_better(robot, log, run_up(robot, log)) for log in logs)
+
+
+# Larger than what turns the motor round, of torques with a deviation of 5 Nm.
+LARGE = {
+    "offset": Effect("torque_offset", 1, {"offset_nm": 2.0}),
+    "friction": Effect("coulomb_friction", 1, {"coulomb_nm": 3.0}),
+    "constant": Effect("torque_constant", 1, {"relative_error": -0.3}),
+}
+
+
+@pytest.mark.parametrize("missing", LARGE)
+def test_what_is_missing_of_both_simulations_does_not_hide_that_it_turns_round(
+    missing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each log by itself: one that is told would do for all."""
+    robot = bare_axis()
+    monkeypatch.setitem(WITHHELD, missing, [LARGE[missing]])
+    for log in turning_logs(robot, missing):
+        assert begins(log, NOISE_RAD) == "open"
+        assert run_up_is_better(robot, log, run_up(robot, log))
+    for kind in ("step", "rise"):
+        log = at_once(robot, kind, missing)
+        assert not run_up_is_better(robot, log, run_up(robot, log))
+
+
+@pytest.mark.parametrize("held_nm", [0.0, 0.5, 4.0])
+def test_axes_that_stand_do_not_tell(held_nm: float) -> None:
+    """One that nothing moves, its torque noise about a constant, beside one that turns round."""
+    one = bare_axis()
+    (turning, *_), stepping = turning_logs(one, "none"), at_once(one, "step", "none")
+    two = with_a_second_axis(one)
+    for log, better in ((turning, True), (stepping, False)):
+        wide = beside_standing(log, held_nm)
+        assert run_up_is_better(two, wide, run_up(two, wide)) == better
+
+
+@pytest.mark.parametrize("cut", [1, 2])
+def test_a_sample_that_is_cut_off_is_a_sample(cut: int) -> None:
+    """Half of one was none, and the last none of a run all of it."""
+    robot = bare_axis()
+    log = turning_logs(robot, "none")[0]
+    found = run_up(robot, log)
+    assert found.run_up is not None
+    lead = found.lead - (log.n_samples - found.n_samples) + cut
+    short = RunUp(
+        position_rad=found.led("position_rad")[:lead],
+        torque_nm=found.led("torque_nm")[:lead],
+        velocity_ref_rad_s=found.led("velocity_ref_rad_s")[:lead],
+    )
+    rest = replace(log.part(cut * STEP_S), run_up=short, start_rad=found.start_rad)
+    assert log.n_samples - rest.n_samples == cut
+    # A sample beside a constant says nothing.
+    assert not run_up_is_better(robot, log, rest)
 
 
 def test_logs_that_leave_it_open_begin_as_those_beside_them() -> None:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.noise import white_std
 from axisight.gap.poses import start_of
 from axisight.gap.used import STANDS
 from axisight.logs import Log
@@ -25,10 +26,13 @@ _NOISES = 6.0
 _OFF = 3.0
 # Share of the largest acceleration below which there is none.
 _STEADY = 0.03
-# Share of what a run-up cuts off along which simulations are compared: what is wrong of a beginning fades. Of what
-# one from rest is off the torque, in squares, what one in motion may be.
+# Share of what a run-up cuts off along which simulations are compared: what is wrong of a beginning fades. Share
+# of the square of what they are apart after which it has, and share of it that tells one from the other.
 _COMPARED = 0.5
-_BETTER = 0.5
+_FADED = 0.8
+_HALF = 0.5
+# Of the arm's torque, below which there is none on an axis.
+_NOISELESS = 1e-3
 
 
 def begins(log: Log, noise_std: float | Array) -> Begins:
@@ -75,28 +79,65 @@ def _largest_acceleration(log: Log, n: int) -> Array:
 
 
 def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
-    """Whether a simulation that is run up to a log's first motion has more of its torque than one from rest.
+    """Whether a log's torque has what a simulation that is run up to its first motion has beyond one from rest.
 
     ``run_up``: the log as `axisight.gap.in_motion.run_up_to` returns it; compared is the first half of what
-    that cuts off.
+    that cuts off. What is missing of both simulations says nothing.
     """
     cut = log.n_samples - run_up.n_samples
-    lead, n = run_up.lead - cut, round(_COMPARED * cut)
+    lead, n = run_up.lead - cut, max(1, round(_COMPARED * cut))
     references = run_up.led("velocity_ref_rad_s")[: lead + n]
     assert run_up.start_rad is not None  # it has a run-up
-    moving = _missed(robot, log, references, run_up.start_rad, n)
+    moving = _first_torques(robot, references, run_up.start_rad, n)
     at_rest = start_of(robot, log.position_rad[0])
-    return moving < _BETTER * _missed(robot, log, references[lead:], at_rest, n)
+    resting = _first_torques(robot, references[lead:], at_rest, n)
+    if moving is None or resting is None:
+        return moving is not None
+    axes, noise = _that_move(log), _noise_nm(log)
+    missed = ((log.torque_nm[:n] - resting) / noise)[:, axes]
+    apart = ((moving - resting) / noise)[:, axes]
+    few = max(1, round(_LONGEST_S / log.sample_time_s))
+    return not _from_rest(missed[:few]) and _has(missed, apart, few)
 
 
-def _missed(robot: Robot, log: Log, references: Array, start_rad: Array, n: int) -> float:
-    """Return what a simulation is off the first ``n`` torques of a log, in mean squares of their size.
+def _first_torques(robot: Robot, references: Array, start_rad: Array, n: int) -> Array | None:
+    """Return the last ``n`` torques (n, n_axes) [Nm] of a simulation; None where it is unstable.
 
-    Along references (m, n_axes) [rad/s] that end where these do, from rest at joint angles ``start_rad``.
+    Along references (m, n_axes) [rad/s], from rest at joint angles ``start_rad``.
     """
     run = simulate(robot, references, method="rk4", start_rad=start_rad)
     torque = run["torque_cmd_nm"].values
-    if len(torque) < len(references):
-        return float("inf")
-    size = np.maximum(log.torque_nm.std(axis=0), 1e-300)
-    return float(np.mean(((torque[-n:] - log.torque_nm[:n]) / size) ** 2))
+    return None if len(torque) < len(references) else torque[-n:]
+
+
+def _that_move(log: Log) -> NDArray[np.bool_]:
+    """Return which axes (n_axes,) of a log move."""
+    travel = np.ptp(log.position_rad, axis=0)
+    return np.asarray(travel > STANDS * travel.max())
+
+
+def _noise_nm(log: Log) -> Array:
+    """Return the noise of torques (n_axes,) [Nm]; of one that has next to none, a share of the arm's."""
+    size = log.torque_nm.std(axis=0).max()
+    return np.maximum(white_std(log.torque_nm, log.sample_time_s), max(_NOISELESS * size, 1e-300))
+
+
+def _from_rest(first: Array) -> bool:
+    """Whether first errors (n, n_axes) of a simulation from rest, over their noise, are nothing but noise.
+
+    Whatever is missing, what stands has the torque of one that stands, but for what is constant.
+    """
+    return bool(np.all(np.abs(first.mean(axis=0)) < _NOISES / np.sqrt(len(first))))
+
+
+def _has(missed: Array, apart: Array, least: int) -> bool:
+    """Whether errors have more than half of what two simulations are ``apart``, (n, n_axes) each over noise.
+
+    By least squares beside a constant of each axis, along where they are apart, for that fades; along ``least``
+    samples at least, for what a step of the reference makes is over in one or two.
+    """
+    square = np.cumsum((apart**2).sum(axis=1))
+    n = max(least, int(np.searchsorted(square, _FADED * square[-1])) + 1)
+    varies = apart[:n] - apart[:n].mean(axis=0)
+    size = float(np.sum(varies**2))
+    return size > _NOISES**2 and float(np.sum(varies * missed[:n])) > _HALF * size
