@@ -161,7 +161,7 @@ def as_currents(log: Log, *, references: bool = True) -> Log:
 
 def axis_logs(error: float, *, references: bool = True) -> tuple[list[Log], list[Log]]:
     """Logs of an elastic axis with friction, whose motor gives ``1 + error`` of what its controller commands."""
-    machine = scattered(bare_axis(), 4)
+    machine = scattered(bare_axis(), 3)
     missing = [
         Effect("coulomb_friction", 1, {"coulomb_nm": 0.6}),
         Effect("torque_constant", 1, {"relative_error": error}),

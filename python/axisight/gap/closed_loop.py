@@ -66,8 +66,8 @@ class ClosedLoopView(View):
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         slow = robot.with_controller_speed(TRACKING_SPEED)
-        # What keeps a simulator on a log acts on its motors, past any drive.
-        self.tracking = slow.with_effects([e for e in robot.effects if not _of_drive(e)])
+        # What keeps a simulator on a log acts on its motors at once.
+        self.tracking = slow.with_effects([e for e in robot.effects if not _is_lag(e)])
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
         check_gains(others)
@@ -166,8 +166,9 @@ class ClosedLoopView(View):
         return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
 
 
-def _of_drive(effect: Effect) -> bool:
-    return effect_info(effect.name).acts == "torque_path"
+def _is_lag(effect: Effect) -> bool:
+    info = effect_info(effect.name)
+    return info.acts == "torque_path" and info.family == "timing"
 
 
 def _contiguous(x: Array) -> Array:

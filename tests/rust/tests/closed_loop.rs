@@ -528,10 +528,10 @@ fn delays_add() {
     assert!(relative(&run(&[0.4e-3, 1.1e-3]), &run(&[1.5e-3])) < 1e-13);
 }
 
-/// What keeps a simulation on a log acts on the motor past its drive: of the right model it is the answer to the noise
-/// of the log, the same whatever the drive does.
+/// What keeps a simulation on a log acts past delays and lags of its drive: of the right model it is the answer to the
+/// noise of the log, the same whatever these are.
 #[test]
-fn a_right_model_answers_noise_alike_with_any_drive() {
+fn a_right_model_answers_noise_alike_with_any_lag() {
     let mut robot = robot(ROTOR);
     robot.controller = Controller::PiVelocity {
         kp: vec![0.4],
@@ -558,9 +558,34 @@ fn a_right_model_answers_noise_alike_with_any_drive() {
         ("input_delay", &[1.3e-3][..]),
         ("actuator_bandwidth", &[2e-3]),
         ("current_loop", &[1e-3, 0.4]),
-        ("torque_constant", &[-0.2]),
     ] {
         let found = added(&[effect(name, Some(0), values)]);
         assert!(relative(&found, &expected) < 1e-9, "{name}");
     }
+}
+
+/// A machine of which all is less, by a share that its motor is weaker, is the same to any command: it needs as much to
+/// be kept on a log.
+#[test]
+fn what_keeps_a_simulation_on_a_log_is_in_units_of_commands() {
+    let torque = axisight_tests::Random(13).vector(80, 2.0);
+    let position = axisight_tests::Random(14).vector(80, 1e-2);
+    let kept = |text: &str, effects: &[EffectSetting<f64>]| {
+        let mut robot = robot(text);
+        robot.controller = Controller::PiVelocity {
+            kp: vec![0.4],
+            ki: vec![4.0],
+        };
+        let log = Drive::Tracking {
+            torque: &[&torque],
+            position: &[&position],
+        };
+        let method = Method::RungeKutta4 { substeps: 2 };
+        trace(&plant::<f64>(&robot, effects), &robot, log, &[], method).command
+    };
+    let lighter = ROTOR
+        .replace("inertia = [1, 1, 3", "inertia = [1, 1, 2.4")
+        .replace("motor_inertia = 0.25", "motor_inertia = 0.2");
+    let weaker = effect("torque_constant", Some(0), &[-0.2]);
+    assert!(relative(&kept(&lighter, &[weaker]), &kept(ROTOR, &[])) < 1e-9);
 }

@@ -114,6 +114,11 @@ impl<S: Scalar> TorquePath<S> {
         self.kernels.iter().fold(torque, |t, k| k.drive(t))
     }
 
+    /// What the gain of the drive makes of a torque in units of commands.
+    fn gained(&self, torque: S) -> S {
+        self.delivered(torque) - self.delivered(S::zero())
+    }
+
     /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
     fn line(&self, command: S, from: f64, to: f64, state: &mut States<S>) -> Line<S> {
         let width = to - from;
@@ -192,7 +197,7 @@ pub struct SampleTorque<'a, S> {
 /// Memory of [`SampleTorque`] that outlives the samples.
 pub struct TorqueBuffers<S> {
     commands: Vec<S>,
-    /// Torques on the motors that no drive makes.
+    /// What of the commands acts on the motors at once.
     added: Vec<S>,
     /// Lag states at the start of the span in hand and at its end.
     at_start: Vec<States<S>>,
@@ -217,8 +222,10 @@ impl<S: Scalar> TorqueBuffers<S> {
 impl<'a, S: Scalar> SampleTorque<'a, S> {
     /// Take the commands of a new sample; `added`: what of each is none of the machine's.
     ///
-    /// That acts on the motor at once: what keeps a simulation on a log answers noise alike, whatever drive is
-    /// tried in it. Through a lag it would answer more, and fits would make lags of too much or too little.
+    /// That acts on the motor at once: what keeps a simulation on a log answers noise alike, whatever delay or lag is
+    /// tried in it. Through a lag it would answer more, and fits would make lags of too much or too little. It is in
+    /// units of commands all the same: in those of the motor a machine of less inertia and a weaker motor, which is
+    /// the same to any command, would need less of it.
     pub fn new(
         paths: &'a mut [TorquePath<S>],
         commands: &[S],
@@ -247,7 +254,7 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
             } = &mut *torque.buffers;
             let held = torque.paths.iter().zip(commands).zip(added);
             lines.extend(held.map(|((path, u), own)| Line {
-                mean: path.delivered(*u) + *own,
+                mean: path.delivered(*u) + path.gained(*own),
                 slope: S::zero(),
             }));
         }
@@ -269,7 +276,7 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
             let told = commands.iter().zip(added);
             for ((path, (u, own)), state) in self.paths.iter().zip(told).zip(at_end) {
                 let mut line = path.line(*u, from, to, state);
-                line.mean += *own;
+                line.mean += path.gained(*own);
                 lines.push(line);
             }
         }
