@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, EffectTuple, core_effects, effect_info
+from axisight.effects import Effect, EffectTuple, core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
@@ -19,6 +19,7 @@ from axisight.gap.cutoff import highest_cutoff_hz
 from axisight.gap.decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.encoder_steps import encoder_steps
 from axisight.gap.feedback import loop_responses, periodic_response
+from axisight.gap.lags import is_lag
 from axisight.gap.limits import missing, reported, torque_limits
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, motion
@@ -67,7 +68,7 @@ class ClosedLoopView(View):
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         slow = robot.with_controller_speed(TRACKING_SPEED)
         # What keeps a simulator on a log acts on its motors at once.
-        self.tracking = slow.with_effects([e for e in robot.effects if not _is_lag(e)])
+        self.tracking = slow.with_effects([e for e in robot.effects if not is_lag(e)])
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
         check_gains(others)
@@ -164,11 +165,6 @@ class ClosedLoopView(View):
         std = np.full(self.robot.n_axes, self.robot.position_noise_std)
         seed, threads = self.settings.seed, self.settings.threads
         return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
-
-
-def _is_lag(effect: Effect) -> bool:
-    info = effect_info(effect.name)
-    return info.acts == "torque_path" and info.family == "timing"
 
 
 def _contiguous(x: Array) -> Array:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from axisight.effects import effect_info
+from axisight.effects import Effect, effect_info
 from axisight.effects.stated import CURRENT_LOOP, TRANSPORT_DELAY
 from axisight.errors import InputError
 from axisight.gap.decide import Standing, Trial
@@ -28,16 +28,21 @@ _AS_DELAY = float(np.sqrt(0.5))
 
 def lags_beside(standing: Standing) -> list[Trial]:
     """Return the delays and lags of an axis that one of them leads on, as far as they are near it."""
-    if not _is_lag(standing.best.trial, standing.axis):
+    if not _is_of(standing.axis, standing.best.trial):
         return []
     least = standing.best.score - _NEAR
-    return [r.trial for r in standing.ranked if r.score > least and _is_lag(r.trial, standing.axis)]
+    return [r.trial for r in standing.ranked if r.score > least and _is_of(standing.axis, r.trial)]
 
 
-def _is_lag(one: Trial, axis: int) -> bool:
+def _is_of(axis: int, one: Trial) -> bool:
     effect = one.candidate.effect
+    return effect.axis == axis + 1 and is_lag(effect)
+
+
+def is_lag(effect: Effect) -> bool:
+    """Whether an effect is a delay or a lag of a drive."""
     info = effect_info(effect.name)
-    return effect.axis == axis + 1 and info.family == "timing" and info.acts == "torque_path"
+    return info.family == "timing" and info.acts == "torque_path"
 
 
 def ended(

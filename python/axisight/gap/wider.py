@@ -27,19 +27,18 @@ def begun_wider(
     ``offered``: candidates for what is left of a model.
     """
     known = {t.label: t for t in trials}
-    out = []
+    out: list[tuple[Evidence, FreeEffect]] = []
     for standing in standings:
         even = standing.best.trial
         effect = even.evidence.effects[-1]
         mine = effect.name == DRY_FRICTION[0] and effect.axis == standing.axis + 1
         if not mine or standing.best.score > 1 - _LEAVES:
             continue
-        for option in offered(even.evidence):
-            place = option.effect.name, option.effect.axis
-            tried = known.get(option.effect.label)
-            worse = tried is None or tried.evidence.total > even.evidence.total
-            if place == (UNEVEN[0], effect.axis) and worse:
-                out.append((even.evidence, option.at(_as_even(effect))))
+        label = Effect(UNEVEN[0], effect.axis).label
+        if label in known and known[label].evidence.total <= even.evidence.total:
+            continue
+        options = (o for o in offered(even.evidence) if o.effect.label == label)
+        out += [(even.evidence, option.at(_as_even(effect))) for option in options]
     return out
 
 
