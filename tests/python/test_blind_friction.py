@@ -10,6 +10,8 @@ from axisight.blind.friction_formulas import SlidingElements, UnevenArctan
 from axisight.blind.friction_laws import ElastoPlastic, UnevenFriction
 from axisight.blind.laws import Axis
 from axisight.blind.scene import Scene
+from axisight.blind.withheld import yielding
+from axisight.blind.withheld_formulas import DRY_STRAIN_RAD
 from axisight.robot import load_robot
 
 DRY, WAY = 0.7, 0.05
@@ -113,3 +115,11 @@ def test_a_third_of_dry_friction_is_drawn_behind_the_gear(engine: str, name: str
 @pytest.mark.parametrize("engine", ENGINES)
 def test_both_are_drawn(engine: str):
     assert {"presliding_friction", "position_dependent_friction"} <= set(ENGINES[engine])
+
+
+@pytest.mark.parametrize("arm", ["irb6600_like", "scara_like", "lever_like", "cobot_like"])
+def test_what_yields_first_does_not_slip_as_soon_as_dry_friction(arm: str):
+    """One effect is not drawn under the name of another: its way is many times the strain of dry friction."""
+    rng, scene = np.random.default_rng(5), Scene(load_robot(arm), [])
+    ways = [yielding(rng, scene, 1 + k % scene.robot.n_axes) for k in range(60)]
+    assert min(ways) > 3 * DRY_STRAIN_RAD

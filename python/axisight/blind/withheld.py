@@ -29,6 +29,9 @@ from axisight.blind.scene import (
     unloaded,
 )
 
+# What a radian of play of turning axes is on a slide, for the way before friction slips [m].
+_SLIDE_M = 0.25
+
 
 def _coulomb(rng: Rng, scene: Scene, axis: int) -> Drawn:
     size = between(rng, 0.2, 0.7) * scene.torque(axis)
@@ -81,9 +84,13 @@ def _bristles(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def yielding(rng: Rng, scene: Scene, axis: int) -> float:
-    """Draw the way of a motor [rad, m] before friction slips: of a gear's play, as the motor turns it."""
+    """Draw the angle of a motor [rad] before friction slips: of a gear's play, as the motor turns it.
+
+    On a slide over 40 to 150 micrometres: what slips much sooner is dry friction, whoever writes it.
+    """
     ratio = abs(float(scene.robot.gear_ratio[axis - 1]))
-    return between(rng, 1.5e-4, 6e-4) * scene.play(axis) / ratio
+    unit = _SLIDE_M if scene.robot.axis_is_prismatic[axis - 1] else 1.0
+    return between(rng, 1.5e-4, 6e-4) * unit / ratio
 
 
 def _uneven(rng: Rng, scene: Scene, axis: int) -> Drawn:

@@ -13,8 +13,8 @@ from axisight.blind.machine import NOTHING, Native
 from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning, unloaded
 from axisight.blind.withheld import BEHIND, KINDS, behind, on_joint, uneven, yielding
 
-# Angle of a motor over which dry friction comes after a reversal.
-_STRAIN_RAD = 2e-3
+DRY_STRAIN_RAD = 2e-3
+"""Angle of a motor over which dry friction comes after a reversal."""
 
 
 Law = Callable[[Rng, Scene, int, Mapping[str, float]], Formula]
@@ -37,7 +37,7 @@ def _by(name: str, law: Law) -> Kind:
 
 def _dahl(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
     size = values["coulomb_nm"]
-    return formulas.DahlFriction(size, size / _STRAIN_RAD)
+    return formulas.DahlFriction(size, size / DRY_STRAIN_RAD)
 
 
 def _elements(rng: Rng, scene: Scene, axis: int) -> Drawn:

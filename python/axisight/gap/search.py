@@ -582,11 +582,14 @@ def _earns_its_gain(fitter: ModelFitter, winner: Ranked, model: Evidence) -> boo
     """
     fitted = winner.trial.evidence
     others = [replace(f, free=()) for f in fitted.free[:-1]]
-    without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
-    gain = model.total - fitted.total
-    return without.total - fitted.total > 0.5 * gain and not fitter.within_tolerance(
-        fitted.effects[-1]
-    )
+    if fitter.within_tolerance(fitted.effects[-1]):
+        return False
+    try:
+        without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
+    except InputError:
+        # A loop that swings without end lacks it.
+        return True
+    return without.total - fitted.total > 0.5 * (model.total - fitted.total)
 
 
 def _settled(state: Search, settings: Settings) -> bool:
