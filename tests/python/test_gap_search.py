@@ -198,3 +198,29 @@ def test_a_model_short_of_its_best_is_fitted_on():
     assert finished(3.0) == []
     (options,) = finished(3.3)
     assert options["worth"] == 1.0
+
+
+def earns(without, within: bool = False) -> bool:
+    """Whether a fit that takes 6 of 10 away earns that; ``without`` is what is left without its effect."""
+
+    def evaluate(free, model, *, robot_values):
+        if without is None:
+            raise InputError("the simulation failed: diverged at sample 5")
+        return SimpleNamespace(total=without)
+
+    fitter = SimpleNamespace(evaluate=evaluate, within_tolerance=lambda effect: within)
+    one = free("torque_offset@1")
+    fitted = SimpleNamespace(free=(one,), effects=(one.effect,), robot_values={}, total=4.0)
+    winner = SimpleNamespace(trial=SimpleNamespace(evidence=fitted))
+    return search._earns_its_gain(fitter, winner, SimpleNamespace(total=10.0))
+
+
+def test_a_gain_that_stays_without_its_cause_is_not_earned():
+    assert earns(without=8.0)
+    assert not earns(without=6.0)
+    assert not earns(without=8.0, within=True)
+
+
+def test_a_simulation_that_diverges_without_a_cause_needs_it():
+    assert earns(without=None)
+    assert not earns(without=None, within=True)
