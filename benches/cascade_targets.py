@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "python"))
 
-from axisight import diagnose
+from printed import COMPLETE, Counted
+
 from cascade_arm import PI, P, log_of, machine_of, simulator
 from servo_arm import MACHINES, NOMINAL
 
@@ -26,26 +26,14 @@ LAWS = {"pi": PI, "p": P, "fed": replace(PI, fed=True)}
 
 def main(law_name: str, seed: int) -> None:
     """Print a line for every machine, and the counts."""
-    first, invented, law = 0, 0, LAWS[law_name]
-    complete = [f"nothing, run {i + 1}" for i in range(5)]
+    counted, law = Counted(), LAWS[law_name]
     with tempfile.TemporaryDirectory() as folder:
         robot = simulator(Path(folder), NOMINAL, law)
-        for number, lacks in enumerate([*MACHINES, *complete]):
+        for number, lacks in enumerate([*MACHINES, *COMPLETE]):
             arm, own = machine_of(lacks, law)
             logs = [log_of(arm, own, 1000 * seed + 10 * number + k) for k in range(3)]
-            start = time.perf_counter()
-            found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
-            names = [cause.label for cause in found.causes]
-            first += bool(names) and names[0].startswith(lacks)
-            invented += lacks.startswith("nothing") and bool(names)
-            print(
-                f"{lacks:20s} {time.perf_counter() - start:5.1f} s  {found.verdict:11s} "
-                f"{100 * found.gap.before:5.1f} -> {100 * found.gap.after:4.1f} % "
-                f"(noise {100 * found.gap.floor:4.1f})  "
-                + ", ".join(f"{c.label} {c.probability:.2f}" for c in found.causes),
-                flush=True,
-            )
-    print(f"{first} of {len(MACHINES)} first, {invented} of {len(complete)} invented")
+            counted.diagnose(robot, lacks, logs)
+    counted.print_counts()
 
 
 if __name__ == "__main__":

@@ -12,8 +12,6 @@ for ten machines, the gap that the verdict states before and after, and both as 
 from __future__ import annotations
 
 import sys
-import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +19,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from printed import table
 
 from axisight import Diagnosis, Effect, Log, diagnose, load_robot
 from axisight.gap.motion import Filtering
@@ -275,22 +274,22 @@ def outcome(machine: Machine, folder: Path, simulated_s: float = DURATION_S) -> 
     return Outcome(found, made, (inverse[0], inverse[1]), (run[0], run[1]))
 
 
+def row(name: str, folder: Path) -> tuple[list[str], str]:
+    """Return the cells of a machine, and its headline."""
+    out = outcome(MACHINES[name], folder)
+    gap = out.found.gap
+    gaps = [
+        f"{100 * before:.1f} → {100 * after:.1f} %"
+        for before, after in ((gap.before, gap.after), out.inverse, out.run)
+    ]
+    written = [", ".join(x) or "–" for x in (out.made.placed, out.made.left_out)]
+    return [*written, *gaps], out.found.headline
+
+
 def main(names: list[str]) -> None:
     """Print the table."""
-    print("| machine | causes written | by `apply` | verdict | `mj_inverse` | run |")
-    print("|---|---|---|---|---|---|")
-    for name in names or MACHINES:
-        started = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            out = outcome(MACHINES[name], Path(folder))
-        gap = out.found.gap
-        gaps = [
-            f"{100 * before:.1f} → {100 * after:.1f} %"
-            for before, after in ((gap.before, gap.after), out.inverse, out.run)
-        ]
-        placed, left_out = (", ".join(x) or "–" for x in (out.made.placed, out.made.left_out))
-        print(f"| {name} | {placed} | {left_out} | {' | '.join(gaps)} |", flush=True)
-        print(f"{name}: {time.monotonic() - started:.0f} s, {out.found.headline}", file=sys.stderr)
+    columns = ("machine", "causes written", "by `apply`", "verdict", "`mj_inverse`", "run")
+    table(columns, names or MACHINES, row)
 
 
 if __name__ == "__main__":

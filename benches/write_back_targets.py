@@ -11,8 +11,6 @@ the verdict states it before and after, and as MuJoCo has it.
 from __future__ import annotations
 
 import sys
-import tempfile
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "python"))
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from printed import table
 
 from axisight import Diagnosis, Log, Settings, diagnose
 from axisight.gap.settings import DEFAULT_TOLERANCES
@@ -85,26 +84,23 @@ def outcome(name: str, folder: Path) -> Outcome:
     return Outcome(found, made, promised, (run[0], run[1]))
 
 
+def row(name: str, folder: Path) -> tuple[list[str], str]:
+    """Return the cells of a machine, what no file has a place for, and its headline."""
+    out = outcome(name, folder)
+    errors = [
+        f"{1e3 * before.max():.2f} → {1e3 * after.max():.2f} mrad"
+        for before, after in (out.promised, out.run)
+    ]
+    left_out = ", ".join(out.made.left_out) or "nothing"
+    return (
+        [", ".join(out.made.placed) or "–", *errors],
+        f"left out {left_out}, {out.found.headline}",
+    )
+
+
 def main(names: list[str]) -> None:
     """Print the table."""
-    print("| machine | written | verdict | run |")
-    print("|---|---|---|---|")
-    for name in names or CASES:
-        started = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            out = outcome(name, Path(folder))
-        errors = [
-            f"{1e3 * before.max():.2f} → {1e3 * after.max():.2f} mrad"
-            for before, after in (out.promised, out.run)
-        ]
-        print(
-            f"| {name} | {', '.join(out.made.placed) or '–'} | {' | '.join(errors)} |", flush=True
-        )
-        left_out = ", ".join(out.made.left_out) or "nothing"
-        print(
-            f"{name}: {time.monotonic() - started:.0f} s, left out {left_out}, {out.found.headline}",
-            file=sys.stderr,
-        )
+    table(("machine", "written", "verdict", "run"), names or CASES, row)
 
 
 if __name__ == "__main__":
