@@ -49,6 +49,14 @@ def test_small_gains_that_agree_may_be_either(proportional, integral, open_):
     assert either(alone, 0.0) == ()
 
 
+def test_gains_that_were_fitted_to_positions_are_no_sensors():
+    """Of a cascade, whose gain of position is fitted beside both."""
+    both = {"relative_proportional": -0.032, "relative_integral": -0.0321}
+    fitted = cause("controller_gain", 2, **both, relative_position=0.001)
+    assert either([fitted], 0.045) == ()
+    assert either([gains(2, *both.values())], 0.045) != ()
+
+
 @pytest.mark.parametrize(
     ("controller", "error", "axis"),
     [

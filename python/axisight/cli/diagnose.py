@@ -41,7 +41,7 @@ from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Diagnosis, Settings, diagnose
 from axisight.gap.inputs import Inputs, read_inputs
-from axisight.gap.own_effects import GAINS, gain_names
+from axisight.gap.own_effects import gain_names, gain_quantities
 from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
@@ -71,9 +71,8 @@ EXIT_CODES: dict[VerdictKind, int] = {
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
     """Return the tolerances given by quantity or name; raises InputError naming the option."""
-    gains = gain_names(robot)
-    quantities = [*DEFAULT_TOLERANCES, *(GAINS if gains else ())]
-    known = [*robot_parameters(robot), *gains]
+    quantities = [*DEFAULT_TOLERANCES, *gain_quantities(robot)]
+    known = [*robot_parameters(robot), *gain_names(robot)]
     own = [n for n in known if n.rsplit(".", 1)[1] in quantities]
     changed = {}
     for item in given:

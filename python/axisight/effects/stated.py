@@ -152,6 +152,9 @@ TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 OTHER_GAINS = ("controller_gain", ("relative_proportional", "relative_integral"))
 """What a controller with other gains is, and its parameters: of the proportional, of the integral gain."""
 
+GAIN_OF_POSITION = (OTHER_GAINS[0], "relative_position")
+"""The same of the position loop of a cascade, and its parameter."""
+
 SPEED_FILTER = ("velocity_filter", "time_constant_s")
 """What a filter on the controller's speed is, and its parameter."""
 

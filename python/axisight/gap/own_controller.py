@@ -275,12 +275,12 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
 
 def check_gains(shown: Sequence[ShownCause]) -> None:
     """Raise InputError where a gain is so far from the stated one that no effect of the simulator has it."""
-    limits = effect_info(OTHER_GAINS[0]).parameters
+    limits = {p.name: p for p in effect_info(OTHER_GAINS[0]).parameters}
     for cause in shown:
         if cause.name != OTHER_GAINS[0]:
             continue
-        for share, p in zip(("proportional", "integral"), limits, strict=True):
-            change = cause.values[p.name].value
+        for share, name in zip(("proportional", "integral"), OTHER_GAINS[1], strict=True):
+            p, change = limits[name], cause.values[name].value
             if not p.lower <= change <= p.upper:
                 raise InputError(
                     f"controller: axis {cause.axis}: expected gains whose shares the logged torque has "

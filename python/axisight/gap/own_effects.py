@@ -10,19 +10,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from axisight.arguments import positive
 from axisight.effects import Effect
-from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
+from axisight.effects.stated import GAIN_OF_POSITION, OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
 from axisight.errors import InputError
 from axisight.fitting import PRIOR_REACH, Parameter, effect_parameter, robot_parameters
 from axisight.gap.tolerances import tolerance_of
 from axisight.robot import Robot
 
-GAINS = ("kp", "kd")
-"""Quantities of a controller of targets that may have a tolerance: its gains of position and of speed."""
 UNKNOWN = 1.0
 """Tolerance of a constant that nobody knows, relative [1]: one standard deviation is a factor of two."""
 _CONSTANT = TORQUE_CONSTANT[0]
-_OF_GAINS = {gain: (OTHER_GAINS[0], p) for gain, p in zip(GAINS, OTHER_GAINS[1], strict=True)}
+_FIRST, _SECOND = OTHER_GAINS[1]
+# Parameter of the effect of other gains by gain, of the controllers whose gains may have a tolerance.
+_OF_GAINS: Mapping[str, Mapping[str, str]] = {
+    "pd_position": {"kp": _FIRST, "kd": _SECOND},
+    "cascade_position": {"kv": GAIN_OF_POSITION[1], "kp": _FIRST, "ki": _SECOND},
+}
 # Of a constant that nobody knows, an error of the torque sensor is part.
 _PARTS = {_CONSTANT: (TORQUE_SENSOR[0],)}
 
@@ -47,15 +51,14 @@ class _Place:
 
 def _places(robot: Robot) -> dict[str, _Place]:
     """Return by name what may be a parameter of the simulator in an effect."""
-    # Effect and parameter by quantity.
-    quantities = {_CONSTANT: TORQUE_CONSTANT}
-    if robot.controller_kind == "pd_position":
-        quantities |= _OF_GAINS
-    return {
-        f"{joint}.{quantity}": _Place(effect, axis, parameter)
-        for axis, joint in zip(robot.axis_numbers(), robot.axis_names, strict=True)
-        for quantity, (effect, parameter) in quantities.items()
-    }
+    gains, parameters = robot.controller_gains, _OF_GAINS.get(robot.controller_kind, {})
+    out = {}
+    for axis, joint in zip(robot.axis_numbers(), robot.axis_names, strict=True):
+        out[f"{joint}.{_CONSTANT}"] = _Place(TORQUE_CONSTANT[0], axis, TORQUE_CONSTANT[1])
+        # A gain of none has no share by which it changes: a speed loop may have no integral.
+        for gain in (gain for gain in parameters if gains[gain][axis - 1] > 0):
+            out[f"{joint}.{gain}"] = _Place(OTHER_GAINS[0], axis, parameters[gain])
+    return out
 
 
 def constant_name(robot: Robot, axis: int) -> str:
@@ -66,6 +69,11 @@ def constant_name(robot: Robot, axis: int) -> str:
 def gain_names(robot: Robot) -> list[str]:
     """Return the names of the gains of a controller of targets; none of others."""
     return [name for name, place in _places(robot).items() if place.effect == OTHER_GAINS[0]]
+
+
+def gain_quantities(robot: Robot) -> list[str]:
+    """Return which gains of a controller of targets may have a tolerance (``kp``); none of others."""
+    return list(dict.fromkeys(name.rsplit(".", 1)[1] for name in gain_names(robot)))
 
 
 def nominal_values(robot: Robot) -> dict[str, float]:
@@ -90,10 +98,15 @@ def unknown_constants(robot: Robot, axes: Sequence[int]) -> list[Parameter]:
 def uncertain_gains(robot: Robot, tolerances: Mapping[str, float]) -> list[Parameter]:
     """Return the gains that have a tolerance, as what a fit moves.
 
-    Raises InputError where the robot states other gains itself, in an effect.
+    Raises InputError for a tolerance that is not positive, and where the robot states other gains itself,
+    in an effect.
     """
     known = {name: tolerance_of(tolerances, name) for name in gain_names(robot)}
-    out = [_uncertain(robot, name, x) for name, x in known.items() if x is not None]
+    out = [
+        _uncertain(robot, name, positive(f"tolerances: {name}", x))
+        for name, x in known.items()
+        if x is not None
+    ]
     stated = [e.label for e in robot.effects if e.name == OTHER_GAINS[0]]
     if out and stated:
         raise InputError(

@@ -34,8 +34,8 @@ class Settings:
     quantity (``mass``) or name (``axis1.mass``, which comes first); what is left out is
     taken as exact. None: those that the robot file states, ``DEFAULT_TOLERANCES`` for
     others, and by name the standard errors of an identification beside the file. Gains of a controller of
-    targets (``kp``, ``kd``) are taken as exact unless they have one. ``model_error``: error of
-    a perfect diagnosis relative to the torque spectrum (formulas differ from
+    targets (``kp``, ``kd``; of a cascade ``kv``, ``kp``, ``ki``) are taken as exact unless they have one.
+    ``model_error``: error of a perfect diagnosis relative to the torque spectrum (formulas differ from
     nature), part of the weight of residuals. ``bandwidth_hz``: residuals above
     are not used. ``block_s``: length of data blocks for cross-validation and
     bootstrap. ``max_causes``: forward selection stops there.

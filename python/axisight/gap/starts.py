@@ -563,12 +563,16 @@ _TURNS_SLOWLY = 0.05
 def _gain_of_position(trial: Trial) -> FreeEffect:
     """Begin at the neutral values; another gain of speed is viscous friction, which is tried as such.
 
-    But in a cascade, whose gains both act on one error.
+    But of a cascade with an integral, whose gains all act on one error: without one, another gain of speed is
+    a torque constant.
     """
-    found = _neutral(trial)
-    if "kv" in trial.robot.controller_gains:
+    found, gains = _neutral(trial), trial.robot.controller_gains
+    proportional, _, position = found.free
+    if "kv" not in gains:
+        return replace(found, free=(proportional,))
+    if gains["ki"][trial.index] > 0:
         return found
-    return replace(found, free=(trial.info.parameters[0].name,))
+    return replace(found, free=(position,))
 
 
 TARGET_STARTS: Mapping[str, Callable[[Trial], FreeEffect | None]] = {

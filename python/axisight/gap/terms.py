@@ -3,6 +3,7 @@
 Orders of a ripple are taken from the residual of the simulator; beside the right one, what is left of it
 at neighbouring orders is taken in too. Of a load or a centre of mass one coordinate may be all that a
 motion shows, of a tilted base one direction; a balancer mostly stands upright where its axis is at zero.
+Of the gains of a cascade one may be another.
 An effect is not to pay for what says nothing for it.
 """
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.effects.stated import GAIN_OF_POSITION, OTHER_GAINS
 from axisight.gap.evidence import Evidence
 
 Array = NDArray[np.float64]
@@ -23,6 +25,7 @@ Term = tuple[tuple[str, ...], float]
 # Fitted values of a term of a series: cosine, sine and order.
 _OF_A_WAVE = 3.0
 _COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm", "at_zero_nm", "about_x_rad", "about_y_rad")
+_GAINS = (*OTHER_GAINS[1], GAIN_OF_POSITION[1])
 
 
 def idle_numbers(evidence: Evidence, pays: Callable[[float, float, float], bool]) -> float:
@@ -66,7 +69,7 @@ def idle_numbers(evidence: Evidence, pays: Callable[[float, float, float], bool]
 
 
 def _terms(evidence: Evidence, free: set[str]) -> list[Term]:
-    """Return what may be idle of the last effect: waves of a series, coordinates."""
+    """Return what may be idle of the last effect: waves of a series, coordinates, gains."""
     effect = evidence.effects[-1]
     values = effect.parameters or {}
     waves: list[Term] = [
@@ -74,8 +77,8 @@ def _terms(evidence: Evidence, free: set[str]) -> list[Term]:
         for order, cosine, sine in effect_info(effect.name).terms().values()
         if values.get(order) and cosine in free and sine in free
     ]
-    coordinates: list[Term] = [((name,), 1.0) for name in _COORDINATES if name in free]
-    return [*waves, *coordinates]
+    single: list[Term] = [((name,), 1.0) for name in (*_COORDINATES, *_GAINS) if name in free]
+    return [*waves, *single]
 
 
 def _spread(evidence: Evidence) -> tuple[Array, Array]:

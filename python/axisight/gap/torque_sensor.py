@@ -59,8 +59,8 @@ def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str]
 
 
 def _has_both(gains: NamedCause) -> bool:
-    """Whether both gains were found: to positions one alone is fitted, and there is no torque sensor."""
-    return gains.parameters.keys() >= set(OTHER_GAINS[1])
+    """Whether both gains were found and no other: to positions others are fitted, without a torque sensor."""
+    return gains.parameters.keys() == set(OTHER_GAINS[1])
 
 
 def _small_and_one(gains: NamedCause, unseen: float) -> bool:

@@ -116,7 +116,8 @@ class Robot:
         """Relative standard deviation [1] of its own parameters, for quantities that state one.
 
         Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia``
-        and ``viscous_friction``, of a controller of targets its gains ``kp`` and ``kd``.
+        and ``viscous_friction``, of a controller of targets its gains ``kp`` and ``kd``, of a
+        cascade ``kv``, ``kp`` and ``ki``.
         """
         return dict(self.core.tolerances)
 

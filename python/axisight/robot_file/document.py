@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -47,8 +48,12 @@ _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
     "motor_inertia": (("drive", "motor_inertia"), "kg m^2"),
     "viscous_friction": (("drive", "viscous_friction"), "Nm s/rad"),
 }
-# Gains, which are no parameters of a robot; others have none by these names.
-_GAINS = {"kp": "Nm/rad", "kd": "Nm s/rad"}
+# Units of gains, which are no parameters of a robot, by kind of controller; others have none that are found.
+_GAINS: Mapping[str, Mapping[str, str]] = {
+    "pd_position": {"kp": "Nm/rad", "kd": "Nm s/rad"},
+    "cascade_position": {"kv": "1/s", "kp": "Nm s/rad", "ki": "Nm/rad"},
+}
+_OF_COMPUTED_TORQUE = {"kp": "1/s^2", "kd": "1/s"}
 _MARK = "# identified: "
 _HEADER = "# identified by axisight"
 
@@ -165,7 +170,7 @@ def _changes(
             text = _note(name, value, error, unit, before.get(name))
             notes.setdefault(effect_key, []).append(text)
             continue
-        gain = _gain_place(robot, name)
+        gain = _gain_place(robot, document, name)
         if gain is not None:
             gain_key, unit = gain
             changes[gain_key] = float(value)
@@ -201,16 +206,14 @@ def _changes(
     return changes, notes
 
 
-def _gain_place(robot: Robot, name: str) -> tuple[Key, str] | None:
+def _gain_place(robot: Robot, document: dict[str, Any], name: str) -> tuple[Key, str] | None:
     """Return place and unit of a gain of targets by its name (``j1.kp``); None of anything else."""
     joint, _, gain = name.rpartition(".")
-    known = gain in _GAINS and "kd" in robot.controller_gains and joint in robot.axis_names
-    if not known:
+    units = _OF_COMPUTED_TORQUE if robot.computed_torque else _GAINS.get(robot.controller_kind, {})
+    # A cascade without an integral need not state its gain.
+    if gain not in units or gain not in document["controller"] or joint not in robot.axis_names:
         return None
-    place: Key = ("controller", gain, robot.axis_names.index(joint))
-    if robot.computed_torque:
-        return place, {"kp": "1/s^2", "kd": "1/s"}[gain]
-    return place, _GAINS[gain]
+    return ("controller", gain, robot.axis_names.index(joint)), units[gain]
 
 
 def _effect_places(document: dict[str, Any]) -> dict[str, tuple[Key, str]]:

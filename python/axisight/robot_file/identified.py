@@ -43,7 +43,7 @@ class Identified:
     ``names`` are those of `axisight.robot_parameters` (``axis1.stiffness``), with
     ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes,
     ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are;
-    ``<joint>.kp`` and ``.kd`` for gains of a controller of targets; and
+    ``<joint>.kp`` and ``.kd`` for gains of a controller of targets, of a cascade ``.kv``, ``.kp`` and ``.ki``; and
     ``<effect label>.<parameter>`` for effects, of those found or of those that the robot has.
     ``values`` in SI units; ``standard_errors`` NaN where unknown; ``covariance`` over ``names``
     or None. ``effects`` are those found; they take the place of those of the robot with the same

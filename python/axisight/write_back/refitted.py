@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from axisight.gap.own_effects import GAINS, gain_names
+from axisight.gap.own_effects import gain_names
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
@@ -18,17 +18,20 @@ _DEVIATIONS = 1.96
 
 @dataclass(frozen=True)
 class Refitted:
-    """A gain of an axis (from 1): its name (``j1.kp``), and by what share of the stated one it is another."""
+    """A gain of an axis (from 1): its name (``j1.kp``), and by what share of the stated one it is another.
+
+    ``gain``: its key in robot files (``kp``).
+    """
 
     label: str
     axis: int
     stated: float
     change: Interval
-    of_position: bool
+    gain: str
 
     @property
     def value(self) -> float:
-        """The gain that was found, motor side [Nm/rad, Nm s/rad]."""
+        """The gain that was found, motor side [unit of the stated one]."""
         return self.stated * (1 + self.change.value)
 
     @property
@@ -53,13 +56,11 @@ def refitted_gains(robot: Robot, refit: Mapping[str, Interval]) -> list[Refitted
             joint, gain = name.rsplit(".", 1)
             axis = robot.axis_names.index(joint) + 1
             stated = float(robot.controller_gains[gain][axis - 1])
-            found.append(Refitted(name, axis, stated, refit[name], gain == GAINS[0]))
+            found.append(Refitted(name, axis, stated, refit[name], gain))
     return found
 
 
 def factors(gains: Sequence[Refitted]) -> tuple[float, float]:
-    """Return what gains of position and of speed are times the stated ones."""
-    out = [1.0, 1.0]
-    for gain in gains:
-        out[0 if gain.of_position else 1] *= 1 + gain.change.value
-    return out[0], out[1]
+    """Return what gains of position and of speed, ``kp`` and ``kd``, are times the stated ones."""
+    found = {gain.gain: 1 + gain.change.value for gain in gains}
+    return found.get("kp", 1.0), found.get("kd", 1.0)

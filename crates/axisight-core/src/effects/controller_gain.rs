@@ -18,7 +18,7 @@ const fn change(name: &'static str) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "controller_gain",
     summary: "the controller has other gains than the stated ones",
-    equation: "k_p' = k_p (1 + e_p),  k_i' = k_i (1 + e_i)",
+    equation: "k_p' = k_p (1 + e_p),  k_i' = k_i (1 + e_i),  k_v' = k_v (1 + e_v)",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control)",
     scope: Scope::Axis,
     acts: Acts::Controller,
@@ -35,17 +35,20 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: &[
         change("relative_proportional"),
         change("relative_integral"),
+        // Of the position loop around a cascade's speed loop; others have none.
+        change("relative_position"),
     ],
 };
 
-struct Gains<S>([S; 2]);
+struct Gains<S>([S; 3]);
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    Box::new(Gains([S::one() + p[0], S::one() + p[1]]))
+    let [proportional, integral, position] = [p[0], p[1], p[2]].map(|change| S::one() + change);
+    Box::new(Gains([proportional, integral, position]))
 }
 
 impl<S: Scalar> Kernel<S> for Gains<S> {
-    fn controller_gains(&self) -> Option<[S; 2]> {
+    fn controller_gains(&self) -> Option<[S; 3]> {
         Some(self.0)
     }
 }

@@ -6,7 +6,7 @@ use crate::effects::{Acts, EFFECTS, EffectInfo, Scope};
 use crate::robot::description::{Bound, Controller};
 use crate::robot::{EffectSetting, Place, RobotDescription};
 
-/// Quantities that may have a tolerance; gains those of a controller of targets.
+/// Quantities that may have a tolerance, beside gains.
 const TOLERATED: [&str; 6] = [
     "mass",
     "inertia_scale",
@@ -15,7 +15,23 @@ const TOLERATED: [&str; 6] = [
     "motor_inertia",
     "viscous_friction",
 ];
-const TOLERATED_GAINS: [&str; 2] = ["kp", "kd"];
+
+/// Gains that may have one: those of a controller of targets, of a cascade its integral where it has one.
+fn tolerated_gains(controller: &Controller) -> &'static [&'static str] {
+    match controller {
+        Controller::PdPosition { .. } => &["kp", "kd"],
+        Controller::Cascade {
+            ki,
+            told_positions: Some(_),
+            ..
+        } if ki.iter().any(|gain| *gain > 0.0) => &["kv", "kp", "ki"],
+        Controller::Cascade {
+            told_positions: Some(_),
+            ..
+        } => &["kv", "kp"],
+        _ => &[],
+    }
+}
 
 pub(super) fn read_effects(
     root: &Section,
@@ -154,9 +170,7 @@ pub(super) fn read_tolerances(
     };
     let section = entry.section()?;
     let mut tolerated = TOLERATED.to_vec();
-    if matches!(robot.controller, Controller::PdPosition { .. }) {
-        tolerated.extend(TOLERATED_GAINS);
-    }
+    tolerated.extend(tolerated_gains(&robot.controller));
     section.only(&tolerated)?;
     let stated = tolerated.iter().filter(|name| section.find(name).is_some());
     stated

@@ -277,8 +277,8 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn clock_drift(&self) -> Option<S> {
         None
     }
-    /// Factors of the controller's proportional and integral gain [1].
-    fn controller_gains(&self) -> Option<[S; 2]> {
+    /// Factors of the controller's proportional and integral gain, and of a cascade's gain of position [1].
+    fn controller_gains(&self) -> Option<[S; 3]> {
         None
     }
     /// What the controller adds to its command for the rate of the reference [Nm s^2/rad] and for the

@@ -12,8 +12,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy)]
 pub struct OwnLaw<S> {
     /// Factors of the proportional and the integral gain; of a PD controller of the position and the
-    /// velocity gain.
-    gains: [S; 2],
+    /// velocity gain. The third is that of the position gain of a cascade.
+    gains: [S; 3],
     /// Torque for the rate of the reference, and for the reference; `None` without.
     forward: Option<[S; 2]>,
     /// Share of a new speed in the filtered one; `None` without a filter.
@@ -32,14 +32,15 @@ impl<S: Scalar> OwnLaw<S> {
     /// The same of one axis.
     pub fn of_axis(kernels: &[Arc<dyn Kernel<S>>], sample_time: f64) -> Self {
         let mut own = Self {
-            gains: [S::one(); 2],
+            gains: [S::one(); 3],
             forward: None,
             filter: None,
             late: None,
         };
         for kernel in kernels {
-            if let Some([kp, ki]) = kernel.controller_gains() {
-                own.gains = [own.gains[0] * kp, own.gains[1] * ki];
+            if let Some([kp, ki, kv]) = kernel.controller_gains() {
+                let [own_kp, own_ki, own_kv] = own.gains;
+                own.gains = [own_kp * kp, own_ki * ki, own_kv * kv];
             }
             if let Some(delay) = kernel.delay() {
                 let delay = delay * (1.0 / sample_time);
@@ -151,7 +152,7 @@ impl<S: Scalar> ControlLoop<S> {
             };
             let speed_error = self.speed_error(target_speed, speed);
             let angle_error = target_angle - angle;
-            let gains = self.own.get(i).map_or([S::one(); 2], |own| own.gains);
+            let gains = self.own.get(i).map_or([S::one(); 3], |own| own.gains);
             let wanted = self.rate_of_target(i, target_speed);
             out[i] = wanted + self.feedback(i, speed_error, angle_error, gains);
             self.reference_angle[i] += reference[i] * self.sample_time;
@@ -184,7 +185,7 @@ impl<S: Scalar> ControlLoop<S> {
             let behind = lag - self.first_lag[i];
             let speed = (lag - self.last_lag[i]) * rate;
             self.last_lag[i] = lag;
-            added[i] = self.feedback(i, -speed, -behind, [S::one(); 2]);
+            added[i] = self.feedback(i, -speed, -behind, [S::one(); 3]);
         }
         if let Some(known) = &mut self.known {
             known.weigh(measured, added);
@@ -263,17 +264,17 @@ impl<S: Scalar> ControlLoop<S> {
         self.filtered[i]
     }
 
-    /// Torque for errors of speed and angle, both gains times `gains` as in [`OwnLaw`].
+    /// Torque for errors of speed and angle, all gains times `gains` as in [`OwnLaw`].
     #[inline(always)]
-    fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 2]) -> S {
-        let [own_kp, own_ki] = gains;
+    fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 3]) -> S {
+        let [own_kp, own_ki, own_kv] = gains;
         match &self.kind {
             Controller::PiVelocity { kp, ki } => {
                 own_kp * (speed_error * kp[i]) + own_ki * (angle_error * ki[i])
             }
             Controller::PVelocity { kp } => own_kp * (speed_error * kp[i]),
             Controller::Cascade { kv, kp, ki, .. } => {
-                let error = speed_error + angle_error * kv[i];
+                let error = speed_error + own_kv * (angle_error * kv[i]);
                 let integral = self.integral[i];
                 self.integral[i] += error * self.sample_time;
                 own_kp * (error * kp[i]) + own_ki * (integral * ki[i])
