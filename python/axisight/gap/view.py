@@ -14,12 +14,14 @@ from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.compared import Compared
 from axisight.gap.currents import unknown_axes
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.layout import layout_of
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
 from axisight.gap.orders import Turning
 from axisight.gap.own_effects import absorbed, unknown_constants
 from axisight.gap.result import Mode
 from axisight.gap.scales import NaturalSizes
+from axisight.gap.score import held_out_loss
 from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
@@ -63,12 +65,16 @@ class View(ABC):
     ) -> list[FreeEffect]:
         """Return the candidates, with start values from the residual of a model.
 
-        On ``axes`` (from 1), by default those where it leaves something worth a cause.
+        On ``axes`` (from 1), by default those where it leaves something worth a cause: of the logs that it
+        was fitted to, or of each as the others predict it.
         """
         enough = self.floor.expected + self.settings.smallest_gain
-        if axes is not None:
-            # A square is more than less than nothing, and less than infinity.
-            enough = np.where(np.isin(self.robot.axis_numbers(), list(axes)), -1.0, np.inf)
+        left = np.isin(self.robot.axis_numbers(), list(axes or ()))
+        if axes is None:
+            layout = layout_of(model)
+            left = layout.by_axis(held_out_loss(model)) > layout.samples() * enough
+        # A square is more than less than nothing, and less than infinity.
+        enough = np.where(left, -1.0, enough if axes is None else np.inf)
         at = situation(
             self.logs,
             model,
