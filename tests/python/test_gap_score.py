@@ -233,3 +233,25 @@ def test_what_one_log_tells_of_the_simulator_is_no_gain_of_an_effect_that_it_tel
     assert current - trial(effect, with_it).held_out.sum() > 500
     assert abs(current - trial(effect, with_it, model).held_out.sum()) < 10
     assert held_out_loss(model, like=model).sum() == current
+
+
+def test_a_gap_that_misleads_the_simulator_more_in_stretches_is_no_gain_of_its_cause():
+    """A cause that one log tells of leaves what it leaves: no less for what the gap does to others."""
+    rng = np.random.default_rng(4)
+    log = np.repeat([0, 1], 2000)
+    cause = (log == 1) * rng.standard_normal(4000)
+    # What a parameter does in the second log looks like the cause, and in its last quarter like the opposite.
+    looks = np.where(np.arange(4000) < 3500, 10.0, -10.0) * cause
+    x = np.stack([np.where(log == 1, looks, rng.standard_normal(4000)), cause], 1)
+    y = 30.0 * cause + rng.standard_normal(4000)
+    model = linear_evidence(x[:, :1], y, log)
+    effect = FreeEffect(Effect("viscous_friction", 1), ("viscous_nm_s_rad",))
+    with_it = replace(
+        linear_evidence(x, y, log),
+        parameters=((None, "p0"), (0, "viscous_nm_s_rad")),
+        effects=(effect.effect,),
+        free=(effect,),
+    )
+    model = replace(model, parameters=((None, "p0"),))
+    assert held_out_loss(model, like=with_it).sum() > held_out_loss(model).sum() + 1e4
+    assert trial(effect, with_it, model).held_out == pytest.approx(held_out_loss(with_it))

@@ -238,8 +238,19 @@ def trial(candidate: FreeEffect, evidence: Evidence, model: Evidence | None = No
 
     held_out = held_out_loss(evidence)
     if model is not None:
-        held_out = held_out + held_out_loss(model) - held_out_loss(model, like=evidence)
+        held_out = held_out + _left_out_otherwise(model, evidence)
     return Trial(candidate, evidence, held_out, idle_numbers(evidence, pays))
+
+
+def _left_out_otherwise(model: Evidence, evidence: Evidence) -> Array:
+    """Return what parameters of the simulator add to the loss of each block where logs are left out as of ``model``.
+
+    Beyond what they do as of ``evidence``. Where they add less on an axis, it is the gap that misleads them, and
+    that a fit with its cause no longer has.
+    """
+    more = held_out_loss(model) - held_out_loss(model, like=evidence)
+    on_axis = np.bincount(model.axis, more)[model.axis]
+    return np.asarray(np.where(on_axis > 0, more, 0.0))
 
 
 def falls(trials: Sequence[Trial], current: Array, layout: Layout) -> Array:
