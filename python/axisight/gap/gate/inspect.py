@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.faults import Finding, RefusedInputError, check_names, flagged, refused
+from axisight.gap.gate.beyond_a_turn import check_turns
 from axisight.gap.gate.closed_loop import check_closed_loop
 from axisight.gap.gate.copies import check_copies
 from axisight.gap.gate.follows_target import check_follows_target
@@ -59,6 +60,7 @@ def check_by_targets(
     found += _of_each(check_log_alone, logs)
     found += check_copies(estimation, validation)
     found += [f for log in logs for f in check_follows_target(robot, log)]
+    found += [f for log in logs for f in check_turns(robot, log)]
     return tuple(flagged(found, despite))
 
 

@@ -1,0 +1,40 @@
+"""Whether joints turn further than joints do, where no torque tells in which unit their angles are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.faults import Finding
+from axisight.logs import Log
+from axisight.logs.guessing.evidence import LARGEST_JOINT_DEG, LARGEST_JOINT_RAD
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# One axis of an arm may turn on and on; of two or more this share does not.
+_AXES = 2
+_SHARE = 0.5
+
+
+def check_turns(robot: Robot, log: Log) -> list[Finding]:
+    """Return a finding where most joints that turn are at angles beyond a turn: of degrees, or of motors.
+
+    Targets in the same unit follow the positions: against them nothing shows.
+    """
+    if log.position_ref_rad is None or log.n_axes != robot.n_axes:
+        return []
+    turns = ~np.asarray(robot.axis_is_prismatic)
+    largest = np.abs(log.position_rad).max(axis=0) * np.abs(robot.gear_ratio)
+    beyond = np.flatnonzero(turns & (largest > LARGEST_JOINT_RAD))
+    if len(beyond) < max(_AXES, _SHARE * turns.sum()):
+        return []
+    top = float(largest[beyond].max())
+    name = "position_in_degrees" if top <= LARGEST_JOINT_DEG else "position_scaled"
+    axes = ", ".join(str(i + 1) for i in beyond)
+    message = (
+        f"expected joints that turn by no more than {LARGEST_JOINT_RAD:g} rad, got up to {top:.3g} on axes "
+        f"{axes}: degrees, or angles of motors? state the unit and the gear of positions and targets in a "
+        "column map"
+    )
+    return [Finding(name, "refuse", message, log.name, None, "position")]
