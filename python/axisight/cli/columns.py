@@ -78,4 +78,8 @@ def _say_found(out: Path, log: Path, robot: str | None, found: Proposal) -> None
     for name, reason in found.unused.items():
         say(f"not used: {name}: {reason}")
     check = ["axisight", "check", str(log), "--columns", str(out)]
-    say(f"then: {shlex.join(check if robot is None else [*check, '--robot', robot])}")
+    command = shlex.join(check if robot is None else [*check, "--robot", robot])
+    if found.missing is None:
+        say(f"then: {command}")
+    else:
+        say(f"then: the map is not complete yet: {found.missing}; after that {command}")

@@ -20,7 +20,8 @@ class Draft:
     """A map in the making.
 
     ``fields`` holds one (signal, unit) per axis, ``torques`` those of which a person has to choose one, or
-    to state its scale (``scaled``: even of a torque). ``why`` gives the reason of a field, ``unused`` that
+    to state its scale (``scaled``: even of a torque), ``targets`` those that a person may know for targets of
+    positions. ``why`` gives the reason of a field, ``unused`` that
     of a name that was left out. ``doubts`` are choices that others might be right for. ``by_numbers``: no
     name said which columns are positions.
     """
@@ -41,6 +42,7 @@ class Draft:
     fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)
     torques: list[list[tuple[Series, str]]] = field(default_factory=list)
     scaled: bool = False
+    targets: list[list[tuple[Series, str]]] = field(default_factory=list)
     by_numbers: bool = False
     why: dict[str, str] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
@@ -56,6 +58,15 @@ class Draft:
         """Note why families are not used; a reason that is known stays."""
         for family in families:
             self.unused.setdefault(family.label, reason)
+
+    def on_this_side(self, families: Iterable[Family]) -> list[Family]:
+        """Return families with a signal of every axis that are not of the other side."""
+        families = list(families)
+        other = {"motor": "joint", "joint": "motor"}[self.side]
+        self.leave([f for f in families if f.of(self.axes) is None], "not of all axes")
+        self.leave([f for f in families if f.meaning.side == other], f"of the {other}s")
+        whole = [f for f in families if f.of(self.axes) is not None]
+        return [f for f in whole if f.meaning.side != other]
 
     def signals(self, name: str) -> list[Series]:
         """Return the signals of a field, by axis; none where it is not there."""

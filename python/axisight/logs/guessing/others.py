@@ -1,8 +1,6 @@
-"""Which columns are velocities, references, torques, temperatures: by name, and by what positions do."""
+"""Which columns are velocities, their references, torques, temperatures: by name, and by what positions do."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.evidence import (
@@ -21,20 +19,11 @@ _SLIDING = ("m/s", "mm/s")
 _LIKELY = 0.5
 
 
-def _on_this_side(draft: Draft, families: list[Family]) -> list[Family]:
-    """Return families with a signal of every axis that are not of the other side."""
-    other = {"motor": "joint", "joint": "motor"}[draft.side]
-    draft.leave([f for f in families if f.of(draft.axes) is None], "not of all axes")
-    draft.leave([f for f in families if f.meaning.side == other], f"of the {other}s")
-    whole = [f for f in families if f.of(draft.axes) is not None]
-    return [f for f in whole if f.meaning.side != other]
-
-
 def take_velocity(draft: Draft, field: str) -> None:
     """Take `velocity` or `velocity_ref` where the numbers bear a column out, and say why where not."""
     families = of_quantity(draft.families, "velocity", wanted=field == "velocity_ref")
     good: list[tuple[Family, list[Series], list[str], str]] = []
-    for family in _on_this_side(draft, families):
+    for family in draft.on_this_side(families):
         signals = family.of(draft.axes)
         assert signals is not None
         found = _velocity_units(draft, family, signals)
@@ -79,52 +68,12 @@ def _velocity_units(
     return si if both else [fits[0]] * len(units), f"{fits[0]}, for it is {said}"
 
 
-# What is told and what is done are alike: slope and correlation of one on the other.
-_FOLLOWED = (0.8, 1.25)
-_ALIKE = 0.8
-
-
-def take_targets(draft: Draft) -> None:
-    """Take targets of positions where positions follow them in their own unit."""
-    good: list[tuple[Family, list[Series]]] = []
-    for family in _on_this_side(draft, of_quantity(draft.families, "position", wanted=True)):
-        signals = family.of(draft.axes)
-        assert signals is not None
-        if _followed(draft.signals("position"), signals):
-            good.append((family, signals))
-        else:
-            draft.unused[family.label] = "a target that positions do not follow in their unit"
-    if len(good) > 1:
-        listed = " or ".join(family.label for family, _ in good)
-        draft.doubts.append(f"position_ref: left out, for it could be {listed}")
-        draft.leave([family for family, _ in good], f"a choice that is open: {listed}")
-    elif good:
-        family, signals = good[0]
-        units = [unit for _, unit in draft.fields["position"]]
-        draft.take("position_ref", signals, units, f"{family.label}: the positions follow it")
-
-
-def _followed(positions: list[Series], targets: list[Series]) -> bool:
-    """Whether every axis that is told to move does so, by as much."""
-    for position, target in zip(positions, targets, strict=True):
-        told = target.values - target.values.mean()
-        done = position.values - position.values.mean()
-        size, power = float(np.sqrt((told @ told) * (done @ done))), float(told @ told)
-        if power == 0.0:
-            continue
-        shared = float(told @ done)
-        within = _FOLLOWED[0] <= shared / power <= _FOLLOWED[1]
-        if not within or shared < _ALIKE * size:
-            return False
-    return True
-
-
 def take_torque(draft: Draft) -> None:
     """Take the torques; currents and voltages stay open, for only a person knows the Nm per A or V."""
     for quantity, wanted in (
         ("torque", False), ("torque", True), ("current", False), ("current", True), ("voltage", False),
     ):  # fmt: skip
-        families = _on_this_side(draft, of_quantity(draft.families, quantity, wanted=wanted))
+        families = draft.on_this_side(of_quantity(draft.families, quantity, wanted=wanted))
         if not families:
             continue
         if len(families) > 1:

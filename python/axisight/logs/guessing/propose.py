@@ -12,16 +12,17 @@ from axisight.logs.guessing.clock import rate_of, take_time
 from axisight.logs.guessing.derived import name_by_derivatives
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, families_of
+from axisight.logs.guessing.incomplete import still_needed
 from axisight.logs.guessing.named import Fit, named_map
 from axisight.logs.guessing.names import joint_in
 from axisight.logs.guessing.others import (
     take_joint_positions,
-    take_targets,
     take_temperature,
     take_torque,
     take_velocity,
 )
 from axisight.logs.guessing.series import series_of
+from axisight.logs.guessing.targets import take_targets
 from axisight.logs.guessing.uneven import uneven_text
 from axisight.logs.guessing.write import text_of
 from axisight.logs.lazy import LazyArrays
@@ -46,7 +47,8 @@ class Proposal:
 
     ``named`` is the shipped map whose names the file has, None without one; then it is that map, but for
     `axes` where the robot has fewer. ``doubts`` are choices that
-    others might be right for, ``unused`` says of every name that was left out why.
+    others might be right for, ``unused`` says of every name that was left out why. ``missing`` is what a
+    person has to fill in before a log is read by the map; None where it is complete.
     """
 
     text: str
@@ -54,6 +56,7 @@ class Proposal:
     named: str | None
     doubts: tuple[str, ...]
     unused: dict[str, str]
+    missing: str | None = None
 
 
 def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
@@ -97,9 +100,8 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     take_temperature(draft)
     _leave_rest(draft)
     text = text_of(draft)
-    return Proposal(
-        text, parse_column_map(text, f"{path}: guess"), None, tuple(draft.doubts), draft.unused
-    )
+    columns = parse_column_map(text, f"{path}: guess")
+    return Proposal(text, columns, None, tuple(draft.doubts), draft.unused, still_needed(draft))
 
 
 def _native(path: Path, arrays: LazyArrays) -> Proposal:
@@ -161,5 +163,5 @@ def _leave_rest(draft: Draft) -> None:
 def _reason(family: Family) -> str:
     quantity = family.meaning.quantity
     if family.meaning.wanted:
-        return f"a target of the {quantity}"
+        return f"a target of the {quantity}" if quantity else "a target, no name says of what"
     return _REASONS.get(quantity, f"another {quantity}")

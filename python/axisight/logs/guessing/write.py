@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from axisight.logs.columns import CsvOptions
 from axisight.logs.guessing.draft import Draft
+from axisight.logs.guessing.incomplete import still_needed
 from axisight.logs.guessing.series import Series
 
 _FIELDS = (
@@ -22,8 +23,10 @@ _FIELDS = (
 
 def text_of(draft: Draft) -> str:
     """Return the map of a draft as TOML."""
+    missing = still_needed(draft)
     lines = [
         f"# Proposed from names and numbers of {draft.path.name}: look at every reason before use.",
+        *_comments("not complete yet: ", [] if missing is None else [missing]),
         *_comments("doubtful: ", draft.doubts),
         'schema = "axisight.columns/1"',
         "",
@@ -46,6 +49,8 @@ def text_of(draft: Draft) -> str:
         for name in _FIELDS:
             if name in draft.fields:
                 lines.append(f"{name} = {_inline(*draft.fields[name][axis])}{check}")
+        for signals in draft.targets:
+            lines.append(f"# position_ref = {_inline(*signals[axis])}")
         for signals in draft.torques:
             series, unit = signals[axis]
             scale = ", scale = ..." if unit in "AV" or draft.scaled else ""

@@ -1,0 +1,118 @@
+"""Which columns are targets of positions: by name, or since the positions follow them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from axisight.logs.guessing.draft import Draft
+from axisight.logs.guessing.families import Family, of_quantity
+from axisight.logs.guessing.series import Series
+
+# What is told and what is done are alike: slope and correlation of one on the other.
+_FOLLOWED = (0.8, 1.25)
+_ALIKE = 0.8
+# Units that targets of positions may have in their names.
+_UNITS = ("rad", "deg", "rev", "m", "mm")
+# What else a target could be one of.
+_OTHERS = ("velocity", "torque", "current", "voltage")
+
+
+def take_targets(draft: Draft) -> None:
+    """Take targets of positions where positions follow them in their own unit.
+
+    A target whose name does not say of what is one of positions where they follow it and nothing else that
+    is logged of these axes does. What stays open is offered, for a person to take.
+    """
+    named = draft.on_this_side(of_quantity(draft.families, "position", wanted=True))
+    bare = draft.on_this_side(
+        family
+        for family in of_quantity(draft.families, "", wanted=True)
+        if family.meaning.unit in (None, *_UNITS)
+    )
+    good = [family for family in named if _leads(draft, family, "position")]
+    sure = good or [family for family in bare if _is_only_of_positions(draft, family)]
+    if len(sure) > 1:
+        listed = " or ".join(family.label for family in sure)
+        draft.doubts.append(f"position_ref: left out, for it could be {listed}")
+        draft.leave(sure, f"a choice that is open: {listed}")
+        _offer(draft, sure)
+    elif sure:
+        _take(draft, sure[0])
+    _leave(draft, named, bare)
+
+
+def _take(draft: Draft, family: Family) -> None:
+    why = f"{family.label}: the positions follow it"
+    if not family.meaning.quantity:
+        why += ", no name says of what it is a target"
+        draft.doubts.append(f"position_ref: {why}")
+    units = [unit for _, unit in draft.fields["position"]]
+    draft.take("position_ref", _signals(draft, family), units, why)
+
+
+def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
+    """Say why targets are not taken, and offer them where a map has nothing else to be read by."""
+    taken = {id(series) for series in draft.signals("position_ref")}
+    rest = [f for f in (*named, *bare) if not any(id(s) in taken for s in f.signals.values())]
+    new = [family for family in rest if family.label not in draft.unused]
+    draft.leave(
+        [f for f in new if f in named], "a target that positions do not follow in their unit"
+    )
+    for family in (f for f in new if f in bare):
+        also = " and ".join(other for other in _OTHERS if _leads(draft, family, other))
+        if not _leads(draft, family, "position"):
+            why = "a target, no name says of what, that positions do not follow in their unit"
+        elif also:
+            why = f"a target, no name says of what: the positions follow it, but so does {also}"
+        else:
+            why = "a target, no name says of what, beside one of positions"
+        draft.leave([family], why)
+    if not (taken or draft.targets or "torque" in draft.fields):
+        # Beside torques that wait for a scale only what positions follow is worth a line.
+        _offer(draft, [f for f in new if not draft.torques or _leads(draft, f, "position")])
+
+
+def _offer(draft: Draft, families: list[Family]) -> None:
+    """Offer targets in the unit of their name, else of the positions."""
+    for family in families:
+        named = family.meaning.unit if family.meaning.unit in _UNITS else None
+        units = [named or unit for _, unit in draft.fields["position"]]
+        draft.targets.append(list(zip(_signals(draft, family), units, strict=True)))
+
+
+def _signals(draft: Draft, family: Family) -> list[Series]:
+    signals = family.of(draft.axes)
+    assert signals is not None
+    return signals
+
+
+def _is_only_of_positions(draft: Draft, family: Family) -> bool:
+    return _leads(draft, family, "position") and not any(
+        _leads(draft, family, other) for other in _OTHERS
+    )
+
+
+def _leads(draft: Draft, target: Family, quantity: str) -> bool:
+    """Whether a quantity of all axes, measured, follows a target in its own unit."""
+    targets = _signals(draft, target)
+    if quantity == "position":
+        return _followed(draft.signals("position"), targets)
+    measured = [f.of(draft.axes) for f in of_quantity(draft.families, quantity)]
+    return any(signals is not None and _followed(signals, targets) for signals in measured)
+
+
+def _followed(measured: list[Series], targets: list[Series]) -> bool:
+    """Whether every axis that is told to move does so, by as much, and any is told to."""
+    moved = False
+    for done_series, told_series in zip(measured, targets, strict=True):
+        told = told_series.values - told_series.values.mean()
+        done = done_series.values - done_series.values.mean()
+        size, power = float(np.sqrt((told @ told) * (done @ done))), float(told @ told)
+        if power == 0.0:
+            continue
+        moved = True
+        shared = float(told @ done)
+        within = _FOLLOWED[0] <= shared / power <= _FOLLOWED[1]
+        if not within or shared < _ALIKE * size:
+            return False
+    return moved
