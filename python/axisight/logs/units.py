@@ -13,6 +13,8 @@ VelocityUnit = Literal["rad/s", "deg/s", "rpm", "rev/s", "counts/s", "m/s", "mm/
 TorqueUnit = Literal["Nm", "N", "A", "V"]
 TemperatureUnit = Literal["degC", "K"]
 
+POSITION_UNITS = ("rad", "deg", "rev", "m", "mm")
+"""Units that positions have in names; counts need a scale beside them."""
 PRISMATIC_UNITS = frozenset({"m", "mm", "m/s", "mm/s", "N"})
 """Units that only a prismatic axis has."""
 REVOLUTE_UNITS = frozenset(

@@ -12,7 +12,8 @@ from axisight.logs.guessing.evidence import (
     largest,
 )
 from axisight.logs.guessing.families import Axis, Family, of_quantity
-from axisight.logs.guessing.names import WORDS
+from axisight.logs.guessing.measured import measured
+from axisight.logs.guessing.names import WORDS, called_after
 from axisight.logs.units import PRISMATIC_UNITS, si_factor
 
 _POSITION_UNITS = ("rad", "deg", "rev")
@@ -28,14 +29,16 @@ def find_positions(draft: Draft) -> Family:
         words = ", ".join(WORDS["position"].split())
         raise draft.refusal(
             f"position: expected columns whose names say so ({words}), got {got}; "
-            f"a column map can name any other"
+            f"a column map can name any other{_with_robot(draft)}"
         )
     if draft.robot is not None:
         n = draft.robot.n_axes
         enough = [f for f in found if len(f.signals) >= n]
         if not enough:
             most = max(len(f.signals) for f in found)
-            raise draft.refusal(f"axis: expected positions of {n} axes, got columns for {most}")
+            raise draft.refusal(
+                f"axis: expected positions of {n} axes, got columns for {most}{_without(draft, found)}"
+            )
         draft.leave([f for f in found if f not in enough], f"not of {n} axes")
         found = enough
     family = _single(draft, found)
@@ -46,6 +49,20 @@ def find_positions(draft: Draft) -> Family:
     signals = [family.signals[a] for a in draft.axes]
     draft.take("position", signals, [""] * len(signals), "")
     return family
+
+
+def _with_robot(draft: Draft) -> str:
+    """Return what a robot would help, where columns are measured of who knows which joint; "" otherwise."""
+    found = measured(draft.families) if draft.robot is None else []
+    return f", and --robot says whether joints are called as in {found[0].label}" if found else ""
+
+
+def _without(draft: Draft, found: list[Family]) -> str:
+    """Return which joints of the robot no position is called after, where any is; "" otherwise."""
+    joints = [] if draft.robot is None else list(draft.robot.axis_names)
+    named = called_after(joints, [s.name for f in found for s in f.signals.values()])
+    missing = [joint for joint in joints if joint not in named]
+    return f": no position is called after {', '.join(missing)}" if named and missing else ""
 
 
 def _single(draft: Draft, found: list[Family]) -> Family:

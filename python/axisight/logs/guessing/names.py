@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from axisight.logs.guessing.series import Series
@@ -119,18 +119,50 @@ def _bracket_unit(text: str) -> str | None:
     return text.strip() if foreign else _UNITS.get(key) or _LETTERS.get(key)
 
 
-def joint_in(name: str, joint: str) -> re.Match[str] | None:
-    """Return where the name of a joint stands in that of a signal, as words; None where it does not."""
-    return re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+def joint_in(name: str, joints: Sequence[str]) -> tuple[str, re.Match[str]] | None:
+    """Return which of the joints a signal is called after, and where that stands in its name, as words.
+
+    Joints as they are written come before those in other letters or without their `joint`: `Elbow_angle`,
+    of `elbow_joint`. Of several the longest is meant.
+    """
+    ways: list[tuple[dict[str, str], re.RegexFlag]] = [
+        ({joint: joint for joint in joints}, re.NOFLAG),
+        (_bare(joints), re.IGNORECASE),
+    ]
+    for called, flags in ways:
+        for words in sorted(called, key=len, reverse=True):
+            pattern = rf"(?<![A-Za-z0-9]){re.escape(words)}(?![A-Za-z0-9])"
+            if match := re.search(pattern, name, flags):
+                return called[words], match
+    return None
+
+
+def called_after(joints: Sequence[str], names: Iterable[str]) -> list[str]:
+    """Return the joints that any of the names has in it, in their order."""
+    found = {match[0] for name in names if (match := joint_in(name, joints))}
+    return [joint for joint in joints if joint in found]
+
+
+def _bare(joints: Sequence[str]) -> dict[str, str]:
+    """Return the joints by their names in small letters, whole and without `joint`; none for what two share."""
+    found: dict[str, set[str]] = {}
+    for joint in joints:
+        whole = joint.lower()
+        bare = whole.removesuffix("_joint").removeprefix("joint_")
+        # A number or a letter alone stands for anything.
+        enough = len(bare) > 1 and any(c.isalpha() for c in bare)
+        for words in {whole, bare} if enough else {whole}:
+            found.setdefault(words, set()).add(joint)
+    return {words: own.pop() for words, own in found.items() if len(own) == 1}
 
 
 def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str, str]:
     """Return number or joint of the axis, and the name without it."""
     if row is not None:
         return row, name
-    for joint in sorted(joints, key=len, reverse=True):
-        if match := joint_in(name, joint):
-            return joint, f"{name[: match.start()]}#{name[match.end() :]}"
+    if found := joint_in(name, joints):
+        joint, match = found
+        return joint, f"{name[: match.start()]}#{name[match.end() :]}"
     numbers = list(re.finditer(r"\d+", name))
     if not numbers:
         return "", name

@@ -13,8 +13,9 @@ from axisight.logs.guessing.derived import name_by_derivatives
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, families_of
 from axisight.logs.guessing.incomplete import still_needed
+from axisight.logs.guessing.measured import name_by_joints
 from axisight.logs.guessing.named import Fit, named_map
-from axisight.logs.guessing.names import joint_in
+from axisight.logs.guessing.names import called_after
 from axisight.logs.guessing.others import (
     take_joint_positions,
     take_temperature,
@@ -66,7 +67,8 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     the time by its steps, of angles and speeds as one is the derivative of the other, or by size. Where names
     say no position, a column whose derivative another one goes with is proposed for one, if no other is as
     likely. Velocities that are no such derivatives, and what could be one of several columns, are left out
-    and said. ``robot`` gives the number, names and kinds of the axes.
+    and said. ``robot`` gives the number, names and kinds of the axes; what is called measured and after its
+    joints, and nothing else, is proposed for positions.
 
     Raises LogError, listing the columns seen, when no time or no position of any axis is found, and when
     there are fewer axes than those of the robot; for a file that needs no map; and as `read_log` for a
@@ -83,11 +85,12 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     series, unused = series_of(arrays)
     unused |= unread
     joints = [] if robot is None else list(robot.axis_names)
-    if not all(any(joint_in(one.name, joint) for one in series) for joint in joints):
+    if not set(joints) <= set(called_after(joints, [one.name for one in series])):
         # Names of another arm: one that both have would be an axis apart.
         joints = []
     families = families_of(series, joints)
     draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
+    name_by_joints(draft)
     name_by_derivatives(draft, rate_of(arrays))
     family = find_positions(draft)
     take_time(draft, arrays)

@@ -7,12 +7,11 @@ import numpy as np
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, of_quantity
 from axisight.logs.guessing.series import Series
+from axisight.logs.units import POSITION_UNITS
 
 # What is told and what is done are alike: slope and correlation of one on the other.
 _FOLLOWED = (0.8, 1.25)
 _ALIKE = 0.8
-# Units that targets of positions may have in their names.
-_UNITS = ("rad", "deg", "rev", "m", "mm")
 # What else a target could be one of.
 _OTHERS = ("velocity", "torque", "current", "voltage")
 
@@ -27,7 +26,7 @@ def take_targets(draft: Draft) -> None:
     bare = draft.on_this_side(
         family
         for family in of_quantity(draft.families, "", wanted=True)
-        if family.meaning.unit in (None, *_UNITS)
+        if family.meaning.unit in (None, *POSITION_UNITS)
     )
     good = [family for family in named if _leads(draft, family, "position")]
     sure = good or [family for family in bare if _is_only_of_positions(draft, family)]
@@ -75,7 +74,7 @@ def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
 def _offer(draft: Draft, families: list[Family]) -> None:
     """Offer targets in the unit of their name, else of the positions."""
     for family in families:
-        named = family.meaning.unit if family.meaning.unit in _UNITS else None
+        named = family.meaning.unit if family.meaning.unit in POSITION_UNITS else None
         units = [named or unit for _, unit in draft.fields["position"]]
         draft.targets.append(list(zip(_signals(draft, family), units, strict=True)))
 
