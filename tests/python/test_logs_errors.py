@@ -81,6 +81,19 @@ def test_no_native_column_at_all(tmp_path):
     refuse(write(tmp_path / "a.npz", {"q": np.zeros(10)}), "position_1", "column map", "q")
 
 
+def test_other_columns_are_listed_with_both_kinds_of_native_ones(tmp_path):
+    names = [f"{what}_{joint}" for what in ("cmd", "meas") for joint in ("a", "b", "c", "d")]
+    columns = dict(zip(["t", *names], np.ones((9, 600)), strict=True))
+    with pytest.raises(LogError) as caught:
+        read_log(write(tmp_path / "a.parquet", columns))
+    message = str(caught.value)
+    assert "torque_cmd_1 (or position_ref_1: logs of targets need no torque), ..." in message
+    assert f"got {', '.join([*names, 't'])} (9 columns); `axisight columns guess" in message
+    many = {f"c{k:02}": np.ones(600) for k in range(13)}
+    with pytest.raises(LogError, match=r"c10, c11, \.\.\. \(13 columns\)"):
+        read_log(write(tmp_path / "b.parquet", many))
+
+
 def test_axis_missing_in_the_middle(tmp_path):
     columns = {k: v for k, v in native_columns(n_axes=3).items() if not k.endswith("_2")}
     refuse(write(tmp_path / "a.parquet", columns), "position_2")

@@ -10,7 +10,7 @@ from axisight.cli import app
 from axisight.errors import LogError
 from axisight.logs import parse_column_map, read_log
 from axisight.logs.guessing import guess_columns
-from columns_data import DEG, GEAR, RATE_HZ, motion, robot, robot_toml, write_csv
+from columns_data import DEG, GEAR, RATE_HZ, maker_columns, motion, robot, robot_toml, write_csv
 
 JOINTS = ("yaw", "shoulder", "elbow", "wrist")
 N = len(JOINTS)
@@ -127,3 +127,20 @@ def test_the_last_line_says_what_has_to_be_filled_in(tmp_path, more, words):
         f"then: the map is not complete yet: .*{words}.*; after that axisight check", last
     )
     assert re.search(f"^# not complete yet: .*{words}", out.read_text(), re.MULTILINE)
+
+
+def test_a_map_of_a_maker_without_its_torque_is_named(tmp_path):
+    made = maker_columns("ur-rtde", 6)
+    made = {n.replace("actual_current_as_torque", "actual_current"): v for n, v in made.items()}
+    found = guessed(tmp_path, made, robot(6))
+    words = "the names are those of ur-rtde, but no column is called actual_current_as_torque_0 or"
+    assert any(doubt.startswith(words) for doubt in found.doubts)
+    with pytest.raises(LogError, match='as a comment, currents with a scale to be stated, or "unk'):
+        read_log(tmp_path / "run.csv", found.columns, robot=robot(6))
+
+
+def test_native_targets_need_no_map(tmp_path):
+    time = motion(N)["time"]
+    made = {"time_s": time, "position_1": time, "position_ref_1": time}
+    with pytest.raises(LogError, match="it needs no map"):
+        guessed(tmp_path, made)

@@ -20,6 +20,8 @@ NATIVE_STEMS = {
     "joint_position": ("joint_position", "rad"),
     "temperature": ("temperature_c", "degC"),
 }
+# Columns of other names that a message lists.
+_SHOWN = 12
 _PATTERN = re.compile(
     r"^(" + "|".join(stem for stem, _ in NATIVE_STEMS.values()) + r")_([1-9][0-9]*)$"
 )
@@ -36,11 +38,13 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
     # Nine digits are enough to be more than any file has, and few enough to count with.
     numbers = {int(match.group(2)[:9]): match.group(0) for match in matches}
     if not numbers:
-        listed = ", ".join(map(short, sorted(present)[:8])) or "nothing"
+        listed = ", ".join(map(short, sorted(present)[:_SHOWN])) or "nothing"
+        more = ", ..." if len(present) > _SHOWN else ""
         raise LogError(
-            f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1, "
-            f"... or a column map, got {listed} ({len(present)} columns); `axisight columns guess LOG "
-            "--robot MODEL -o columns.toml` proposes a map for --columns"
+            f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1 (or "
+            f"position_ref_1: logs of targets need no torque), ... or a column map, got {listed}{more} "
+            f"({len(present)} columns); `axisight columns guess LOG --robot MODEL -o columns.toml` proposes "
+            "a map for --columns"
         )
     highest = max(numbers)
     if highest > len(numbers):

@@ -38,9 +38,16 @@ def _no_torque(found: Gathered) -> list[Finding]:
     if any(axis.position_ref is not None for axis in found.columns.axis):
         return []
     looked_for = found.pattern.looked_for("torque") if found.pattern is not None else ""
+    if found.pattern is None:
+        more = (
+            "; in a map of `axisight columns guess` what may be one stands as a comment, currents with a scale "
+            'to be stated, or "unknown"'
+        )
+    else:
+        more = f"; no column is called {looked_for}" if looked_for else ""
     message = (
         "expected a torque (or force, or current or voltage with its scale) of every axis, or targets of "
-        f"positions, got neither{f'; no column is called {looked_for}' if looked_for else ''}"
+        f"positions, got neither{more}"
     )
     return [Finding("error", "torque_1", message, "torque_missing", 1)]
 

@@ -46,7 +46,11 @@ def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[Fit | No
             columns = pattern.for_file(arrays, robot, path)
         except LogError:
             continue
-        if not _all_there(columns, arrays):
+        if not _all_there(columns, arrays, "position"):
+            continue
+        if not _all_there(columns, arrays, "torque"):
+            looked_for = pattern.looked_for("torque", robot)
+            against.append(f"the names are those of {name}, but no column is called {looked_for}")
             continue
         wrong = _contradiction(columns, arrays)
         in_file = len(columns.axis)
@@ -59,10 +63,11 @@ def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[Fit | No
     return None, against
 
 
-def _all_there(columns: ColumnMap, arrays: Arrays) -> bool:
+def _all_there(columns: ColumnMap, arrays: Arrays, field: str) -> bool:
+    """Whether a file has the time, and a signal of every axis."""
     if columns.time is None or columns.time.name not in arrays:
         return False
-    wanted = [signal for axis in columns.axis for signal in (axis.position, axis.torque)]
+    wanted = [getattr(axis, field) for axis in columns.axis]
     return all(
         signal is not None and arrays.get(signal.name, np.zeros(0)).dtype.kind in "iuf"
         for signal in wanted

@@ -31,7 +31,7 @@ from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
 from axisight.logs.sources import load_arrays
 from axisight.robot import Robot
 
-_NATIVE = ("time_s", "position_1", "torque_cmd_1")
+_NATIVE = ({"time_s", "position_1", "torque_cmd_1"}, {"time_s", "position_1", "position_ref_1"})
 # Why a signal with that quantity in its name is not used, unless something better is known.
 _REASONS = {
     "": "no word of its name is known",
@@ -77,7 +77,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     path = Path(path)
     opened, csv = _opened(path)
     arrays, unread = opened.readable()
-    if set(_NATIVE) <= set(arrays):
+    if any(native <= set(arrays) for native in _NATIVE):
         return _native(path, opened)
     fit, against = named_map(arrays, robot, path)
     if fit is not None:
