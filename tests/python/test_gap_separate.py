@@ -69,6 +69,8 @@ def test_what_is_open_is_decided_by_the_experiment(open_case: Diagnosis, logs: l
     assert made.decides
     assert made.rivals == ("coulomb_friction@1", "torque_offset@1")
     assert open_case.next_experiment == str(made)
+    group = next(g for g in open_case.equivalent if open_case.causes[0].label in g)
+    assert open_case.causes[0].rivals == group[1:]
     reference = made.references.period[0]
     new = [log_of(MACHINE, [FRICTION], reference, 7 + k) for k in range(made.repeats)]
     after = diagnose(robot=bare_axis(), estimation=[*logs[:2], *new], validation=logs[2:])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from axisight import load_robot
-from axisight.cli.diagnose import _write_model
+from axisight.cli.outcomes import write_found_model
 from axisight.gap.result import Interval
 from axisight.robot_file import load_identified
 from axisight.write_back import write_model
@@ -223,5 +223,5 @@ def test_fitted_gains_alone_are_a_model(tmp_path: Path):
     options: Any = SimpleNamespace(given=lambda: False)
     for refit, there in (({"j1.mass": LIGHTER}, False), ({"j1.kp": LIGHTER}, True)):
         found: Any = SimpleNamespace(causes=(), refit=refit)
-        _write_model(found, inputs, options, tmp_path / "new.xml", force=False)
+        write_found_model(found, inputs, options, tmp_path / "new.xml", force=False)
         assert (tmp_path / "new.xml").exists() == there

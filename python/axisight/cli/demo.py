@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from axisight.blind.case_files import CaseFolder, moves
 from axisight.cli.common import bars, errors, say, write_each
-from axisight.cli.diagnose import diagnosis_writes
+from axisight.cli.outcomes import diagnosis_writes
 from axisight.cli.show import show_diagnosis
 from axisight.effects import Effect
 from axisight.effects.stated import DEMONSTRATION

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import Annotated
 import typer
 
 import axisight
-from axisight import report as pages
 from axisight.cli.common import (
     AtRests,
     Columns,
@@ -29,18 +28,22 @@ from axisight.cli.common import (
     Validation,
     bars,
     errors,
-    say,
     write_each,
-    write_text,
 )
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
+from axisight.cli.outcomes import (
+    diagnosis_writes,
+    write_found_experiment,
+    write_found_model,
+    write_found_signals,
+)
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.screen import OUT, is_output
 from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
-from axisight.gap import Diagnosis, Settings, diagnose
-from axisight.gap.inputs import Inputs, read_inputs
+from axisight.gap import Settings, diagnose
+from axisight.gap.inputs import read_inputs
 from axisight.gap.own_effects import gain_names, gain_quantities
 from axisight.gap.result import VerdictKind
 from axisight.gap.separate.experiment import experiment_files
@@ -49,7 +52,6 @@ from axisight.gap.tolerances import with_tolerances
 from axisight.gap.used import Used
 from axisight.robot import Robot
 from axisight.storage import check_targets
-from axisight.write_back.refitted import refitted_gains
 
 # How files end that an output may replace unasked: what the command makes anew.
 _RESULTS = {
@@ -133,7 +135,7 @@ def diagnose_command(
         Path | None,
         typer.Option(
             help="Design the experiment that tells the causes apart which stay open, and write its "
-            "references into this folder.",
+            "references into this folder: of logs in closed loop with velocity references, no others.",
         ),
     ] = None,
     write_model: Annotated[
@@ -272,12 +274,12 @@ def diagnose_command(
         show_diagnosis(found)
         writes = diagnosis_writes(found, json, report)
         if next_experiment is not None:
-            writes.append(partial(_write_experiment, found, next_experiment))
+            writes.append(partial(write_found_experiment, found, next_experiment))
         if write_model is not None:
-            made = partial(_write_model, found, inputs, options, write_model, force=force)
+            made = partial(write_found_model, found, inputs, options, write_model, force=force)
             writes.append(made)
         if signals is not None:
-            writes.append(partial(_write_signals, found, signals))
+            writes.append(partial(write_found_signals, found, signals))
         write_each(writes)
         if exit_code:
             raise typer.Exit(EXIT_CODES[found.verdict])
@@ -286,59 +288,3 @@ def diagnose_command(
 def _described(given: Sequence[Path], columns: Path | None) -> list[Path]:
     """Return the files that say what is read, beside those that hold it."""
     return [p / "case.toml" for p in given if p.is_dir()] + [p for p in (columns,) if p]
-
-
-def _write_signals(found: Diagnosis, target: Path) -> None:
-    say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
-
-
-def _write_model(
-    found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
-) -> None:
-    """Write the simulator with its causes, and say which of them it has no place for."""
-    if not found.causes and not refitted_gains(inputs.robot, found.refit):
-        say("no model was written: no cause was named")
-        return
-    made = axisight.write_back.write_model(
-        inputs.robot_source,
-        inputs.robot,
-        found.causes,
-        target,
-        refit=found.refit,
-        overwrite=force,
-        drives=options.drives(inputs.robot_source) if options.given() else None,
-    )
-    say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
-    for label in made.left_out:
-        say(f"no place in it for {label}: {made.why[label]}")
-
-
-def _write_experiment(found: Diagnosis, folder: Path) -> None:
-    """Write the designed experiment where there is one that decides; say it where there is none."""
-    made = found.experiment
-    if made is None:
-        why = "needs references in every log" if found.mode != "closed_loop" else "nothing is open"
-        say(f"no experiment: {why}")
-    elif not made.decides:
-        say("no experiment was written: none of those tried decides")
-    else:
-        for path in made.write(folder):
-            say(f"experiment: {path}")
-
-
-def diagnosis_writes(
-    found: Diagnosis, json: Path | None, report: Path | None
-) -> list[Callable[[], object]]:
-    """Return what writes the verdict and the page of a diagnosis where they are asked for."""
-
-    def verdict(target: Path) -> None:
-        write_text(target, found.to_json())
-        if not is_output(target):
-            say(f"verdict: {target}")
-
-    def page(target: Path) -> None:
-        pages.save_report(found, target)
-        say(f"report: {target}")
-
-    wanted = ((verdict, json), (page, report))
-    return [partial(write, target) for write, target in wanted if target is not None]

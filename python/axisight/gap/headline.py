@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from axisight.effects import Effect, article, noun, phrase
 from axisight.effects.stated import STEPS
 from axisight.gap.beyond import LARGEST
 from axisight.gap.compared import gap_of, torque_of
-from axisight.gap.result import Cause, Gap, Where
+from axisight.gap.result import Cause, Gap, Interval, Where
 from axisight.gap.verdict import Conclusion
 
 
@@ -66,7 +66,7 @@ def _of_causes(
         f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
-        rivals = _listed([_placed(label) for label in conclusion.equivalent[0]])
+        rivals = listed([_placed(label) for label in conclusion.equivalent[0]])
         return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
     return f"The simulator lacks {missing}: {shrinks}"
 
@@ -96,9 +96,9 @@ def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) 
         shared = head if start not in ("a", "an") else noun(effect)
         key = (start, shared, tuple(mine))
         phrases.setdefault(key, []).append(adjective if shared == head else "")
-    return _listed(
+    return listed(
         [
-            " ".join(x for x in (start, _listed(adjectives), head, _place(where, n_axes)) if x)
+            " ".join(x for x in (start, listed(adjectives), head, _place(where, n_axes)) if x)
             for (start, head, where), adjectives in phrases.items()
         ]
     )
@@ -115,14 +115,27 @@ def _place(axes: Sequence[int], n_axes: int) -> str:
         return ""
     if 1 < len(axes) == n_axes:
         return "on both axes" if n_axes == 2 else f"on all {_COUNTS.get(n_axes, n_axes)} axes"
-    return f"on {'axis' if len(axes) == 1 else 'axes'} {_listed([str(a) for a in axes])}"
+    return f"on {'axis' if len(axes) == 1 else 'axes'} {listed([str(a) for a in axes])}"
 
 
 _COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
-def _listed(items: Sequence[str]) -> str:
-    return " and ".join([", ".join(items[:-1]), items[-1]]) if len(items) > 1 else items[0]
+def listed(items: Sequence[str], last: str = "and") -> str:
+    """Return items in a row: "a, b and c", with another ``last`` word between the last two."""
+    return f" {last} ".join([", ".join(items[:-1]), items[-1]]) if len(items) > 1 else items[0]
+
+
+# Changes that are told by name, of what may be many.
+_TOLD = 4
+
+
+def clear_changes(refit: Mapping[str, Interval]) -> list[str]:
+    """Return re-fitted parameters with what they changed by, the largest first: those whose interval leaves out 0."""
+    clear = {k: p for k, p in refit.items() if p.low > 0 or p.high < 0}
+    largest = sorted(clear.items(), key=lambda item: -abs(item[1].value))
+    told = [f"{k} {100 * p.value:+.2g} %" for k, p in largest[:_TOLD]]
+    return told if len(largest) <= _TOLD else [*told, f"and {len(largest) - _TOLD} more"]
 
 
 def percent(x: float) -> str:

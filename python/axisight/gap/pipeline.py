@@ -551,9 +551,17 @@ def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cau
             c.family,
             c.family_probability,
             c.axes,
+            _rivals(c.label, conclusion),
         )
         for c, r in zip(conclusion.causes, reductions, strict=False)
     )
+
+
+def _rivals(label: str, conclusion: Conclusion) -> tuple[str, ...]:
+    """Return what the data cannot tell from a cause, none of which is a cause itself."""
+    causes = {c.label for c in conclusion.causes}
+    open_to_it = [x for group in conclusion.equivalent if label in group for x in group]
+    return tuple(dict.fromkeys(x for x in open_to_it if x not in causes))
 
 
 def _provenance(

@@ -179,7 +179,8 @@ class Cause:
     """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm.
 
     ``axes``: both of an effect between two, of which ``axis`` is the first; None of others, as in
-    `Candidate` and `DetectionLimit`.
+    `Candidate` and `DetectionLimit`. ``rivals``: labels of what the data cannot tell from it, of
+    `Diagnosis.equivalent`.
     """
 
     effect: str
@@ -191,6 +192,7 @@ class Cause:
     family: str = ""
     family_probability: float = 1.0
     axes: tuple[int, int] | None = None
+    rivals: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

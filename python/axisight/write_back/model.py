@@ -74,7 +74,8 @@ def write_model(
         with all causes as effects; a URDF or MJCF, which is written as its own kind, or as a robot file.
     target
         File to write. Of a URDF or MJCF all bytes stay but the numbers that change, each with a comment that says
-        cause, value, interval and probability: dry and viscous friction of joints; masses, centres of mass and
+        cause, value, interval, probability and what the data cannot tell from it:
+        dry and viscous friction of joints; masses, centres of mass and
         inertias of links, and a load on the last one; where an axis lies in its link, where the zero of a joint
         is, how the base is tilted; of an MJCF also rotors (armature), springs of joints, and gains, limits, delays
         and lags of motors.
@@ -123,13 +124,22 @@ def _as_robot_file(
 ) -> Written:
     found = identified(
         {gain.label: gain.value for gain in gains},
-        Provenance("diagnosis of the sim-to-real gap"),
+        Provenance("; ".join(["diagnosis of the sim-to-real gap", *_doubts(causes)])),
         standard_errors={gain.label: gain.standard_error for gain in gains},
         effects=[cause.as_effect() for cause in causes],
     )
     write_identified(robot, path, found, overwrite=overwrite)
     every: list[Labelled] = [*causes, *gains]
     return Written(path, tuple(x.label for x in every), ())
+
+
+def _doubts(causes: Sequence[Cause]) -> list[str]:
+    """Return which causes the data cannot tell from something else."""
+    return [
+        f"{c.label}: the data cannot tell it from {' or '.join(c.rivals)}"
+        for c in causes
+        if c.rivals
+    ]
 
 
 # Causes, and gains that were re-fitted.

@@ -41,7 +41,7 @@ class Placed:
 
 
 def said(causes: Sequence[Cause], more: Sequence[str] = ()) -> str:
-    """Return what a comment says: of causes values, intervals, probabilities, as the diagnosis does; and ``more``."""
+    """Return what a comment says: of causes values, intervals, probabilities and rivals; and ``more``."""
     return "axisight: " + "; ".join([*map(_cause, causes), *more])
 
 
@@ -54,4 +54,5 @@ def _cause(cause: Cause) -> str:
         if value is not None:
             text = f"{name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})"
             values.append(text if unit in ("", "1") else f"{text} {unit}{side}")
-    return f"{cause.label}: {', '.join(values)}, probability {cause.probability:.2f}"
+    doubt = f", the data cannot tell it from {' or '.join(cause.rivals)}" if cause.rivals else ""
+    return f"{cause.label}: {', '.join(values)}, probability {cause.probability:.2f}{doubt}"

@@ -1,0 +1,108 @@
+"""What a diagnosis hands over in files, and what is said of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import axisight
+from axisight import report as pages
+from axisight.cli.common import say, write_text
+from axisight.cli.model_options import ModelOptions
+from axisight.cli.screen import is_output
+from axisight.gap import Diagnosis
+from axisight.gap.headline import clear_changes, listed
+from axisight.gap.inputs import Inputs
+from axisight.write_back import Written
+from axisight.write_back.refitted import refitted_gains
+
+_DESIGNED = "experiments are designed for logs in closed loop with velocity references"
+
+
+def write_found_signals(found: Diagnosis, target: Path) -> None:
+    """Write the signals of a diagnosis, and say where."""
+    say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
+
+
+def write_found_model(
+    found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
+) -> None:
+    """Write the simulator with its causes, and say which of them it has no place for.
+
+    And of which the data cannot say whether it was them, and what was re-fitted beside them.
+    """
+    if not found.causes and not refitted_gains(inputs.robot, found.refit):
+        say("no model was written: no cause was named")
+        return
+    made = axisight.write_back.write_model(
+        inputs.robot_source,
+        inputs.robot,
+        found.causes,
+        target,
+        refit=found.refit,
+        overwrite=force,
+        drives=options.drives(inputs.robot_source) if options.given() else None,
+    )
+    say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
+    for label in made.left_out:
+        say(f"no place in it for {label}: {made.why[label]}")
+    for cause in found.causes:
+        if cause.rivals and cause.label in made.placed:
+            others = listed(cause.rivals, "or")
+            say(f"in doubt: {cause.label} is in it, but this data cannot tell it from {others}")
+    _say_refitted(found, made)
+
+
+def _say_refitted(found: Diagnosis, made: Written) -> None:
+    """Say what was re-fitted and is not written, where causes are: the promised fall of the gap counts both."""
+    left = {k: v for k, v in found.refit.items() if k not in made.placed}
+    changes = clear_changes(left)
+    if changes and found.causes:
+        say(
+            f"not in it: what was re-fitted within its tolerance ({', '.join(changes)}); "
+            f"part of the fall of the gap is that"
+        )
+
+
+def write_found_experiment(found: Diagnosis, folder: Path) -> None:
+    """Write the designed experiment where there is one that decides; say why where there is none."""
+    made = found.experiment
+    if made is None:
+        say(f"no experiment: {_why_none(found)}")
+    elif not made.decides:
+        say("no experiment was written: none of those tried decides")
+    else:
+        for path in made.write(folder):
+            say(f"experiment: {path}")
+
+
+def _why_none(found: Diagnosis) -> str:
+    """Return why no experiment was designed."""
+    if not found.causes:
+        return "no cause was named, so none has a rival"
+    if found.mode != "closed_loop":
+        return f"{_DESIGNED}; by inverse dynamics there is no loop to run"
+    if found.gap.compared == "positions":
+        return f"{_DESIGNED}; not for targets and positions alone"
+    if found.equivalent:
+        return f"no motion tells {listed(found.equivalent[0])} apart"
+    return "nothing is open"
+
+
+def diagnosis_writes(
+    found: Diagnosis, json: Path | None, report: Path | None
+) -> list[Callable[[], object]]:
+    """Return what writes the verdict and the page of a diagnosis where they are asked for."""
+
+    def verdict(target: Path) -> None:
+        write_text(target, found.to_json())
+        if not is_output(target):
+            say(f"verdict: {target}")
+
+    def page(target: Path) -> None:
+        pages.save_report(found, target)
+        say(f"report: {target}")
+
+    wanted = ((verdict, json), (page, report))
+    return [partial(write, target) for write, target in wanted if target is not None]
