@@ -164,6 +164,7 @@ def explained(n_axes: int = 3) -> Diagnosis:
             "seed": 7,
             "robot": "practice",
             "robot_effects": [],
+            "axis_names": [f"axis{k + 1}" for k in range(n_axes)],
             "axis_kinds": ["revolute"] * n_axes,
             "estimation_logs": ["a", "b"],
             "validation_logs": ["validation_multisine", "validation_trajectory"],

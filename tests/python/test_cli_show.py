@@ -41,6 +41,14 @@ def test_a_diagnosis_says_it_all(shown):
         assert words in text, words
 
 
+def test_joints_with_names_of_their_own_are_told(shown):
+    named = {**explained().provenance, "axis_names": ["base", "axis2", "elbow"]}
+    text = shown(replace(explained(), provenance=named))
+    assert "axes: 1 base, 3 elbow" in text
+    assert "axis: rms error / standard deviation of the torque; all: rms of the axes" in text
+    assert "axes: " not in shown(explained())
+
+
 def test_positions_are_told_as_what_the_gains_command(shown):
     found = explained()
     text = shown(replace(found, gap=replace(found.gap, compared="positions")))

@@ -9,6 +9,7 @@ from rich.table import Table
 from axisight.cli.common import say
 from axisight.cli.screen import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
+from axisight.gap.axis_words import own_name
 from axisight.gap.compared import FROM_POSITIONS, MOTION_HEAD, motion_words, torque_of
 from axisight.gap.headline import in_order, percent
 from axisight.gap.own_simulator import said
@@ -26,6 +27,7 @@ def show_diagnosis(found: Diagnosis) -> None:
     if found.causes:
         OUT.print(_causes(found))
     OUT.print(_gaps(found))
+    _show_joints(found)
     if found.gap.motion is not None:
         OUT.print(_motion(found.gap.motion))
     _show_comparison(found)
@@ -41,6 +43,14 @@ def show_diagnosis(found: Diagnosis) -> None:
     # What could be there all the same is the other half of finding nothing.
     if found.verdict == "none" and found.detection_limits:
         OUT.print(_limits(found))
+
+
+def _show_joints(found: Diagnosis) -> None:
+    """Say which joint each axis is, where joints have names of their own."""
+    numbers = range(1, len(found.joints) + 1)
+    named = [f"{i} {name}" for i in numbers if (name := own_name(i, found.joints))]
+    if named:
+        say(f"axes: {', '.join(named)}")
 
 
 def _show_comparison(found: Diagnosis) -> None:
@@ -92,22 +102,17 @@ def _causes(found: Diagnosis) -> Table:
 def _gaps(found: Diagnosis) -> Table:
     table = Table("axis", "verdict", "gap before", "re-fitted", "after", "noise alone")
     gap = found.gap
-    columns = (
-        gap.before_per_axis,
-        gap.refitted_per_axis,
-        gap.after_per_axis,
-        gap.floor_per_axis,
-    )
-    verdicts = {a.axis: a.verdict for a in found.axes}
-    for i, row in enumerate(zip(*columns, strict=True), start=1):
-        table.add_row(str(i), verdicts.get(i, ""), *(_percent(x) for x in row))
+    for i, verdict, row in found.axis_rows():
+        table.add_row(str(i), verdict, *(_percent(x) for x in row))
     table.add_row("all", found.verdict, *_stages(gap))
+    # A caption is as wide as its table: one line a sentence.
+    table.caption = f"axis: rms error / standard deviation of the {torque_of(gap.compared)}; all: rms of the axes"
     if gap.pooled is not None:
         p = gap.pooled
         pooled = (p.before, p.refitted, p.after, p.floor)
         table.add_row("pooled", "", *(_percent(x) for x in pooled))
         squared = f"{torque_of(gap.compared)}s"
-        table.caption = f"pooled: sqrt(sum of squared errors / sum of squared {squared})"
+        table.caption += f"\npooled: sqrt(sum of squared errors / sum of squared {squared})"
     return table
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from axisight.effects import Effect, article, noun, phrase
 from axisight.effects.stated import STEPS
+from axisight.gap.axis_words import removed_by_refit, with_joints
 from axisight.gap.beyond import LARGEST
 from axisight.gap.compared import gap_of, torque_of
 from axisight.gap.result import Cause, Gap, Interval, Where
@@ -19,12 +21,33 @@ def headline(
     causes: Sequence[Cause],
     where: Sequence[Where],
     own: Sequence[Effect] = (),
+    *,
+    refit: Mapping[str, Interval] = MappingProxyType({}),
+    joints: Sequence[str] = (),
 ) -> str:
-    """Return the finding in one or two plain sentences; ``own``: effects of the simulator."""
+    """Return the finding in one or two plain sentences.
+
+    ``own``: effects of the simulator; ``refit``: what its own parameters changed by; ``joints``: names of
+    its axes.
+    """
+    return with_joints(_said(conclusion, gap, causes, where, own, refit), joints)
+
+
+def _said(
+    conclusion: Conclusion,
+    gap: Gap,
+    causes: Sequence[Cause],
+    where: Sequence[Where],
+    own: Sequence[Effect],
+    refit: Mapping[str, Interval],
+) -> str:
     place = f" The gap lies mainly on axis {where[0].axis}." if where else ""
     if conclusion.withdrawn is not None:
         return f"{conclusion.withdrawn}{place}"
     of = f"of the {torque_of(gap.compared)}"
+    moved = within_tolerances(gap)
+    if conclusion.verdict == "none" and moved:
+        return _refitted(gap, moved, refit)
     if conclusion.verdict == "none":
         return (
             f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
@@ -43,6 +66,27 @@ def headline(
             f"{percent(gap.before)} {of} is unexplained, {percent(gap.floor)} would be noise.{place}"
         )
     return _of_causes(conclusion, gap, causes, own)
+
+
+def within_tolerances(gap: Gap) -> list[int]:
+    """Return the axes (from 1) whose gap as given is clear and gone once re-fitted, the largest first."""
+    stages = (gap.before_per_axis, gap.refitted_per_axis, gap.floor_per_axis)
+    return removed_by_refit(*(stage.tolist() for stage in stages))
+
+
+def _refitted(gap: Gap, axes: Sequence[int], refit: Mapping[str, Interval]) -> str:
+    """Return the finding where nothing but the simulator's own parameters makes the gap as given."""
+    first, *others = axes
+    stages = (gap.before_per_axis, gap.refitted_per_axis, gap.floor_per_axis)
+    before, left, floor = (percent(float(stage[first - 1])) for stage in stages)
+    also = f", and above the floor {_place(others, 0)} too," if others else ""
+    changes = clear_changes(refit)
+    how = f" ({', '.join(changes)})" if changes else ""
+    return (
+        f"No unmodelled effect found: the gap as given, {before} of the {torque_of(gap.compared)} on axis "
+        f"{first}{also} is within the tolerances of the simulator's own parameters. Re-fitted{how}, they "
+        f"leave {left} there; sensor noise alone leaves {floor}."
+    )
 
 
 def _of_causes(

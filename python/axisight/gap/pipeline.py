@@ -500,11 +500,14 @@ def _assemble(
         places = led_by_weight(places, *maps, excess)
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
+    refit = {k: _relative(robot, fitted, k) for k in fitted.robot_values}
     return Diagnosis(
         name=name,
         mode=view.mode,
         verdict=conclusion.verdict,
-        headline=headline(conclusion, gap, causes, places, robot.effects),
+        headline=headline(
+            conclusion, gap, causes, places, robot.effects, refit=refit, joints=robot.axis_names
+        ),
         gap=gap,
         where=places,
         causes=causes,
@@ -515,7 +518,7 @@ def _assemble(
         band_map=bands,
         regime_maps=regimes,
         overlays=reach.overlays,
-        refit={k: _relative(robot, fitted, k) for k in fitted.robot_values},
+        refit=refit,
         checks=(
             *conclusion.checks,
             *chance_check(reach.stages, reach.judged),
@@ -551,17 +554,10 @@ def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cau
             c.family,
             c.family_probability,
             c.axes,
-            _rivals(c.label, conclusion),
+            conclusion.rivals_of(c.label),
         )
         for c, r in zip(conclusion.causes, reductions, strict=False)
     )
-
-
-def _rivals(label: str, conclusion: Conclusion) -> tuple[str, ...]:
-    """Return what the data cannot tell from a cause, none of which is a cause itself."""
-    causes = {c.label for c in conclusion.causes}
-    open_to_it = [x for group in conclusion.equivalent if label in group for x in group]
-    return tuple(dict.fromkeys(x for x in open_to_it if x not in causes))
 
 
 def _provenance(
@@ -572,6 +568,7 @@ def _provenance(
         "seed": settings.seed,
         "robot": robot.name,
         "robot_effects": [effect.label for effect in robot.effects if effect.acts],
+        "axis_names": list(robot.axis_names),
         "axis_kinds": ["prismatic" if p else "revolute" for p in robot.axis_is_prismatic],
         "estimation_logs": [log.name for log in view.logs],
         "validation_logs": list(held),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.display import html
 from axisight.effects import Effect
+from axisight.gap.axis_words import axis_label, verdict_word
 from axisight.gap.compared import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.faults import Finding
 from axisight.gap.separate.experiment import Experiment
@@ -328,9 +329,17 @@ class Diagnosis:
     simulator: Reproduction | None = None
     signals: tuple[xr.Dataset, ...] = ()
 
-    def _repr_html_(self) -> str:
-        """Verdict, causes with values, and the gap by axis, for notebooks."""
-        causes = [row for cause in self.causes for row in _rows(cause)]
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Name of the joint that each axis drives, where the provenance has them."""
+        return tuple(self.provenance.get("axis_names", ()))
+
+    def axis_rows(self) -> list[tuple[int, str, tuple[float, ...]]]:
+        """Return of each axis its number (from 1), verdict in words, and gap: before, re-fitted, after, floor [1].
+
+        The verdict is empty where the logs did not get that far, and ``at the floor`` where causes of
+        others act on an axis on which there was nothing to explain.
+        """
         gap, verdicts = self.gap, {a.axis: a.verdict for a in self.axes}
         stages = (
             gap.before_per_axis,
@@ -338,9 +347,20 @@ class Diagnosis:
             gap.after_per_axis,
             gap.floor_per_axis,
         )
+        out = []
+        for i, row in enumerate(zip(*(x.tolist() for x in stages), strict=True), start=1):
+            before, refitted, _, floor = row
+            word = verdict_word(verdicts.get(i, ""), before, refitted, floor)
+            out.append((i, word, row))
+        return out
+
+    def _repr_html_(self) -> str:
+        """Verdict, causes with values, and the gap by axis, for notebooks."""
+        causes = [row for cause in self.causes for row in _rows(cause)]
+        gap, joints = self.gap, self.joints
         rows = [
-            (str(i), verdicts.get(i, ""), *map(_percent, row))
-            for i, row in enumerate(zip(*stages, strict=True), start=1)
+            (axis_label(i, joints), verdict, *map(_percent, row))
+            for i, verdict, row in self.axis_rows()
         ]
         whole = (gap.before, gap.refitted, gap.after, gap.floor)
         rows.append(("all", self.verdict, *map(_percent, whole)))

@@ -45,6 +45,12 @@ class Conclusion:
         """Return the same with further checks."""
         return replace(self, checks=(*self.checks, *more))
 
+    def rivals_of(self, label: str) -> tuple[str, ...]:
+        """Return what the data cannot tell from a cause, none of which is a cause itself."""
+        causes = {c.label for c in self.causes}
+        rivals = [x for group in self.equivalent if label in group for x in group]
+        return tuple(dict.fromkeys(x for x in rivals if x not in causes))
+
 
 # Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
 _EDGE = 5.0

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from axisight.effects import effect_table
+from axisight.gap.axis_words import axis_label
 from axisight.gap.compared import MOTION_HEAD, motion_words, torque_of
-from axisight.gap.headline import in_order
+from axisight.gap.headline import in_order, within_tolerances
 from axisight.gap.result import (
     Candidate,
     Cause,
@@ -57,6 +58,11 @@ _VERDICTS: dict[VerdictKind, tuple[str, str]] = {
         "Two or more effects explain the gap equally well on this data.",
     ),
 }
+_WITHIN = (
+    "No unmodelled effect",
+    "There is a gap as given; the simulator's own parameters, re-fitted within their tolerances, remove it: what is "
+    "left is no larger than noise explains.",
+)
 # Values beside the headline: about its height with a few causes, all friction of a six-axis arm.
 _MOST_VALUES = 12
 _MODES = {
@@ -85,6 +91,8 @@ def save_report(diagnosis: Diagnosis, path: Path | str) -> None:
 
 def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     badge, meaning = _VERDICTS[diagnosis.verdict]
+    if diagnosis.verdict == "none" and within_tolerances(diagnosis.gap):
+        badge, meaning = _WITHIN
     logs, left_out = overlays_by_log(diagnosis)
     ranking = ranked(diagnosis)
     measured = "measured" if diagnosis.gap.compared == "torques" else ""
@@ -152,16 +160,10 @@ def _numbers(diagnosis: Diagnosis) -> list[dict[str, str]]:
 def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
     """Return axis, verdict and the gap at each stage: by axis, for all, and pooled."""
     gap = diagnosis.gap
-    columns = (
-        gap.before_per_axis,
-        gap.refitted_per_axis,
-        gap.after_per_axis,
-        gap.floor_per_axis,
-    )
-    verdicts: dict[int, str] = {a.axis: a.verdict for a in diagnosis.axes}
+    joints = diagnosis.joints
     rows = [
-        [str(i), verdicts.get(i, NO_VALUE), *(percent(float(x)) for x in row)]
-        for i, row in enumerate(zip(*columns, strict=True), 1)
+        [axis_label(i, joints), verdict or NO_VALUE, *(percent(x) for x in row)]
+        for i, verdict, row in diagnosis.axis_rows()
     ]
     wholes: list[tuple[str, str, Gap | Pooled | None]] = [
         ("all", diagnosis.verdict, gap),
