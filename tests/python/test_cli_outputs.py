@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from axisight import Diagnosis
-from axisight.cli import app
+from axisight.cli import app, outcomes
 from axisight.cli import diagnose as command
 from axisight.cli.demo import write_demo_case
 from axisight.gap import Interval
@@ -91,7 +91,7 @@ def test_a_failed_output_costs_no_other(case, quick, monkeypatch, tmp_path):
     def full(*_args: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(command.pages, "save_report", full)
+    monkeypatch.setattr(outcomes.pages, "save_report", full)
     verdict, signals = tmp_path / "v.json", tmp_path / "r.html"
     said = run("diagnose", case, "--json", verdict, "--report", signals, status=2)
     assert verdict.exists()
