@@ -7,7 +7,9 @@ import pytest
 from rich.console import Console
 
 from axisight.cli import common, show
-from diagnosis_data import explained, hostile, of
+from axisight.gap.result import DetectionLimit
+from axisight.logs.render import _folded
+from diagnosis_data import explained, gap, hostile, of
 
 
 @pytest.fixture
@@ -77,3 +79,30 @@ def test_nothing_is_cut_on_a_narrow_screen(shown):
 def test_names_are_no_markup(shown):
     assert "[red]" in shown(replace(explained(), headline="a [red] arm"))
     shown(hostile())
+
+
+def test_limits_are_whole_in_80_columns():
+    """Seven places of numbers as wide as they come; no word and no number on two lines."""
+    places = (1, 2, 3, 4, 5, 6, None)
+    names = ("asymmetric_friction", "load_dependent_friction")
+    limits = tuple(
+        DetectionLimit(name, place, "x", 0.00053, "Nm (joint side)")
+        for name in names
+        for place in places
+    )
+    six = replace(of("none"), gap=gap(0.1, 0.1, 0.1, 0.1, 6), detection_limits=limits)
+    console = Console(width=80, record=True, file=StringIO())
+    for table in show._limits(six):
+        console.print(table)
+    text = console.export_text()
+    words = text.split()
+    assert words.count("0.00053") == 14
+    assert {"Asymmetric", "Load-dependent", "friction"} <= set(words)
+    assert "axis 6" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_names_of_columns_fold_where_they_have_an_end():
+    folded = _folded("joint_states.velocity.shoulder_lift_joint")
+    assert folded.split("\n") == ["joint_states.velocity.", "shoulder_lift_joint"]
+    assert _folded("a" * 60) == "a" * 60

@@ -18,6 +18,8 @@ from axisight.report.limits import limit_table
 
 _RANKED = 8
 _REFITTED = 10
+# Axes of a table of detection limits.
+_PLACES = 7
 
 
 def show_diagnosis(found: Diagnosis) -> None:
@@ -42,7 +44,8 @@ def show_diagnosis(found: Diagnosis) -> None:
         OUT.print(_ranking(found))
     # What could be there all the same is the other half of finding nothing.
     if found.verdict == "none" and found.detection_limits:
-        OUT.print(_limits(found))
+        for table in _limits(found):
+            OUT.print(table)
 
 
 def _show_joints(found: Diagnosis) -> None:
@@ -141,14 +144,25 @@ def _refitted(refit: dict[str, Interval]) -> Table:
     return table
 
 
-def _limits(found: Diagnosis) -> Table:
+def _limits(found: Diagnosis) -> list[Table]:
+    """Return the detection limits, so many axes a table that numbers stay whole in 80 columns."""
     limits = limit_table(found.detection_limits, len(found.gap.before_per_axis))
-    table = Table(title="smaller would not have shown (95 % power)", box=SIMPLE_HEAD)
-    for name in ("effect", "unit", *limits.columns):
-        table.add_column(name, overflow="fold")
-    for row in limits.rows:
-        table.add_row(*(escape(cell) for cell in row))
-    return table
+    out = []
+    for first in range(0, len(limits.columns), _PLACES):
+        shown = slice(first, first + _PLACES)
+        table = Table(
+            title=None if first else "smaller would not have shown (95 % power)",
+            box=SIMPLE_HEAD,
+            padding=0,
+        )
+        table.add_column("effect")
+        for name in limits.columns[shown]:
+            table.add_column(name, no_wrap=True)
+        for effect, unit, *values in limits.rows:
+            title = f"{effect} [{unit}]" if unit else effect
+            table.add_row(escape(title), *(escape(cell) for cell in values[shown]))
+        out.append(table)
+    return out
 
 
 def _ranking(found: Diagnosis) -> Table:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
@@ -24,7 +26,7 @@ def render(report: LogReport) -> RenderableType:
     for finding in sorted(report.findings, key=lambda item: _ORDER[item.severity]):
         table.add_row(
             Text(finding.severity, style=_STYLES[finding.severity]),
-            Text(finding.column),
+            Text(_folded(finding.column)),
             Text(finding.message),
         )
     counts = {
@@ -34,3 +36,17 @@ def render(report: LogReport) -> RenderableType:
     verdict = "readable" if report.ok else "not readable as it is"
     summary = f"{verdict}: {counts['error']} errors, {counts['warning']} warnings"
     return Group(table, Text(summary, style=_STYLES["ok" if report.ok else "error"]))
+
+
+# Of a terminal of 80 columns, what is left for a name beside what was found.
+_NAME = 24
+
+
+def _folded(name: str) -> str:
+    """Return a name on lines of so many characters where it has a dot or underscore to end one at."""
+    lines = [""]
+    for part in re.findall(r"[^._]*[._]|[^._]+", name):
+        if lines[-1] and len(lines[-1]) + len(part) > _NAME:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
