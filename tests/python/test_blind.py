@@ -35,7 +35,7 @@ from axisight.blind.formulas import (
 from axisight.blind.laws import Axis, Delay, ExponentialStribeck, Law, MaxwellSlip
 from axisight.blind.machine import Machine, Native
 from axisight.blind.make import _in_steps, _noise, make_cases
-from axisight.blind.motions import MOTIONS, multisines
+from axisight.blind.motions import MOTIONS, multisines, point_to_point
 from axisight.blind.scene import Scene
 from axisight.blind.score import _missed, _said, comparable, sizes
 from axisight.blind.sealed import SEAL
@@ -510,3 +510,17 @@ def test_a_machine_that_runs_away_is_drawn_again(monkeypatch: pytest.MonkeyPatch
 def test_truths_stay_apart_from_cases(tmp_path: Path):
     with pytest.raises(InputError, match="truth: expected another folder"):
         make_cases(tmp_path, tmp_path, [0], 0, 1, lambda *_: None)
+
+
+@pytest.mark.parametrize("arm", ["irb6600_like", "lever_like", "scara_like"])
+def test_a_limit_of_torque_holds_the_arm_and_cuts_what_moves_it(arm: str):
+    robot = load_robot(arm)
+    moves = [ref for _, ref in point_to_point(np.random.default_rng(2), robot).values()]
+    scene, rng = Scene(robot, moves[:1]), np.random.default_rng(6)
+    for axis in robot.axis_numbers():
+        held, largest = scene.at_rest_nm(axis), float(scene.largest_nm[axis - 1])
+        for _ in range(5):
+            limit = (
+                ENGINES["mujoco"]["torque_saturation"].draw(rng, scene, axis).parameters["limit_nm"]
+            )
+            assert held + 0.7 * (largest - held) < limit < largest

@@ -72,7 +72,11 @@ class Scene:
 
     def holds(self, axis: int) -> float:
         """Return the torque that holds an axis at rest, over the rated one of its motor."""
-        return float(np.abs(self._at_rest[axis - 1])) / (_RATED_NM * self.torque(axis))
+        return self.at_rest_nm(axis) / (_RATED_NM * self.torque(axis))
+
+    def at_rest_nm(self, axis: int) -> float:
+        """Return the size of the motor torque that holds an axis at rest [Nm]."""
+        return float(np.abs(self._at_rest[axis - 1]))
 
     @cached_property
     def _at_rest(self) -> Array:

@@ -430,7 +430,9 @@ def _fed_forward(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    limit = float(rng.uniform(0.75, 0.9) * scene.largest_nm[axis - 1])
+    # Of what moves the axis beyond what holds it: a motor that cannot hold its arm logs its limit, and no more.
+    held, largest = scene.at_rest_nm(axis), float(scene.largest_nm[axis - 1])
+    limit = held + float(rng.uniform(0.75, 0.9)) * max(largest - held, 0.0)
     return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[laws.Limit(limit)])
 
 

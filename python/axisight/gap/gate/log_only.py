@@ -85,6 +85,9 @@ def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
     return LogFinding("error", finding.column, message, "reference_missing", finding.axis)
 
 
+_LIMIT = ", or the drive is at its limit all the time and cannot hold the arm"
+
+
 def _dead(finding: Finding, log: Log) -> Finding:
     """Refuse a constant channel of an axis that moves, or is told to."""
     if finding.name != "channel_constant" or finding.axis is None:
@@ -98,9 +101,10 @@ def _dead(finding: Finding, log: Log) -> Finding:
         travel = float(np.ptp(path))
     if travel <= _TRAVEL:
         return finding
+    at_limit = finding.field.startswith("torque") and bool(np.any(log.torque_nm[:, axis]))
     message = (
         f"expected a signal, got one that is {finding.message} while the axis travels "
-        f"{travel:.4g} rad: the channel is dead or was not recorded"
+        f"{travel:.4g} rad: the channel is dead or was not recorded{_LIMIT if at_limit else ''}"
     )
     return Finding(finding.name, "refuse", message, log.name, finding.axis, finding.field)
 
