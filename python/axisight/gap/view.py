@@ -66,11 +66,12 @@ class View(ABC):
         """Return the candidates, with start values from the residual of a model.
 
         On ``axes`` (from 1), by default those where it leaves something worth a cause: of the logs that it
-        was fitted to, or of each as the others predict it.
+        was fitted to, or in closed loop of each as the others predict it. By inverse dynamics what filters smear
+        around reversals is predicted badly, too.
         """
         enough = self.floor.expected + self.settings.smallest_gain
         left = np.isin(self.robot.axis_numbers(), list(axes or ()))
-        if axes is None:
+        if axes is None and self.mode == "closed_loop":
             layout = layout_of(model)
             left = layout.by_axis(held_out_loss(model)) > layout.samples() * enough
         # A square is more than less than nothing, and less than infinity.
