@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight import Log, Robot, load_robot
+from axisight import Diagnosis, Log, Robot, load_robot
 from axisight.logs.log import not_logged
 
 Array = NDArray[np.float64]
@@ -170,3 +170,19 @@ MACHINES: Mapping[str, ServoArm] = {
     "controller_gain@3": NOMINAL.with_changed("kp", 3, 420.0),
 }
 """By what the simulator lacks of them."""
+
+
+def check_unknown_gains(found: Diagnosis, lacks: str | None, changes: Mapping[str, float]) -> None:
+    """Gains with a tolerance are found by name, as relative changes, and are no cause: dry friction is."""
+    assert found.verdict == ("none" if lacks is None else "explained")
+    assert [c.label for c in found.causes] == ([lacks] if lacks else [])
+    for cause in found.causes:
+        # A tenth, as of gains that are known: the corner of the fitted friction is not MuJoCo's.
+        assert np.isclose(cause.parameters["coulomb_nm"].value, 2.5, rtol=0.1)
+    # Gains, masses and friction times one number are the same motion: known as masses are, 1.5 % each.
+    for name, change in changes.items():
+        assert np.isclose(1 + found.refit[name].value, 1 + change, rtol=0.03)
+        assert found.refit[name].low < change < found.refit[name].high
+    assert np.isclose(found.gap.after, found.gap.floor, rtol=0.1)
+    assert not found.findings
+    assert not any("controller_gain" in c.effect for c in found.ranking)

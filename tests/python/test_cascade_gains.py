@@ -18,7 +18,7 @@ from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.robot_file import Provenance, identified, load_identified, write_identified
 from axisight.write_back import write_model
 from cascade_arm import PI, SAMPLE_S, Cascade, P, log_of, simulator
-from servo_arm import HOME_RAD, MACHINES, NOMINAL, targets
+from servo_arm import HOME_RAD, MACHINES, NOMINAL, check_unknown_gains, targets
 
 pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
 
@@ -104,18 +104,7 @@ def test_unknown_gains_are_found_beside_what_lacks(
     logs = [log_of(arm, own(LAWS[law]), run) for run in (1, 2, 3)]
     settings = Settings(tolerances=UNKNOWN)
     found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:], settings=settings)
-    assert found.verdict == ("none" if lacks is None else "explained")
-    assert [c.label for c in found.causes] == ([lacks] if lacks else [])
-    for cause in found.causes:
-        # A tenth, as of gains that are known: the corner of the fitted friction is not MuJoCo's.
-        assert cause.parameters["coulomb_nm"].value == pytest.approx(2.5, rel=0.1)
-    # Gains, masses and friction times one number are the same motion: known as masses are, 1.5 % each.
-    for name, change in changes(robot).items():
-        assert 1 + found.refit[name].value == pytest.approx(1 + change, rel=0.03)
-        assert found.refit[name].low < change < found.refit[name].high
-    assert found.gap.after == pytest.approx(found.gap.floor, rel=0.1)
-    assert not found.findings
-    assert not any("controller_gain" in c.effect for c in found.ranking)
+    check_unknown_gains(found, lacks, changes(robot))
 
 
 @pytest.mark.parametrize(

@@ -70,12 +70,13 @@ class View(ABC):
         around reversals is predicted badly, too.
         """
         enough = self.floor.expected + self.settings.smallest_gain
-        left = np.isin(self.robot.axis_numbers(), list(axes or ()))
-        if axes is None and self.mode == "closed_loop":
-            layout = layout_of(model)
-            left = layout.by_axis(held_out_loss(model)) > layout.samples() * enough
         # A square is more than less than nothing, and less than infinity.
-        enough = np.where(left, -1.0, enough if axes is None else np.inf)
+        if axes is not None:
+            enough = np.where(np.isin(self.robot.axis_numbers(), list(axes)), -1.0, np.inf)
+        elif self.mode == "closed_loop":
+            layout = layout_of(model)
+            predicted = layout.by_axis(held_out_loss(model)) / layout.samples()
+            enough = np.where(predicted > enough, -1.0, enough)
         at = situation(
             self.logs,
             model,

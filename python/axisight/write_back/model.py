@@ -25,7 +25,7 @@ from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
 from axisight.write_back.limits import limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
-from axisight.write_back.placed import Labelled, Placed
+from axisight.write_back.placed import Labelled, Placed, doubt
 from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
 
@@ -122,24 +122,16 @@ def _as_robot_file(
     *,
     overwrite: bool,
 ) -> Written:
+    doubts = [f"{cause.label}: {words}" for cause in causes for words in doubt(cause)]
     found = identified(
         {gain.label: gain.value for gain in gains},
-        Provenance("; ".join(["diagnosis of the sim-to-real gap", *_doubts(causes)])),
+        Provenance("; ".join(["diagnosis of the sim-to-real gap", *doubts])),
         standard_errors={gain.label: gain.standard_error for gain in gains},
         effects=[cause.as_effect() for cause in causes],
     )
     write_identified(robot, path, found, overwrite=overwrite)
     every: list[Labelled] = [*causes, *gains]
     return Written(path, tuple(x.label for x in every), ())
-
-
-def _doubts(causes: Sequence[Cause]) -> list[str]:
-    """Return which causes the data cannot tell from something else."""
-    return [
-        f"{c.label}: the data cannot tell it from {' or '.join(c.rivals)}"
-        for c in causes
-        if c.rivals
-    ]
 
 
 # Causes, and gains that were re-fitted.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from axisight.effects import effect_info
+from axisight.gap.headline import listed
 
 if TYPE_CHECKING:
     from axisight.gap.result import Cause
@@ -54,5 +55,10 @@ def _cause(cause: Cause) -> str:
         if value is not None:
             text = f"{name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})"
             values.append(text if unit in ("", "1") else f"{text} {unit}{side}")
-    doubt = f", the data cannot tell it from {' or '.join(cause.rivals)}" if cause.rivals else ""
-    return f"{cause.label}: {', '.join(values)}, probability {cause.probability:.2f}{doubt}"
+    parts = [*values, f"probability {cause.probability:.2f}", *doubt(cause)]
+    return f"{cause.label}: {', '.join(parts)}"
+
+
+def doubt(cause: Cause) -> list[str]:
+    """Return that the data cannot tell a cause from others, as one item; none where they can."""
+    return [f"the data cannot tell it from {listed(cause.rivals, 'or')}"] if cause.rivals else []

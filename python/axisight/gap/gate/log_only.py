@@ -26,6 +26,7 @@ _OPTIONAL = {"velocity": "velocity_rad_s"}
 # A dead channel of an axis whose reference travels this far [rad, or m] is no axis at rest: a
 # thousand times the noise of a usual motor sensor.
 _TRAVEL = 0.01
+_LIMIT = ", or the drive is at its limit all the time and cannot hold the arm"
 
 
 def channels(log: Log) -> tuple[dict[Channel, Array], dict[Channel, str]]:
@@ -83,9 +84,6 @@ def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
         "of the axis, zero if it rests"
     )
     return LogFinding("error", finding.column, message, "reference_missing", finding.axis)
-
-
-_LIMIT = ", or the drive is at its limit all the time and cannot hold the arm"
 
 
 def _dead(finding: Finding, log: Log) -> Finding:
