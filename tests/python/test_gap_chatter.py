@@ -11,7 +11,7 @@ from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.layout import layout_of
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 from axisight.gap.torques import AS_GIVEN, Variant
 from gap_data import HELD, PLAN, bare_axis, logs_of
 

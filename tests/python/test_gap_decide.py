@@ -235,9 +235,10 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
     [
         # A rival that fits the logs better and predicts a little worse is as good.
         (50.0, 0.08, 2),
-        # One that fits no better is not, nor is one that explains less by more than formulas differ.
+        (50.0, 0.6, 2),
+        # One that fits no better is not, nor is one that predicts less than nine tenths of it.
         (0.0, 0.08, 1),
-        (50.0, 0.6, 1),
+        (50.0, 1.1, 1),
     ],
 )
 def test_where_one_predicts_better_and_the_other_fits_better_neither_is_surer(fits, behind, open_):
@@ -291,6 +292,22 @@ def test_what_leads_another_axis_surely_is_judged_by_both():
     product = alone[one] / alone[other] * elsewhere[one] / elsewhere[other]
     assert odds[one] / odds[other] == pytest.approx(product)
     assert here.with_those_that_lead([]).best.trial is offset
+
+
+def test_a_third_gains_nothing_from_a_rival_that_leads_another_axis():
+    """What holds the first against it holds all others that do as badly there."""
+    lag, loop, delay = (
+        a_trial(name, 1, np.full(40, loss))
+        for name, loss in (("actuator_bandwidth", 1.5), ("current_loop", 1.8), ("input_delay", 1.9))
+    )
+    here = standing([lag, loop, delay])
+    there = standing(
+        [replace(t, held_out=np.full(40, x)) for t, x in ((lag, 1.6), (loop, 1.6), (delay, 1.0))]
+    )
+    both = here.with_those_that_lead([there])
+    odds, alone = ({r.trial.label: r.probability for r in s.ranked} for s in (both, here))
+    assert odds[lag.label] / odds[loop.label] == pytest.approx(alone[lag.label] / alone[loop.label])
+    assert odds[delay.label] / odds[loop.label] > alone[delay.label] / alone[loop.label]
 
 
 def test_many_rivals_leave_a_cause_as_open_as_one():

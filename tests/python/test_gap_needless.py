@@ -7,7 +7,7 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.errors import InputError
-from axisight.gap import search
+from axisight.gap import reconsider
 from axisight.gap.evidence import FreeEffect
 from gap_data import linear_evidence
 
@@ -41,9 +41,9 @@ def test_a_cause_is_dropped_unless_a_loop_swings_without_it(needed, dropped, mon
     free = [FreeEffect(Effect(name, 1), ("size",)) for name in COLUMNS]
     model = fits.evaluate(free, None, robot_values={})
     state = SimpleNamespace(model=model, layout=SimpleNamespace(samples=lambda: np.array([400.0])))
-    monkeypatch.setattr(search, "linear_gain", lambda _: 0.0)
+    monkeypatch.setattr(reconsider, "linear_gain", lambda _: 0.0)
     monkeypatch.setattr(
-        search, "settled", lambda fitter, rest, _: fitter.evaluate(rest, None, robot_values={})
+        reconsider, "settled", lambda fitter, rest, _: fitter.evaluate(rest, None, robot_values={})
     )
     # Of noise of one a per cent is worth a cause: one by chance takes a four-hundredth.
-    assert search._drop_idle(fits, state, Settings(smallest_gain=0.01)) == dropped
+    assert reconsider.drop_idle(fits, state, Settings(smallest_gain=0.01)) == dropped

@@ -8,7 +8,7 @@ from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import layout_of
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 from axisight.gap.straight import bent_for
 from gap_data import bare_axis, logs_of
 

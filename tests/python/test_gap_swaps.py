@@ -12,7 +12,7 @@ from axisight.gap.decide import Ranked, Standing, Trial
 from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
-from axisight.gap.search import _weigh_again
+from axisight.gap.reconsider import weigh_again
 from axisight.gap.swaps import mending, nearly_as_good, straightened, weighed_again
 from gap_data import linear_evidence
 
@@ -234,7 +234,9 @@ def test_only_a_law_that_mends_has_to_halve_what_is_left(
         left_by=lambda _model: np.array([after]),
     )
     for name in ("mending", "nearly_as_good"):
-        monkeypatch.setattr(f"axisight.gap.search.{name}", lambda *_: [])
-    monkeypatch.setattr("axisight.gap.search.weighed_again", lambda *_: (new, (cause, standing)))
-    _weigh_again(None, state, SimpleNamespace(explained_share=0.6))
+        monkeypatch.setattr(f"axisight.gap.reconsider.{name}", lambda *_: [])
+    monkeypatch.setattr(
+        "axisight.gap.reconsider.weighed_again", lambda *_: (new, (cause, standing))
+    )
+    weigh_again(None, state, SimpleNamespace(explained_share=0.6))
     assert (state.model is new) is swapped

@@ -9,8 +9,8 @@ from axisight import Effect
 from axisight.gap.decide import Ranked, Standing, Trial
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.result import Interval
-from axisight.gap.search import Round, Search
 from axisight.gap.shown import ShownCause
+from axisight.gap.state import Round, Search
 from axisight.gap.told import with_constants_told
 from gap_data import linear_evidence
 

@@ -10,7 +10,7 @@ from axisight import Effect, Settings, diagnose
 from axisight.gap import trials
 from axisight.gap.decide import Ranked, Standing
 from axisight.gap.evidence import FreeEffect
-from axisight.gap.search import _beaten_at_home
+from axisight.gap.search import _beaten_at_home, _rival_leads
 from axisight.gap.trials import Trials
 from axisight.gap.usual import begun_where_it_ended
 from gap_data import PLAN, bare_axis, logs_of, scattered
@@ -217,3 +217,29 @@ def test_play_is_found_whatever_damps_in_its_gap(damped: float):
     (cause,) = found.causes
     assert (found.verdict, cause.label) == ("explained", "backlash@1")
     assert cause.parameters["half_width_rad"].value == pytest.approx(4e-4, rel=0.03)
+
+
+@pytest.mark.parametrize(("unknown", "leads"), [(0.01, True), (0.9, False)])
+def test_a_rival_that_something_unknown_is_likelier_than_leads_no_axis(unknown: float, leads: bool):
+    """What takes next to nothing away of another axis says nothing of the cause."""
+    viscous, sag = Effect("viscous_friction", 2), Effect("power_supply_sag", 2)
+
+    def ranked(effect: Effect, p: float):
+        held_out = np.zeros(2)
+        trial = SimpleNamespace(
+            candidate=FreeEffect(effect, ()), label=effect.label, held_out=held_out
+        )
+        return SimpleNamespace(trial=trial, probability=p)
+
+    def standing(axis: int, entries, p_unknown: float):
+        return SimpleNamespace(
+            axis=axis, ranked=tuple(entries), best=entries[0], p_none=0.0, p_unknown=p_unknown
+        )
+
+    one, other = ranked(viscous, 0.97), ranked(sag, 0.02)
+    led = standing(1, [one, other], 0.0)
+    there = standing(0, [SimpleNamespace(trial=other.trial, probability=0.1)], unknown)
+    fall = np.array([[-400.0, 8e5], [70.0, 3e5]])
+    place = {viscous.label: 0, sag.label: 1}
+    state = SimpleNamespace(layout=SimpleNamespace(significance=lambda *_: 9.0))
+    assert _rival_leads(led, there, fall, place, state, Settings()) == leads

@@ -14,8 +14,8 @@ import numpy as np
 
 from axisight.gap.howfar import Stage
 from axisight.gap.model import ModelFitter
-from axisight.gap.search import Search
 from axisight.gap.settings import Settings
+from axisight.gap.state import Search
 from axisight.gap.trials import settled
 
 # Share of what causes change on validation logs, in squares, by which they have to lower the gap

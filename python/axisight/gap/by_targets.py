@@ -23,9 +23,9 @@ from axisight.gap.feedback import (
 )
 from axisight.gap.noise import Floor, position_noise_std, torque_density
 from axisight.gap.own_effects import uncertain_gains
-from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import simulated_positions
+from axisight.gap.state import Search
 from axisight.gap.targets import Commanded
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.tracking_weights import shortest

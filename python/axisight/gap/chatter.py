@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from axisight.gap.compared import torque_of
 from axisight.gap.headline import percent
 from axisight.gap.howfar import Stage, Stages
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 from axisight.gap.torques import Variant
 from axisight.gap.view import View
 from axisight.logs import Log

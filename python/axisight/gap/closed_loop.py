@@ -26,10 +26,10 @@ from axisight.gap.motion import Motion, motion
 from axisight.gap.own_controller import check_gains, other_controllers
 from axisight.gap.own_effects import with_values
 from axisight.gap.rigid_torque import predicted_torque
-from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques, simulated_run, simulated_torques
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
+from axisight.gap.state import Search
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.tracking_weights import passed, shortest, tracking_floor
 from axisight.gap.view import View

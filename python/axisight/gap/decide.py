@@ -141,20 +141,20 @@ class Standing:
         return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
 
     def with_those_that_lead(self, others: Sequence[Standing]) -> Standing:
-        """Return the same with the first held against rivals by what axes say on which those lead.
+        """Return the same with all held by what axes say on which rivals of the first lead surely.
 
-        ``others``: standings of other axes that rivals here lead surely. What is seen on two axes is
-        judged by both.
+        ``others``: standings of these axes. What is seen on two axes is judged by both.
         """
-        first = self.best
         odds = {r.trial.label: r.probability for r in self.ranked}
-        mine = odds[first.trial.label]
         for other in others:
-            there = {r.trial.label: r.probability for r in other.ranked}
-            rival = other.best
-            share = there.get(first.trial.label, 0.0) / rival.probability
-            mine = min(mine, first.probability * share)
-        held = (replace(r, probability=mine if r is first else r.probability) for r in self.ranked)
+            there = {r.trial.label: r.probability / other.best.probability for r in other.ranked}
+            odds = {
+                r.trial.label: min(
+                    odds[r.trial.label], r.probability * there.get(r.trial.label, 0.0)
+                )
+                for r in self.ranked
+            }
+        held = (replace(r, probability=odds[r.trial.label]) for r in self.ranked)
         return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
 
     def inseparable(self) -> list[Ranked]:
@@ -345,6 +345,8 @@ def _costs(trials: Sequence[Trial]) -> Array:
 # they leave open about as much again.
 _BETTER = 4.0
 _LEFT_OPEN = 2e-3
+# Share of what there is to explain by which it may predict worse all the same.
+_NEARLY = 0.1
 
 
 def _fitted_loss(evidence: Evidence, here: NDArray[np.bool_]) -> float:
@@ -369,10 +371,10 @@ def _with_those_that_fit_better(
     leeway = max(_BETTER, _LEFT_OPEN * fitted[first])
     out = logp.copy()
     for i, t in enumerate(trials):
-        if i == first or score[i] <= score[first] - FORMULA_ERROR:
+        if i == first or score[i] <= score[first] - _NEARLY:
             continue
         if are_lags(t, trials[first]):
-            if fitted[i] < fitted[first] + leeway:
+            if score[i] > score[first] - FORMULA_ERROR and fitted[i] < fitted[first] + leeway:
                 out[i] = max(out[i], logp[first] + cost[first] - cost[i])
         elif fitted[i] < fitted[first] - leeway and t.cost <= trials[first].cost:
             out[i] = logp[first]

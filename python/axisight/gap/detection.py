@@ -19,8 +19,8 @@ from axisight.gap.decide import numbers, smallest_likely_fall
 from axisight.gap.result import DetectionLimit
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import Bench, thinned
-from axisight.gap.search import Search
 from axisight.gap.sensitivity import Sensitivity
+from axisight.gap.state import Search
 from axisight.gap.view import View
 from axisight.statistics.tails import normal_deviate
 

@@ -19,7 +19,7 @@ from axisight.errors import InputError
 from axisight.gap.evidence import Evidence
 from axisight.gap.model import ModelFitter
 from axisight.gap.rank import pseudo_inverse
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 
 Array = NDArray[np.float64]
 

@@ -49,10 +49,11 @@ from axisight.gap.result import (
     Overlay,
     Reproduction,
 )
-from axisight.gap.search import Search, search
+from axisight.gap.search import search
 from axisight.gap.separate.design import separating_experiment_of
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
+from axisight.gap.state import Search
 from axisight.gap.straight import bent_for
 from axisight.gap.targets import Commanded, with_commands
 from axisight.gap.told import with_constants_told

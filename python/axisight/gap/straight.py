@@ -5,7 +5,7 @@ from __future__ import annotations
 from axisight.errors import InputError
 from axisight.gap.edge import BENT, bent
 from axisight.gap.model import ModelFitter
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 
 # Tolerances within which the simulator's own parameters are kept: one machine in twenty is further off
 # in one of them.

@@ -15,8 +15,8 @@ from axisight.effects.stated import TORQUE_CONSTANT
 from axisight.gap.decide import Ranked, Standing, clearly_worse
 from axisight.gap.evidence import Evidence
 from axisight.gap.model import ModelFitter
-from axisight.gap.search import Round, Search
 from axisight.gap.shown import ShownCause
+from axisight.gap.state import Round, Search
 from axisight.gap.swaps import in_its_place
 from axisight.gap.torque_sensor import share_reported
 

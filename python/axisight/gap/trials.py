@@ -30,6 +30,7 @@ from axisight.gap.lags import ended, lags_beside
 from axisight.gap.layout import Layout
 from axisight.gap.leading import CLOSE, SETTLED, clear
 from axisight.gap.model import ModelFitter
+from axisight.gap.promising import HOPELESS, best_by_axis, least_of_the_arm, promising
 from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
@@ -43,15 +44,8 @@ Progress = Callable[[str, int, int], None]
 A = TypeVar("A")
 B = TypeVar("B")
 
-# Candidates of an axis fitted in full: the best of the screen, and all that come near them.
-_FITTED = 4
-_NEAR = 0.3
-# A linear step promises less than a fit may gain; this much less of what is worth naming.
-_HOPELESS = 0.3
-# And this much less again where what it did to a model before tells.
+# What is hopeless by what it did to a model before promises this much less again.
 _ROUGHLY = 0.3
-# Candidates fitted where none is worth it.
-_LOOKED_AT = 3
 # Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
 # the one found before its shadow on another axis.
 _AS_MUCH = 0.9
@@ -173,7 +167,7 @@ class Trials:
 
     def run(self, options: Sequence[FreeEffect], number: int) -> list[Trial]:
         """Screen all candidates by one linear step, fit the promising ones in full."""
-        chosen = self._promising(self._screened(options, number))
+        chosen = promising(self._screened(options, number), self._worth())
         tryout = Tryout(self.bench, self.screen)
         if any(tryout.bends(start) for start in chosen):
             self.bench.begin_nominal()
@@ -203,7 +197,7 @@ class Trials:
             return {}
         kept = screen.from_kept()
         known = [o for o in options if kept.knows(o)]
-        worth = _ROUGHLY * _HOPELESS * self._worth()
+        worth = _ROUGHLY * HOPELESS * self._worth()
         starts = (start for o in known for start in kept.starts([o]))
         return {
             s.option.effect.label: s
@@ -330,7 +324,7 @@ class Trials:
         much as any of that one's axis.
         """
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
-        most = _best(chosen, self.layout.n_axes)
+        most = best_by_axis(chosen, self.layout.n_axes)
         found: list[Trial] = []
         done = 0
         for axis, here in self._turns(chosen):
@@ -353,11 +347,11 @@ class Trials:
 
         An effect of the whole arm is tried at the first axis where it comes near the others.
         """
-        best = _best(chosen, self.layout.n_axes)
+        best = best_by_axis(chosen, self.layout.n_axes)
         axes = {a for s in chosen if (a := s.option.effect.axis) is not None}
         places: list[int | None] = [*sorted(axes, key=lambda a: -best[a - 1])]
         turns: dict[int | None, list[Start]] = {place: [] for place in places or [None]}
-        least = self._least_of_the_arm(best)
+        least = least_of_the_arm(self._worth(), best)
         for start in chosen:
             place = start.option.effect.axis
             if place is None and start.falls is not None:
@@ -542,32 +536,6 @@ class Trials:
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
         return np.asarray(np.maximum(self.least, self.settings.smallest_score * left))
 
-    def _promising(self, starts: Sequence[Start]) -> list[Start]:
-        """Return the candidates to fit: at every place the best, where anything is to be gained."""
-        worth = self._worth()
-        ranked = sorted(starts, key=lambda s: -s.gain)
-        best = _best(starts, self.layout.n_axes)
-        keep: list[Start] = []
-        for axis in range(self.layout.n_axes):
-            mine = [s for s in ranked if s.option.effect.axis == axis + 1]
-            keep += [
-                s
-                for k, s in enumerate(mine)
-                if s.gain > _HOPELESS * worth[axis]
-                and (k < _FITTED or (k < 2 * _FITTED and s.gain > _NEAR * best[axis]))
-            ]
-        least = self._least_of_the_arm(best)
-        keep += [s for s in ranked if s.falls is not None and np.any(s.falls > least)]
-        # Where nothing is worth a cause, the best of all still say what was looked at.
-        return keep or ranked[:_LOOKED_AT]
-
-    def _least_of_the_arm(self, best: Array) -> Array:
-        """Return what an effect of the whole arm has to promise on an axis (n_axes,).
-
-        It has to come near the ``best`` of those of one axis.
-        """
-        return np.asarray(np.maximum(_HOPELESS * self._worth(), _NEAR * best))
-
     def _each(
         self, pool: ThreadPoolExecutor, work: Callable[[A], B], items: Sequence[A], label: str
     ) -> list[B]:
@@ -576,15 +544,6 @@ class Trials:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
-
-
-def _best(starts: Sequence[Start], n_axes: int) -> Array:
-    """Return the most that a candidate of each axis promises (n_axes,)."""
-    best = np.full(n_axes, -np.inf)
-    for start in starts:
-        if (axis := start.option.effect.axis) is not None:
-            best[axis - 1] = max(best[axis - 1], start.gain)
-    return np.where(np.isfinite(best), best, 0.0)
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

@@ -15,9 +15,9 @@ from axisight.gap.intervals import intervals
 from axisight.gap.named import NamedCause
 from axisight.gap.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.score import held_out_loss
-from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
+from axisight.gap.state import Search
 from axisight.gap.torque_sensor import either, with_torque_sensors
 from axisight.gap.twins import about_twins, less_their_twins, open_twins, with_twins
 

@@ -22,9 +22,9 @@ from axisight.gap.own_effects import absorbed, unknown_constants
 from axisight.gap.result import Mode
 from axisight.gap.scales import NaturalSizes
 from axisight.gap.score import held_out_loss
-from axisight.gap.search import Search
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
+from axisight.gap.state import Search
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.logs import Log
 from axisight.robot import Robot

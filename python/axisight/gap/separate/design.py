@@ -13,10 +13,10 @@ from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
 from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.own_effects import with_values
-from axisight.gap.search import Search
 from axisight.gap.separate.experiment import ENOUGH, Experiment
 from axisight.gap.separate.rivals import Rivals, rivals_of
 from axisight.gap.separate.waves import Motion, motions, seen_range, standard
+from axisight.gap.state import Search
 from axisight.gap.view import View
 from axisight.simulation import simulate_batch
 

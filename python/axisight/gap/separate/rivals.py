@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.evidence import Evidence
-from axisight.gap.search import Search
+from axisight.gap.state import Search
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,38 @@
+"""Which candidates are fitted in full."""
+
+import numpy as np
+
+from axisight import Effect
+from axisight.gap.evidence import FreeEffect
+from axisight.gap.promising import promising
+from axisight.gap.screening import Start
+
+WORTH = np.array([10.0, 10.0])
+
+
+def start(name: str, axis: int | None, gain: float) -> Start:
+    falls = None if axis else np.array([gain, 0.0])
+    return Start(FreeEffect(Effect(name, axis), ()), {}, gain, falls)
+
+
+def chosen(starts: list[Start]) -> list[str]:
+    return [s.option.effect.label for s in promising(starts, WORTH)]
+
+
+STARTS = [
+    start("backlash", 1, 1.3),
+    start("torque_offset", 1, 1.2),
+    start("viscous_friction", 1, 1.1),
+    start("coulomb_friction", 1, 1.0),
+    start("payload", None, 0.9),
+    start("link_mass", 2, 0.0),
+]
+
+
+def test_where_nothing_promises_a_cause_the_best_are_looked_at():
+    assert chosen(STARTS) == ["backlash@1", "torque_offset@1", "viscous_friction@1"]
+
+
+def test_where_one_promises_a_cause_what_comes_nowhere_near_is_not_fitted():
+    starts = [start("motor_inertia", 2, 40.0), *STARTS]
+    assert chosen(starts) == ["motor_inertia@2"]
