@@ -90,6 +90,8 @@ def test_limits_are_whole_in_80_columns():
         for name in names
         for place in places
     )
+    unseen = DetectionLimit("link_mass", 1, "relative_change", None, "1", hidden="tolerances")
+    limits = (*limits, unseen, replace(unseen, axis=2, hidden="motion"))
     six = replace(of("none"), gap=gap(0.1, 0.1, 0.1, 0.1, 6), detection_limits=limits)
     console = Console(width=80, record=True, file=StringIO())
     for table in show._limits(six):
@@ -98,6 +100,9 @@ def test_limits_are_whole_in_80_columns():
     words = text.split()
     assert words.count("0.00053") == 14
     assert {"Asymmetric", "Load-dependent", "friction"} <= set(words)
+    # What hides any size, and what the words mean, once.
+    assert words.count("hidden") == words.count("never") == 1
+    assert words.count("hidden:") == words.count("never:") == 1
     assert "axis 6" in text
     assert max(map(len, text.splitlines())) <= 80
 

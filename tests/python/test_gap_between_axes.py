@@ -115,6 +115,6 @@ def test_friction_of_coupled_axes_slows_both():
 
 def test_a_limit_between_axes_stands_at_the_first_and_says_so():
     limit = DetectionLimit("axis_coupling", 2, "share", 0.01, "1", (2, 3))
-    assert limit_table([limit], 3).rows == [
-        ["Axis coupling, with the next axis", "", "–", "0.010", "–"]
-    ]
+    table = limit_table([limit], 3)
+    assert table.rows == [["Axis coupling, with the next axis", "", "–", "0.010", "–"]]
+    assert table.note == ""

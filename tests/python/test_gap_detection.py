@@ -5,7 +5,9 @@ import pytest
 
 from axisight import Effect, Settings, diagnose
 from axisight.effects import effect_info
-from axisight.gap.detection import _of_a_stiffer_gear
+from axisight.gap.detection import _limit, _of_a_stiffer_gear
+from axisight.gap.evidence import FreeEffect, Linearized
+from axisight.gap.sensitivity import Sensitivity
 from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 
 LOOKED_AT = (
@@ -48,6 +50,7 @@ def test_every_effect_that_may_be_nothing_has_a_limit_at_every_place(nothing, li
         assert info[limit.parameter].role == "amplitude"
         assert limit.unit == info[limit.parameter].unit
         assert limit.value is None or limit.value > 0
+        assert (limit.hidden is None) == (limit.value is not None)
 
 
 def test_what_is_scatter_of_a_parameter_is_below_the_limit(limits):
@@ -73,6 +76,34 @@ def test_the_limit_of_a_richer_law_is_of_what_a_plainer_one_lacks(limits):
     dry = {"coulomb_nm": 0.3, "stribeck_speed_rad_s": 2.0}
     found = run([Effect("stribeck_friction", 1, {**dry, "excess_nm": 2.0 * excess.value})])
     assert [c.effect for c in found.causes] == ["stribeck_friction"], found.headline
+
+
+@pytest.mark.parametrize(
+    ("column", "tolerance", "hidden"),
+    [
+        # Along the column of a parameter of the simulator, which may change by as much.
+        ([1.0, 1.0, 1.0, 1.0], 1e6, "tolerances"),
+        # The same where that is known: the effect shows.
+        ([1.0, 1.0, 1.0, 1.0], 1e-6, None),
+        # Next to nothing, whatever is known.
+        ([1e-9, 0.0, 0.0, 0.0], 1e6, "motion"),
+    ],
+)
+def test_why_no_size_shows_is_what_hides_it(column, tolerance, hidden):
+    own, effect = np.ones(4), np.array(column)
+    one = Effect("torque_offset", 1)
+    rest = Linearized(
+        parameters=((None, "axis1.mass"),),
+        at_bound=(),
+        matrix=np.array([[[own @ own]]]),
+        gradient=np.array([[own @ effect]]),
+        loss=np.array([effect @ effect]),
+        prior_matrix=np.array([[tolerance**-2]]),
+        prior_gradient=np.zeros(1),
+    )
+    option = FreeEffect(one, ("offset_nm",))
+    limit = _limit(Sensitivity(option, "offset_nm", rest), np.ones(1), 0.0)
+    assert (limit.hidden, limit.value is None) == (hidden, hidden is not None)
 
 
 @pytest.mark.parametrize(("softer", "stiffer"), [(0.2, 0.25), (0.45, 9 / 11), (0.6, None)])

@@ -162,6 +162,7 @@ def _limits(found: Diagnosis) -> list[Table]:
             title = f"{effect} [{unit}]" if unit else effect
             table.add_row(escape(title), *(escape(cell) for cell in values[shown]))
         out.append(table)
+    out[-1].caption = limits.note or None
     return out
 
 

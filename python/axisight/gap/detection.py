@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.effects.stated import STIFFER
 from axisight.gap.decide import numbers, smallest_likely_fall
-from axisight.gap.result import DetectionLimit
+from axisight.gap.result import DetectionLimit, Hidden
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import Bench, thinned
 from axisight.gap.sensitivity import Sensitivity
@@ -101,7 +101,11 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         at_most = low - float(np.log1p(missing(low)))
     if at_most > high and missing(high) < 0.0:
         # Larger than the effect can be: these logs do not show it at all.
-        return DetectionLimit(effect.name, place, s.parameter, None, info.unit, effect.axes, others)
+        moves = bool(np.any(s.unfitted(float(np.exp(high))) > shows))
+        hidden: Hidden = "tolerances" if moves else "motion"
+        return DetectionLimit(
+            effect.name, place, s.parameter, None, info.unit, effect.axes, others, hidden
+        )
     at_most = min(at_most, high)
     if at_most > low:
         bounded = missing(at_most) > _PRECISION
@@ -110,7 +114,10 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     softens = (effect.name, s.parameter) == STIFFER
     shown = _of_a_stiffer_gear(size) if softens else size
     value = None if shown is None else max(shown, tolerated)
-    return DetectionLimit(effect.name, place, s.parameter, value, info.unit, effect.axes, others)
+    why: Hidden | None = "motion" if value is None else None
+    return DetectionLimit(
+        effect.name, place, s.parameter, value, info.unit, effect.axes, others, why
+    )
 
 
 def _of_a_stiffer_gear(softer: float) -> float | None:

@@ -144,8 +144,12 @@ def _stands(fitter: ModelFitter, state: Search, label: str, axis: int, settings:
     """Whether a cause of the model is likelier on an axis than none and something unknown together."""
     mine = next(f for f in state.model.free if f.effect.label == label)
     rest = [f for f in state.model.free if f is not mine]
-    without = fitter.fit(rest, state.model, lazy=True)
-    tried = trial(mine, fitter.fit([*rest, mine], state.model, lazy=True))
+    try:
+        without = fitter.fit(rest, state.model, lazy=True)
+        tried = trial(mine, fitter.fit([*rest, mine], state.model, lazy=True))
+    except InputError:
+        # A loop that swings without end lacks it.
+        return True
     found = stand(
         [tried],
         held_out_loss(without),

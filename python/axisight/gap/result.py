@@ -23,6 +23,7 @@ from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
 Mode = Literal["closed_loop", "inverse_dynamics"]
+Hidden = Literal["tolerances", "motion"]
 Array = NDArray[np.float64]
 
 
@@ -250,8 +251,9 @@ class DetectionLimit:
     """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
 
     ``parameter`` is the first amplitude that no plainer law has; ``others`` are what the other parameters
-    are then. ``value`` in ``unit``, None where no size that the effect may have would show. ``axis``
-    from 1, None for the arm.
+    are then. ``value`` in ``unit``, None where no size that the effect may have would show: for what is
+    in ``hidden``, the ``"tolerances"`` of the simulator's own parameters, which with a plainer law make up for it,
+    or the ``"motion"``, which hardly brings it out. ``axis`` from 1, None for the arm.
     """
 
     effect: str
@@ -261,6 +263,7 @@ class DetectionLimit:
     unit: str
     axes: tuple[int, int] | None = None
     others: Mapping[str, float] = field(default_factory=dict)
+    hidden: Hidden | None = None
 
 
 @dataclass(frozen=True)
@@ -502,7 +505,7 @@ def _place(item: Cause | Candidate | DetectionLimit) -> dict[str, Any]:
 
 
 def _limit(limit: DetectionLimit) -> dict[str, Any]:
-    rest = {name: getattr(limit, name) for name in ("parameter", "value", "unit")}
+    rest = {name: getattr(limit, name) for name in ("parameter", "value", "unit", "hidden")}
     return {"effect": limit.effect, **_place(limit), **rest, "others": dict(limit.others)}
 
 

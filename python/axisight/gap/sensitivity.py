@@ -32,6 +32,10 @@ class Sensitivity:
         """Return that of ``factor`` times as much data."""
         return replace(self, more=factor * self.more)
 
+    def unfitted(self, amplitude: float) -> Array:
+        """Return what an amplitude that the model lacks leaves (n_axes,) while nothing makes up for it."""
+        return np.asarray(self.more * amplitude**2 * self.rest.loss)
+
     def losses(self, amplitude: float) -> Array:
         """Return what an amplitude that the model lacks leaves on each axis (n_axes,).
 

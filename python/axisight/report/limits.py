@@ -8,19 +8,28 @@ from dataclasses import dataclass
 from axisight.gap.result import DetectionLimit
 from axisight.report.wording import NO_VALUE, number, plain_name
 
-_HIDDEN = "never"
+# How places read where no size would show, by what hides it.
+_HIDDEN = {"tolerances": "hidden", "motion": "never"}
+_MEANING = {
+    "hidden": "the simulator's own parameters, or a plainer law, make up for any size",
+    "never": "no size of it shows in this motion",
+}
 
 
 @dataclass(frozen=True)
 class LimitTable:
-    """``columns``: axes, and the arm where an effect acts on it; ``rows``: title, unit, values."""
+    """``columns``: axes, and the arm where an effect acts on it; ``rows``: title, unit, values.
+
+    ``note`` says what the words among the values mean; empty without such words.
+    """
 
     columns: list[str]
     rows: list[list[str]]
+    note: str
 
 
 def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
-    """Return the limits in words; ``never`` where no size that the effect may have would show."""
+    """Return the limits in words; ``hidden`` or ``never`` where no size that the effect may have would show."""
     places: list[int | None] = list(range(1, n_axes + 1))
     if any(limit.axis is None for limit in limits):
         places.append(None)
@@ -34,8 +43,10 @@ def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
         title = plain_name(effect) + ("" if first.axes is None else ", with the next axis")
         values = [_value(mine[p]) if p in mine else NO_VALUE for p in places]
         rows.append([title, "" if unit == "1" else unit, *values])
-    return LimitTable(["arm" if p is None else f"axis {p}" for p in places], rows)
+    words = {cell for row in rows for cell in row[2:]}
+    note = "; ".join(f"{word}: {meaning}" for word, meaning in _MEANING.items() if word in words)
+    return LimitTable(["arm" if p is None else f"axis {p}" for p in places], rows, note)
 
 
 def _value(limit: DetectionLimit) -> str:
-    return _HIDDEN if limit.value is None else number(limit.value, 2)
+    return _HIDDEN[limit.hidden or "motion"] if limit.value is None else number(limit.value, 2)
