@@ -11,7 +11,6 @@ from typing import Annotated
 
 import typer
 
-import axisight
 from axisight.cli.common import (
     AtRests,
     Columns,
@@ -31,12 +30,7 @@ from axisight.cli.common import (
     write_each,
 )
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
-from axisight.cli.outcomes import (
-    diagnosis_writes,
-    write_found_experiment,
-    write_found_model,
-    write_found_signals,
-)
+from axisight.cli.outputs import Outputs
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.screen import OUT, is_output
 from axisight.cli.show import show_diagnosis
@@ -46,21 +40,10 @@ from axisight.gap import Settings, diagnose
 from axisight.gap.inputs import read_inputs
 from axisight.gap.own_effects import gain_names, gain_quantities
 from axisight.gap.result import VerdictKind
-from axisight.gap.separate.experiment import experiment_files
 from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.tolerances import with_tolerances
 from axisight.gap.used import Used
 from axisight.robot import Robot
-from axisight.storage import check_targets
-
-# How files end that an output may replace unasked: what the command makes anew.
-_RESULTS = {
-    "--json": (".json",),
-    "--report": (".html", ".htm"),
-    "--signals": (".parquet", ".mcap"),
-    "--write-model": (),
-}
-
 
 EXIT_CODES: dict[VerdictKind, int] = {
     "none": 0,
@@ -214,8 +197,7 @@ def diagnose_command(
         run_fleet = import_module("axisight.cli.fleet").run_fleet
         run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
         return
-    piped = is_output(json)
-    if piped:
+    if is_output(json):
         OUT.leave_output()
     with errors():
         if not case_or_logs:
@@ -236,20 +218,8 @@ def diagnose_command(
             untrusted=untrusted,
             max_bytes=max_bytes,
         )
-        targets = {
-            "--json": None if piped else json,
-            "--report": report,
-            "--write-model": write_model,
-            "--signals": signals,
-        }
-        for path in () if next_experiment is None else experiment_files(next_experiment):
-            targets[f"--next-experiment, {path.name}"] = path
-        read = [*inputs.files(), *_described(case_or_logs, columns)]
-        check_targets(targets, inputs=read, replaces=_RESULTS, force=force)
-        if write_model is not None:
-            axisight.write_back.check_target(inputs.robot_source, write_model, overwrite=force)
-        if signals is not None:
-            axisight.signal_files.check_target(signals, overwrite=True)
+        outputs = Outputs(json, report, write_model, signals, next_experiment, force)
+        outputs.check(inputs, [*inputs.files(), *_described(case_or_logs, columns)])
         settings = Settings(
             seed=seed,
             cutoff_hz=cutoff_hz,
@@ -272,15 +242,7 @@ def diagnose_command(
                 simulated=inputs.simulated,
             )
         show_diagnosis(found)
-        writes = diagnosis_writes(found, json, report)
-        if next_experiment is not None:
-            writes.append(partial(write_found_experiment, found, next_experiment))
-        if write_model is not None:
-            made = partial(write_found_model, found, inputs, options, write_model, force=force)
-            writes.append(made)
-        if signals is not None:
-            writes.append(partial(write_found_signals, found, signals))
-        write_each(writes)
+        write_each(outputs.writes(found, inputs, options))
         if exit_code:
             raise typer.Exit(EXIT_CODES[found.verdict])
 

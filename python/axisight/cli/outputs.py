@@ -1,0 +1,76 @@
+"""Where ``axisight diagnose`` writes: checked before anything runs, written when all is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import axisight
+from axisight.cli.model_options import ModelOptions
+from axisight.cli.outcomes import (
+    diagnosis_writes,
+    write_found_experiment,
+    write_found_model,
+    write_found_signals,
+)
+from axisight.cli.screen import is_output
+from axisight.gap import Diagnosis
+from axisight.gap.inputs import Inputs
+from axisight.gap.separate.experiment import experiment_files
+from axisight.storage import check_targets
+
+# How files end that an output may replace unasked: what the command makes anew.
+_RESULTS = {
+    "--json": (".json",),
+    "--report": (".html", ".htm"),
+    "--signals": (".parquet", ".mcap"),
+    "--write-model": (),
+}
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The files that a diagnosis is asked for, None where it is not; ``force``: others may be replaced."""
+
+    json: Path | None
+    report: Path | None
+    model: Path | None
+    signals: Path | None
+    next_experiment: Path | None
+    force: bool
+
+    def check(self, inputs: Inputs, read: Sequence[Path]) -> None:
+        """Refuse targets that cannot be written, or that would replace what the user has.
+
+        ``read``: the files that are read. Raises InputError.
+        """
+        targets = {
+            "--json": None if is_output(self.json) else self.json,
+            "--report": self.report,
+            "--write-model": self.model,
+            "--signals": self.signals,
+        }
+        if self.next_experiment is not None:
+            for path in experiment_files(self.next_experiment):
+                targets[f"--next-experiment, {path.name}"] = path
+        check_targets(targets, inputs=list(read), replaces=_RESULTS, force=self.force)
+        if self.model is not None:
+            axisight.write_back.check_target(inputs.robot_source, self.model, overwrite=self.force)
+        if self.signals is not None:
+            axisight.signal_files.check_target(self.signals, overwrite=True)
+
+    def writes(
+        self, found: Diagnosis, inputs: Inputs, options: ModelOptions
+    ) -> list[Callable[[], object]]:
+        """Return what writes each of them."""
+        out = diagnosis_writes(found, self.json, self.report)
+        if self.next_experiment is not None:
+            out.append(partial(write_found_experiment, found, self.next_experiment))
+        if self.model is not None:
+            made = partial(write_found_model, found, inputs, options, self.model, force=self.force)
+            out.append(made)
+        if self.signals is not None:
+            out.append(partial(write_found_signals, found, self.signals))
+        return out
