@@ -44,7 +44,7 @@ class Outputs:
     def check(self, inputs: Inputs, read: Sequence[Path]) -> None:
         """Refuse targets that cannot be written, or that would replace what the user has.
 
-        ``read``: the files that are read. Raises InputError.
+        ``read``: the files that are read. Raises OutputError, naming the option.
         """
         targets = {
             "--json": None if is_output(self.json) else self.json,
@@ -55,7 +55,7 @@ class Outputs:
         if self.next_experiment is not None:
             for path in experiment_files(self.next_experiment):
                 targets[f"--next-experiment, {path.name}"] = path
-        check_targets(targets, inputs=list(read), replaces=_RESULTS, force=self.force)
+        check_targets(targets, inputs=read, replaces=_RESULTS, force=self.force)
         if self.model is not None:
             axisight.write_back.check_target(inputs.robot_source, self.model, overwrite=self.force)
         if self.signals is not None:

@@ -101,8 +101,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         at_most = low - float(np.log1p(missing(low)))
     if at_most > high and missing(high) < 0.0:
         # Larger than the effect can be: these logs do not show it at all.
-        moves = bool(np.any(s.unfitted(float(np.exp(high))) > shows))
-        hidden: Hidden = "tolerances" if moves else "motion"
+        hidden = _hides(s, float(np.exp(high)), shows)
         return DetectionLimit(
             effect.name, place, s.parameter, None, info.unit, effect.axes, others, hidden
         )
@@ -114,10 +113,15 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     softens = (effect.name, s.parameter) == STIFFER
     shown = _of_a_stiffer_gear(size) if softens else size
     value = None if shown is None else max(shown, tolerated)
-    why: Hidden | None = "motion" if value is None else None
+    why = _hides(s, size, shows) if value is None else None
     return DetectionLimit(
         effect.name, place, s.parameter, value, info.unit, effect.axes, others, why
     )
+
+
+def _hides(s: Sensitivity, size: float, shows: Array) -> Hidden:
+    """Return what hides a size of an effect: whether it would show while nothing makes up for it."""
+    return "tolerances" if np.any(s.unfitted(size) > shows) else "motion"
 
 
 def _of_a_stiffer_gear(softer: float) -> float | None:

@@ -49,4 +49,7 @@ def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
 
 
 def _value(limit: DetectionLimit) -> str:
-    return _HIDDEN[limit.hidden or "motion"] if limit.value is None else number(limit.value, 2)
+    if limit.value is not None:
+        return number(limit.value, 2)
+    assert limit.hidden is not None  # without a value something hides it
+    return _HIDDEN[limit.hidden]
