@@ -1,10 +1,12 @@
 """One elastic axis with effects withheld from its simulator, and evidence made by hand."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from axisight import Effect, Log, Robot, load_robot, simulate
+from axisight.blind.case_files import CaseFolder
 from axisight.gap.evidence import Evidence
 
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
@@ -14,6 +16,22 @@ HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
 def bare_axis() -> Robot:
     """The two-mass axis as a simulator that models no effect."""
     return load_robot("two_mass_axis").with_effects([])
+
+
+def bare_case(folder: Path, logs: Sequence[Log]) -> Path:
+    """Write a case of that axis, the last log to validate; return its folder."""
+    case = CaseFolder(folder, "bare")
+    for k, log in enumerate(logs):
+        role = "validation" if k == len(logs) - 1 else "estimation"
+        case.add(
+            log.name, role, log.time_s, log.velocity_ref_rad_s, log.torque_nm, log.position_rad
+        )
+    case.finish("two_mass_axis")
+    robot = folder / "robot.toml"
+    text = robot.read_text("utf-8")
+    first, rest = text.index("[[effect]]"), text.index("[controller]")
+    robot.write_text(text[:first] + text[rest:], "utf-8")
+    return folder
 
 
 def reference(kind: str, seed: int, n: int, sample_time_s: float) -> np.ndarray:

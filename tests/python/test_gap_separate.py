@@ -7,17 +7,17 @@ import pytest
 from typer.testing import CliRunner
 
 from axisight import Diagnosis, Effect, Log, Settings, diagnose
-from axisight.blind.case_files import CaseFolder
 from axisight.cli import app
 from axisight.excitation import read_references
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import layout_of
-from axisight.gap.separate.design import separating
+from axisight.gap.separate.design import designed
+from axisight.gap.separate.experiment import Experiment
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
 from axisight.logs import lowpass
-from gap_data import bare_axis, log_of, scattered
+from gap_data import bare_axis, bare_case, log_of, scattered
 
 
 def one_way(seed: int, n: int, sample_time_s: float) -> np.ndarray:
@@ -60,6 +60,10 @@ def rivals(view: ClosedLoopView, one: Effect, other: Effect) -> Rivals:
     return Rivals((one.label, other.label), models, samples, to_explain)
 
 
+def separating_of(view: ClosedLoopView, both: Rivals) -> Experiment:
+    return designed(view, both, seen_range(view.logs))
+
+
 def test_what_is_open_is_decided_by_the_experiment(open_case: Diagnosis, logs: list[Log]):
     """Recovery from known truth: undecidable before, the truth and nothing else after."""
     assert open_case.verdict == "undecidable"
@@ -83,7 +87,7 @@ def test_what_is_open_is_decided_by_the_experiment(open_case: Diagnosis, logs: l
 def test_friction_and_an_offset_differ_where_a_motor_turns_round(view: ClosedLoopView):
     """Closed form: one way they are the same torque; of a square of both ways each misses the other's
     by all of it for half of the time at the least."""
-    made = separating(view, rivals(view, FRICTION, OFFSET))
+    made = separating_of(view, rivals(view, FRICTION, OFFSET))
     # The motor turns both ways for as long.
     way = np.sign(made.references.period[0, :, 0])
     assert abs(way.mean()) < 0.2
@@ -92,7 +96,7 @@ def test_friction_and_an_offset_differ_where_a_motor_turns_round(view: ClosedLoo
 
 
 def test_a_cause_is_not_told_from_itself(view: ClosedLoopView):
-    made = separating(view, rivals(view, FRICTION, FRICTION))
+    made = separating_of(view, rivals(view, FRICTION, FRICTION))
     assert made.log_ratio < 1e-3
     assert not made.decides
 
@@ -103,7 +107,7 @@ def test_what_no_motion_tells_is_said(view: ClosedLoopView):
     heavy = Effect("motor_inertia", 1, {"relative_change": 0.05})
     logs = [log_of(MACHINE, [heavy], log.velocity_ref_rad_s, k) for k, log in enumerate(view.logs)]
     seen = ClosedLoopView(bare_axis(), logs, Settings())
-    made = separating(seen, rivals(seen, heavy, weak))
+    made = separating_of(seen, rivals(seen, heavy, weak))
     assert not made.decides
     assert str(made).startswith("No motion within")
 
@@ -150,23 +154,15 @@ def test_multisines_ride_on_a_wave_that_keeps_the_motor_turning(logs: list[Log])
 
 def test_the_design_is_a_function_of_the_seed(view: ClosedLoopView):
     both = rivals(view, FRICTION, OFFSET)
-    one, other = separating(view, both), separating(view, both)
+    one, other = separating_of(view, both), separating_of(view, both)
     np.testing.assert_array_equal(one.references.period, other.references.period)
-    assert (one.log_ratio, one.times_shorter) == (other.log_ratio, other.times_shorter)
+    assert (one.log_ratio, one.plan.times_shorter) == (other.log_ratio, other.plan.times_shorter)
 
 
 def test_the_command_writes_references_that_can_be_run(tmp_path: Path, logs: list[Log]):
-    case = CaseFolder(tmp_path / "case", "open")
-    for log, role in zip(logs, ("estimation", "estimation", "validation"), strict=True):
-        reference = log.velocity_ref_rad_s
-        case.add(log.name, role, log.time_s, reference, log.torque_nm, log.position_rad)
-    case.finish("two_mass_axis")
-    robot = tmp_path / "case" / "robot.toml"
-    robot.write_text(robot.read_text("utf-8").split("[[effects]]")[0], "utf-8")
+    case = bare_case(tmp_path / "case", logs)
     out = tmp_path / "next"
-    done = CliRunner().invoke(
-        app, ["diagnose", str(tmp_path / "case"), "--next-experiment", str(out)]
-    )
+    done = CliRunner().invoke(app, ["diagnose", str(case), "--next-experiment", str(out)])
     assert done.exit_code == 0, done.output
     found = read_references(out / "references.parquet")
     assert found.period.shape == (1, round(SECONDS / found.sample_time_s), 1)

@@ -170,3 +170,9 @@ def numbers(option: str, text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
+
+
+def one_or_each(option: str, text: str | None) -> float | list[float] | None:
+    """Return one number for all or one each, from ``VALUE,...``; None without; raises InputError naming the option."""
+    found = None if text is None else numbers(option, text)
+    return found[0] if found is not None and len(found) == 1 else found

@@ -29,6 +29,7 @@ from axisight.cli.common import (
     errors,
     write_each,
 )
+from axisight.cli.experiment import asked_experiment
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.outputs import Outputs
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
@@ -121,6 +122,27 @@ def diagnose_command(
             "references into this folder: of logs in closed loop with velocity references, no others.",
         ),
     ] = None,
+    to_show: Annotated[
+        str | None,
+        typer.Option(
+            metavar="EFFECT@AXIS PARAM=VALUE",
+            help="The experiment is to show this effect, of this size, if the machine has it.",
+        ),
+    ] = None,
+    velocity_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            help="Of each motor or all (rad/s) in the experiment. Default: what the logs show.",
+        ),
+    ] = None,
+    torque_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            help="Of each motor or all (Nm) in the experiment. Default: what the logs show.",
+        ),
+    ] = None,
     write_model: Annotated[
         Path | None,
         typer.Option(
@@ -180,6 +202,9 @@ def diagnose_command(
             "--despite": despite,
             "--effect": effect,
             "--next-experiment": next_experiment,
+            "--to-show": to_show,
+            "--velocity-limit": velocity_limit,
+            "--torque-limit": torque_limit,
             "--write-model": write_model,
             "--signals": signals,
             "--simulated": simulated,
@@ -204,6 +229,7 @@ def diagnose_command(
             raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
         if out or workers or scheduler:
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
+        asked = asked_experiment(next_experiment, to_show, velocity_limit, torque_limit)
         options = ModelOptions(base, tip, payload)
         load = partial(load_simulator, given=parse_effects(effect), options=options)
         inputs = read_inputs(
@@ -218,7 +244,9 @@ def diagnose_command(
             untrusted=untrusted,
             max_bytes=max_bytes,
         )
-        outputs = Outputs(json, report, write_model, signals, next_experiment, force)
+        outputs = Outputs(
+            json, report, write_model, signals, next_experiment, to_show is not None, force
+        )
         outputs.check(inputs, [*inputs.files(), *_described(case_or_logs, columns)])
         settings = Settings(
             seed=seed,
@@ -237,7 +265,9 @@ def diagnose_command(
                 validation=inputs.validation,
                 settings=settings,
                 progress=progress,
-                separate=next_experiment is not None,
+                separate=asked is not None,
+                to_show=None if asked is None else asked.to_show,
+                within=None if asked is None else asked.within,
                 signals=signals is not None,
                 simulated=inputs.simulated,
             )

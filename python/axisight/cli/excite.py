@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from axisight.cli.common import complain, errors, numbers, say
+from axisight.cli.common import complain, errors, numbers, one_or_each, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, parse_effects, say_effects, say_import, with_given
 from axisight.cli.screen import OUT
@@ -92,9 +92,9 @@ def excite_command(
                 raise InputError(f"--square: expected AMPLITUDE,PERIOD, got {square}")
             _replace(data, "square", amplitude_rad_s=wave[0], period_s=wave[1])
         limits = {
-            "velocity_rad_s": _one_or_each("--velocity-limit", velocity_limit),
-            "acceleration_rad_s2": _one_or_each("--acceleration-limit", acceleration_limit),
-            "torque_nm": _one_or_each("--torque-limit", torque_limit),
+            "velocity_rad_s": one_or_each("--velocity-limit", velocity_limit),
+            "acceleration_rad_s2": one_or_each("--acceleration-limit", acceleration_limit),
+            "torque_nm": one_or_each("--torque-limit", torque_limit),
         }
         _replace(data, "limits", **limits)
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
@@ -161,8 +161,3 @@ def _replace(data: dict[str, Any], part: str, **values: Any) -> None:
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     return None if text is None else numbers(option, text)
-
-
-def _one_or_each(option: str, text: str | None) -> float | list[float] | None:
-    found = _numbers(option, text)
-    return found[0] if found is not None and len(found) == 1 else found

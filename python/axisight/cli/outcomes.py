@@ -19,6 +19,8 @@ from axisight.write_back.refitted import refitted_gains
 
 _DESIGNED = "experiments are designed for logs in closed loop with velocity references"
 
+_TO_SHOW = "--to-show designs one that shows what these logs would not"
+
 
 def write_found_signals(found: Diagnosis, target: Path) -> None:
     """Write the signals of a diagnosis, and say where."""
@@ -65,11 +67,15 @@ def _say_refitted(found: Diagnosis, made: Written) -> None:
         )
 
 
-def write_found_experiment(found: Diagnosis, folder: Path) -> None:
-    """Write the designed experiment where there is one that decides; say why where there is none."""
+def write_found_experiment(found: Diagnosis, folder: Path, *, to_show: bool) -> None:
+    """Write the designed experiment where there is one that decides; say why where there is none.
+
+    ``to_show``: it was to show an effect; what the diagnosis advises says why there is none then.
+    """
     made = found.experiment
     if made is None:
-        say(f"no experiment: {_why_none(found)}")
+        why = "there is none that would show it" if to_show else _why_none(found)
+        say(f"no experiment: {why}")
     elif not made.decides:
         say("no experiment was written: none of those tried decides")
     else:
@@ -79,15 +85,17 @@ def write_found_experiment(found: Diagnosis, folder: Path) -> None:
 
 def _why_none(found: Diagnosis) -> str:
     """Return why no experiment was designed."""
+    possible = found.mode == "closed_loop" and found.gap.compared != "positions"
+    hint = f" ({_TO_SHOW})" if possible else ""
     if not found.causes:
-        return "no cause was named, so none has a rival"
+        return f"no cause was named, so none has a rival{hint}"
     if found.mode != "closed_loop":
         return f"{_DESIGNED}; by inverse dynamics there is no loop to run"
     if found.gap.compared == "positions":
         return f"{_DESIGNED}; not for targets and positions alone"
     if found.equivalent:
         return f"no motion tells {listed(found.equivalent[0])} apart"
-    return "nothing is open"
+    return f"nothing is open{hint}"
 
 
 def diagnosis_writes(

@@ -32,13 +32,17 @@ _RESULTS = {
 
 @dataclass(frozen=True)
 class Outputs:
-    """The files that a diagnosis is asked for, None where it is not; ``force``: others may be replaced."""
+    """The files that a diagnosis is asked for, None where it is not.
+
+    ``to_show``: the experiment is to show an effect; ``force``: other files may be replaced.
+    """
 
     json: Path | None
     report: Path | None
     model: Path | None
     signals: Path | None
     next_experiment: Path | None
+    to_show: bool
     force: bool
 
     def check(self, inputs: Inputs, read: Sequence[Path]) -> None:
@@ -67,7 +71,8 @@ class Outputs:
         """Return what writes each of them."""
         out = diagnosis_writes(found, self.json, self.report)
         if self.next_experiment is not None:
-            out.append(partial(write_found_experiment, found, self.next_experiment))
+            folder = self.next_experiment
+            out.append(partial(write_found_experiment, found, folder, to_show=self.to_show))
         if self.model is not None:
             made = partial(write_found_model, found, inputs, options, self.model, force=self.force)
             out.append(made)

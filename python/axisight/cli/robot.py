@@ -97,29 +97,29 @@ def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
     return list(found.values())
 
 
-def parse_effect(text: str) -> Effect:
+def parse_effect(text: str, option: str = "--effect") -> Effect:
     """Return the effect that ``NAME@AXIS PARAM=VALUE ...`` describes.
 
     Axis and parameters may be left out; ``NAME@AXIS:PARAM=VALUE,...`` is read too. Raises
-    InputError quoting ``text``.
+    InputError quoting ``option`` and ``text``.
     """
     head, *rest = re.split(r"[:\s]+", re.sub(r"\s*=\s*", "=", text.strip()), maxsplit=1)
     name, at, place = head.partition("@")
     axes = place.split(",") if at else []
     if not all(axis.isdecimal() for axis in axes) or len(axes) > 2:
-        raise InputError(f"--effect {text!r}: expected an axis number after @, got {place!r}")
+        raise InputError(f"{option} {text!r}: expected an axis number after @, got {place!r}")
     numbered = [int(axis) for axis in axes]
     parameters: dict[str, float] = {}
     for item in re.split(r"[,\s]+", rest[0]) if rest and rest[0] else []:
         key, equals, value = item.partition("=")
         if not equals:
-            raise InputError(f"--effect {text!r}: expected PARAM=VALUE, got {item!r}")
+            raise InputError(f"{option} {text!r}: expected PARAM=VALUE, got {item!r}")
         if key in parameters:
-            raise InputError(f"--effect {text!r}: expected {key} once, got it twice")
-        (parameters[key],) = numbers(f"--effect {text!r}: {key}", value)
+            raise InputError(f"{option} {text!r}: expected {key} once, got it twice")
+        (parameters[key],) = numbers(f"{option} {text!r}: {key}", value)
     try:
         if len(numbered) == 2:
             return Effect(name, None, parameters, (numbered[0], numbered[1]))
         return Effect(name, numbered[0] if numbered else None, parameters)
     except InputError as error:
-        raise InputError(f"--effect {text!r}: {error}") from None
+        raise InputError(f"{option} {text!r}: {error}") from None

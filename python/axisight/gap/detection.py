@@ -20,6 +20,7 @@ from axisight.gap.result import DetectionLimit, Hidden
 from axisight.gap.score import held_out_loss
 from axisight.gap.screening import Bench, thinned
 from axisight.gap.sensitivity import Sensitivity
+from axisight.gap.settings import Settings
 from axisight.gap.state import Search
 from axisight.gap.view import View
 from axisight.statistics.tails import normal_deviate
@@ -39,20 +40,30 @@ def detection_limits(found: Search, view: View) -> tuple[DetectionLimit, ...]:
     On the axis where it shows best, with all causes in. Competition between effects that look alike
     is not in it: at the limit something is seen; what it is may need more.
     """
-    settings = view.settings
-    loss = found.layout.by_axis(held_out_loss(found.model))
-    noise = np.maximum(loss, found.layout.by_axis(found.floor)) / found.layout.samples()
-    least = np.maximum(found.least_falls(settings), settings.smallest_score * found.left())
     named = {e.label for e in found.model.effects}
     known = {**found.sensitivities, **_not_tried(found, view)}
     kept = [s for label, s in known.items() if label not in named]
     limits = []
     for s in sorted(kept, key=_order):
-        needed = np.maximum(least, smallest_likely_fall(loss, numbers(s.option)))
-        sure = normal_deviate(1.0 - _POWER) * np.sqrt(noise)
-        shows = (sure + np.sqrt(sure**2 + needed)) ** 2
+        shows = loss_that_shows(found, view.settings, numbers(s.option))
         limits.append(_limit(s, shows, view.fitter.tolerated(s.option.effect)))
     return tuple(limits)
+
+
+def loss_that_shows(
+    found: Search, settings: Settings, cost: float, more: Array | float = 1.0
+) -> Array:
+    """Return the loss on each axis (n_axes,) with which a missing effect shows, nineteen times of twenty.
+
+    ``cost``: fitted numbers of it; ``more``: times as much data as there are, of each axis or of all.
+    """
+    loss = more * found.layout.by_axis(held_out_loss(found.model))
+    samples = more * found.layout.samples()
+    noise = np.maximum(loss, more * found.layout.by_axis(found.floor)) / samples
+    least = more * np.maximum(found.least_falls(settings), settings.smallest_score * found.left())
+    needed = np.maximum(least, smallest_likely_fall(loss, cost))
+    sure = normal_deviate(1.0 - _POWER) * np.sqrt(noise)
+    return np.asarray((sure + np.sqrt(sure**2 + needed)) ** 2)
 
 
 def _not_tried(found: Search, view: View) -> dict[str, Sensitivity]:

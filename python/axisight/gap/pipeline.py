@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
+from axisight.excitation import Limits
 from axisight.gap import own_simulator
 from axisight.gap.begun import from_rest
 from axisight.gap.beyond import beyond_torque
@@ -50,7 +51,7 @@ from axisight.gap.result import (
     Reproduction,
 )
 from axisight.gap.search import search
-from axisight.gap.separate.design import separating_experiment_of
+from axisight.gap.separate.asked import asked_of
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.state import Search
@@ -83,6 +84,8 @@ def diagnose(
     settings: Settings | None = None,
     progress: Progress = _silent,
     separate: bool = False,
+    to_show: Effect | None = None,
+    within: Limits | None = None,
     signals: bool = False,
     simulated: Sequence[Log] = (),
 ) -> Diagnosis:
@@ -98,6 +101,8 @@ def diagnose(
     progress : called with (what, done, total).
     separate : also design the experiment that tells the causes apart which stay open,
         ``Diagnosis.experiment`` (closed loop only).
+    to_show : design the one that shows this effect instead, of this size, if the machine has it.
+    within : limits of speed and torque for either; by default what the logs show.
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
     simulated : logs of one's own simulator under the same references, or along the same motion, one for
         each estimation log and then each validation log: how far the model reproduces it,
@@ -121,10 +126,13 @@ def diagnose(
     chosen = settings or Settings()
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
     machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
+    asked = asked_of(machine, separate, to_show, within)
     progress("looking at the logs", 0, 1)
     inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, simulated)
     progress("looking at the logs", 1, 1)
     inputs, view = inputs.compared(chosen)
+    if asked is not None:
+        asked.check_limits(view)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     found = with_constants_told(found, view.fitter, view.shown)
@@ -143,15 +151,12 @@ def diagnose(
     )
     out = replace(out, gap=replace(out.gap, motion=_motion(view, held_logs, seen, inputs.noted)))
     progress("measuring the gap", 1, 1)
-    if separate:
+    if asked is not None:
         progress("designing an experiment", 0, 1)
-        experiment = separating_experiment_of(view, seen.found)
+        # What constants leave open no experiment decides.
+        keep = bool(unknown) and out.verdict == "undecidable"
+        out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
-        if experiment is not None:
-            # What constants leave open no experiment decides.
-            kept = out.next_experiment if unknown and out.verdict == "undecidable" else None
-            advice = " ".join(filter(None, (kept, str(experiment))))
-            out = replace(out, experiment=experiment, next_experiment=advice)
     if signals:
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))

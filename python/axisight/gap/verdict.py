@@ -65,7 +65,8 @@ def conclude(
     """Draw the verdict from a finished search.
 
     ``stands_out``: whether the plain torque error of the re-fitted simulator lies
-    above the noise; without, what no effect explains is taken for noise. ``shown``: causes that
+    above the noise; without, what no effect explains is taken for noise of an unexpected colour, as far as
+    noise can be that. ``shown``: causes that
     the logs show by themselves; they come first.
     """
     accepted = found.accepted
@@ -82,7 +83,7 @@ def conclude(
     ranking = with_twins(ranking, n_axes)
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
-    gap = stands_out and _significant(found, settings)
+    gap = (stands_out or _excess(found) > _OF_COLOUR) and _significant(found, settings)
     if not accepted and not shown:
         verdict: VerdictKind = "unknown" if gap else "none"
     elif (accepted or gap) and _too_little(found, explained, settings):
@@ -194,10 +195,19 @@ def _axes(
     return tuple(out)
 
 
+# Mean square above the floor up to which noise may have another colour, or be twice as large as was thought.
+_OF_COLOUR = 4.0
+
+
 def _significant(found: Search, settings: Settings) -> bool:
     """Whether the re-fitted simulator leaves more than floor and formula error."""
+    return _excess(found) > settings.largest_scatter
+
+
+def _excess(found: Search) -> float:
+    """Return the mean square that the re-fitted simulator leaves above the floor, on the axis with most."""
     excess = found.layout.by_axis(held_out_loss(found.baseline) - found.floor)
-    return bool(np.any(excess / found.layout.samples() > settings.largest_scatter))
+    return float(np.max(excess / found.layout.samples()))
 
 
 def _candidate_shown(cause: ShownCause) -> Candidate:

@@ -1,4 +1,4 @@
-"""Choose the motion on which two rivals differ most, whichever of them is true."""
+"""Choose the motion that answers a question best, whatever the answer is."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 
 from axisight.excitation import References
 from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
-from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.own_effects import with_values
-from axisight.gap.separate.experiment import ENOUGH, Experiment
-from axisight.gap.separate.rivals import Rivals, rivals_of
-from axisight.gap.separate.waves import Motion, motions, seen_range, standard
-from axisight.gap.state import Search
-from axisight.gap.view import View
+from axisight.gap.separate.experiment import Experiment, Plan
+from axisight.gap.separate.question import Question, Seen, Turn
+from axisight.gap.separate.waves import Motion, Range, motions, standard
 from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
@@ -39,83 +36,44 @@ class _Runs:
     possible: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """What a wrong rival leaves of a run and what there is without either, mean squares (n_axes,) each.
+def designed(view: ClosedLoopView, question: Question, limits: Range) -> Experiment:
+    """Return the motion within ``limits`` that answers a question best, run as often as it takes.
 
-    ``samples``: residuals of an axis.
+    What may be so is simulated along each motion, and fitted by what else may be, in one linear step,
+    held by what the logs say of its parameters.
     """
-
-    left: Array
-    there: Array
-    samples: float
-
-
-def separating_experiment_of(view: View, found: Search) -> Experiment | None:
-    """Return the experiment that separates the rivals of a search; None where nothing is open.
-
-    By inverse dynamics there is no loop to simulate, and no experiment.
-    """
-    rivals = rivals_of(found)
-    if rivals is None or not isinstance(view, ClosedLoopView):
-        return None
-    return separating(view, rivals)
-
-
-def separating(view: ClosedLoopView, rivals: Rivals) -> Experiment:
-    """Return the motion on which two rivals differ most.
-
-    Each rival in turn is the machine: its simulated run along a motion is fitted by the other, in one
-    linear step, held by what the logs say of its parameters. What that leaves is the log-likelihood
-    ratio to expect once the run is among the logs, by the rules of a diagnosis. The motion counts for
-    the worse of the two.
-    """
-    limits = seen_range(view.logs)
     widest = 0.8 * min(view.settings.bandwidth_hz, 0.5 / view.robot.sample_time_s)
     time, seed = view.robot.sample_time_s, view.settings.seed
-    axes = rivals.axes or tuple(view.robot.axis_numbers())
+    axes = question.axes or tuple(view.robot.axis_numbers())
     usual = standard(limits, time, seed)
     tried = [*usual, *motions(limits, axes, time, widest, seed)]
-    runs = [_runs(view, machine, tried, limits.torque) for machine in rivals.models]
-    rough = _seen(view, rivals, runs, range(len(tried)), alone=False)
-    worth = np.array([_expected(rivals, rough[k]) for k in range(len(tried))])
+    runs = [_runs(view, turn.machine, tried, limits.torque) for turn in question.turns]
+    rough = _seen(view, question.turns, runs, range(len(tried)), alone=False)
+    worth = np.array([question.worth(rough[k]) for k in range(len(tried))])
     best_usual = int(np.argmax(worth[: len(usual)]))
     order = np.argsort(-worth, kind="stable")[:_FINALISTS]
     # Weights as they will be with the new log decide between the best.
     finalists = list(dict.fromkeys([best_usual, *order.tolist()]))
-    exact = _seen(view, rivals, runs, finalists, alone=True)
-    best = max(finalists, key=lambda k: _expected(rivals, exact[k]))
-    repeats = _repeats(rivals, exact[best], ENOUGH, _REPEATS)
-    expected = _expected(rivals, exact[best], repeats)
+    exact = _seen(view, question.turns, runs, finalists, alone=True)
+    best = max(finalists, key=lambda k: question.worth(exact[k]))
+    repeats = _repeats(question, exact[best], question.enough, _REPEATS)
+    expected = question.worth(exact[best], repeats)
+    as_much = min(expected, question.enough)
     chosen = tried[best]
-    design = {"motion": chosen.words, "rivals": list(rivals.labels), "seed": seed}
-    return Experiment(
-        rivals.labels,
+    design = {"motion": chosen.words, "seed": seed}
+    plan = Plan(
         chosen.words,
         chosen.axes,
         References(time, chosen.reference[None], design=design),
         repeats,
-        expected,
-        _repeats(rivals, exact[best_usual], min(expected, ENOUGH), _FOR_EVER) / repeats,
+        _repeats(question, exact[best_usual], as_much, _FOR_EVER) / repeats,
     )
+    return question.answered(plan, expected)
 
 
-def _expected(rivals: Rivals, seen: Sequence[_Seen], repeats: int = 1) -> float:
-    """Return the log-likelihood ratio to expect, on the axis that shows most, of the worse rival."""
-    ratios = []
-    for one in seen:
-        samples = np.stack(
-            [rivals.samples, np.full_like(rivals.samples, repeats * one.samples)], -1
-        )
-        explained = np.stack([rivals.to_explain, one.there], -1)
-        left = np.stack([np.zeros_like(one.left), one.left], -1)
-        ratios.append(float(log_ratio(left, explained, samples).max()))
-    return min(ratios)
-
-
-def _repeats(rivals: Rivals, seen: Sequence[_Seen], enough: float, most: int) -> int:
+def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int) -> int:
     """Return how often a motion has to be run for enough, at most ``most`` times."""
-    tried = (r for r in range(_TWICE, most) if _expected(rivals, seen, r) >= enough)
+    tried = (r for r in range(_TWICE, most) if question.worth(seen, r) >= enough)
     return next(tried, most)
 
 
@@ -140,30 +98,30 @@ def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most
 
 def _seen(
     view: ClosedLoopView,
-    rivals: Rivals,
+    turns: Sequence[Turn],
     runs: Sequence[_Runs],
     which: Sequence[int],
     *,
     alone: bool,
-) -> dict[int, list[_Seen]]:
-    """Return what each rival sees of the other's run along each motion; nothing where it cannot be run.
+) -> dict[int, list[Seen]]:
+    """Return what is seen of each turn along each motion; nothing where it cannot be run.
 
     ``alone``: each with the weights that its own torque brings.
     """
     n_axes = view.robot.n_axes
-    nothing = _Seen(np.zeros(n_axes), np.zeros(n_axes), 0.0)
-    out = {k: [nothing, nothing] for k in which}
-    for turn, (run, other) in enumerate(zip(runs, rivals.models[::-1], strict=True)):
-        here = [k for k in which if all(r.possible[k] for r in runs)]
-        together = [here] if here else []
+    nothing = Seen(np.zeros(n_axes), np.zeros(n_axes), 0.0)
+    out = {k: [nothing] * len(turns) for k in which}
+    here = [k for k in which if all(r.possible[k] for r in runs)]
+    together = [here] if here else []
+    for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
         for group in [[k] for k in here] if alone else together:
             fitter = view.fitter.along([run.records[k] for k in group])
             if alone:
                 fitter.weighting = view.weighting_with(run.records[group[0]][1])
-            left, samples = _left(fitter, other, other.free, n_axes)
-            there, _ = _left(fitter, other, other.free[:-1], n_axes)
+            left, samples = _left(fitter, turn.other, turn.free, n_axes)
+            there, _ = _left(fitter, turn.other, turn.neither, n_axes)
             for k, a, b in zip(group, left, there, strict=True):
-                out[k][turn] = _Seen(a, b, samples)
+                out[k][place] = Seen(a, b, samples)
     return out
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence
+from axisight.gap.separate.experiment import ENOUGH, Plan, SeparatingExperiment
+from axisight.gap.separate.question import Seen, Turn
 from axisight.gap.state import Search
 
 Array = NDArray[np.float64]
@@ -18,8 +22,11 @@ _LIKELY = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """Two fitted models that explain the logs by different causes, the last effect of each.
+    """Which of two fitted models is right, that explain the logs by different causes, the last effect of each.
 
+    Each in turn is the machine: its simulated run along a motion is fitted by the other. What that leaves
+    is the log-likelihood ratio to expect once the run is among the logs, by the rules of a diagnosis. The
+    motion counts for the worse of the two.
     ``labels``: of these, ``effect@axis``. Of the logs, by axis: ``samples`` (n_axes,) and what there
     was ``to_explain`` (n_axes,), as a mean square of the weighted residual above the noise.
     """
@@ -34,6 +41,36 @@ class Rivals:
         """The axes (from 1) they act on; none for effects of the whole arm alone."""
         found = {m.free[-1].effect.axis for m in self.models}
         return tuple(sorted(a for a in found if a is not None))
+
+    @property
+    def turns(self) -> tuple[Turn, Turn]:
+        """Each of them as the machine; without its last effect, the other explains nothing."""
+        one, other = self.models
+        return _turn(one, other), _turn(other, one)
+
+    @property
+    def enough(self) -> float:
+        """The log-likelihood ratio that decides."""
+        return ENOUGH
+
+    def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
+        """Return the log-likelihood ratio to expect, on the axis that shows most, of the worse rival."""
+        ratios = []
+        for one in seen:
+            new = np.full_like(self.samples, repeats * one.samples)
+            samples = np.stack([self.samples, new], -1)
+            explained = np.stack([self.to_explain, one.there], -1)
+            left = np.stack([np.zeros_like(one.left), one.left], -1)
+            ratios.append(float(log_ratio(left, explained, samples).max()))
+        return min(ratios)
+
+    def answered(self, plan: Plan, worth: float) -> SeparatingExperiment:
+        """Return a planned experiment with its log-likelihood ratio."""
+        return SeparatingExperiment(plan, self.labels, worth)
+
+
+def _turn(machine: Evidence, other: Evidence) -> Turn:
+    return Turn(machine, other, other.free, other.free[:-1])
 
 
 def rivals_of(found: Search) -> Rivals | None:

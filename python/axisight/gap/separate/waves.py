@@ -6,12 +6,14 @@ None goes beyond what the logs show the machine to do: speeds, travel, torques.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.excitation import multisine, square
+from axisight.errors import InputError
+from axisight.excitation import Limits, multisine, square
+from axisight.excitation.checks import per_item
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
@@ -37,7 +39,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Range:
-    """What the motors were seen to do: ``speed`` [rad/s], ``travel`` back and forth [rad], ``torque`` [Nm]."""
+    """What motors may do: ``speed`` [rad/s], travel ``back`` and ``forth`` [rad], ``torque`` [Nm], (n_axes,) each."""
 
     speed: Array
     back: Array
@@ -45,19 +47,43 @@ class Range:
     torque: Array
 
 
-def seen_range(logs: Sequence[Log]) -> Range:
-    """Return what the motors do in logs, from where each begins; each (n_axes,)."""
+def seen_range(logs: Sequence[Log], limits: Limits | None = None) -> Range:
+    """Return what the motors do in logs, from where each begins.
+
+    Or may do: ``limits`` of speed and torque take the place of what was seen. Raises InputError for
+    limits that are not positive, not one for each axis or for all, or of acceleration.
+    """
     speeds, turned = [], []
     for log in logs:
         assert log.velocity_ref_rad_s is not None  # closed loop only
         speeds.append(np.abs(log.velocity_ref_rad_s).max(axis=0))
         turned.append(log.position_rad - log.position_rad[0])
-    return Range(
+    seen = Range(
         np.max(speeds, axis=0),
         np.min([x.min(axis=0) for x in turned], axis=0),
         np.max([x.max(axis=0) for x in turned], axis=0),
         np.max([np.abs(log.torque_nm).max(axis=0) for log in logs], axis=0),
     )
+    return seen if limits is None else _stated(seen, limits)
+
+
+def _stated(seen: Range, limits: Limits) -> Range:
+    """Return what was seen with the limits that are stated in place of it."""
+    if limits.acceleration_rad_s2 is not None:
+        raise InputError(
+            f"within.acceleration_rad_s2: expected None, as motions are chosen by speed and torque, got "
+            f"{limits.acceleration_rad_s2}"
+        )
+    stated = {"speed": limits.velocity_rad_s, "torque": limits.torque_nm}
+    fields = {"speed": "velocity_rad_s", "torque": "torque_nm"}
+    given: dict[str, Array] = {}
+    for quantity, value in stated.items():
+        if value is not None:
+            field = f"within.{fields[quantity]}"
+            given[quantity] = per_item(field, value, len(seen.speed))
+            if np.any(given[quantity] <= 0):
+                raise InputError(f"{field}: expected positive numbers, got {value}")
+    return replace(seen, **given)
 
 
 def standard(seen: Range, sample_time_s: float, seed: int) -> list[Motion]:

@@ -1,0 +1,37 @@
+"""What the command line asks of an experiment that a diagnosis designs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from axisight.cli.common import one_or_each
+from axisight.cli.robot import parse_effect
+from axisight.errors import InputError
+from axisight.excitation import Limits
+from axisight.gap.separate.asked import Asked
+
+
+def asked_experiment(
+    folder: Path | None, to_show: str | None, velocity_limit: str | None, torque_limit: str | None
+) -> Asked | None:
+    """Return the experiment that goes into a folder; None without one.
+
+    Raises InputError, naming the option, for options of an experiment that nobody asks for, and for
+    what is no effect or no number.
+    """
+    options = {
+        "--to-show": to_show,
+        "--velocity-limit": velocity_limit,
+        "--torque-limit": torque_limit,
+    }
+    if folder is None:
+        for option, given in options.items():
+            if given is not None:
+                raise InputError(f"{option}: expected with --next-experiment FOLDER only")
+        return None
+    limits = Limits(
+        velocity_rad_s=one_or_each("--velocity-limit", velocity_limit),
+        torque_nm=one_or_each("--torque-limit", torque_limit),
+    )
+    effect = None if to_show is None else parse_effect(to_show, "--to-show")
+    return Asked(effect, limits)

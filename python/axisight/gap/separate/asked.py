@@ -1,0 +1,85 @@
+"""What experiment is asked for with a diagnosis, and its design."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from axisight.effects import Effect
+from axisight.errors import InputError
+from axisight.excitation import Limits
+from axisight.gap.closed_loop import ClosedLoopView
+from axisight.gap.result import Diagnosis
+from axisight.gap.separate.design import designed
+from axisight.gap.separate.experiment import Experiment, placed
+from axisight.gap.separate.question import Question
+from axisight.gap.separate.rivals import rivals_of
+from axisight.gap.separate.sought import sought
+from axisight.gap.separate.waves import seen_range
+from axisight.gap.state import Search
+from axisight.gap.view import View
+from axisight.robot import Robot
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An experiment that is asked for: what separates the rivals that stay, or shows an effect.
+
+    ``to_show``: the effect, of the size that is to show; ``within``: limits of motors in place of what
+    the logs show.
+    """
+
+    to_show: Effect | None
+    within: Limits | None
+
+    def check_limits(self, view: View) -> None:
+        """Raise InputError for limits that are no limits of these motors."""
+        if isinstance(view, ClosedLoopView):
+            seen_range(view.logs, self.within)
+
+    def added(self, out: Diagnosis, view: View, found: Search, *, keep: bool) -> Diagnosis:
+        """Return a diagnosis with the experiment, and what to do next; with ``keep``, after what is advised."""
+        experiment = self._design(view, found)
+        if experiment is None:
+            return out
+        kept = out.next_experiment if keep or self.to_show is not None else None
+        advice = " ".join(filter(None, (kept, str(experiment))))
+        made = None if isinstance(experiment, str) else experiment
+        return replace(out, experiment=made, next_experiment=advice)
+
+    def _design(self, view: View, found: Search) -> Experiment | str | None:
+        """Return the experiment; None where nothing is open, and why there is none where one is to show something.
+
+        By inverse dynamics there is no loop to simulate, and no experiment.
+        """
+        question: Question | str | None
+        if not isinstance(view, ClosedLoopView):
+            question = (
+                None if self.to_show is None else "by inverse dynamics there is no loop to run"
+            )
+        elif self.to_show is None:
+            question = rivals_of(found)
+        else:
+            question = sought(found, view, self.to_show)
+        if isinstance(question, str):
+            assert self.to_show is not None  # rivals are there or not
+            return f"No experiment to show {placed(self.to_show.label)}: {question}."
+        if question is None or not isinstance(view, ClosedLoopView):
+            return None
+        return designed(view, question, seen_range(view.logs, self.within))
+
+
+def asked_of(
+    robot: Robot, separate: bool, to_show: Effect | None, within: Limits | None
+) -> Asked | None:
+    """Return what is asked for; None if nothing is.
+
+    Raises InputError for an effect that the robot cannot have, or that does nothing.
+    """
+    if to_show is not None:
+        if not to_show.acts:
+            raise InputError(
+                f"to_show: expected {to_show.label} of a size that does something, got "
+                f"{dict(to_show.parameters or {})}"
+            )
+        robot.with_effects([*(e for e in robot.effects if e.label != to_show.label), to_show])
+    return Asked(to_show, within) if separate or to_show is not None else None

@@ -1,0 +1,106 @@
+"""Whether a machine has an effect of a size that its logs would not show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, effect_info
+from axisight.gap.decide import FORMULA_ERROR, numbers
+from axisight.gap.detection import loss_that_shows
+from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.separate.experiment import NAMED, Plan, ShowingExperiment
+from axisight.gap.separate.question import Seen, Turn
+from axisight.gap.settings import Settings
+from axisight.gap.state import Search
+from axisight.gap.view import View
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """Whether an effect is there, of a size that would not show: ``asked``, and in full the ``effect``.
+
+    The machine has it, and its simulated run along a motion is fitted without it. What that leaves has to
+    be what detection limits ask for, of all logs together; what the old ones would show of it does not
+    count. ``without``: the fitted model, all causes in; ``plainer``: numbers of the effect that a plainer
+    law has, which make up for what they can; ``cost``: fitted numbers of the effect.
+    """
+
+    asked: Effect
+    effect: Effect
+    without: Evidence
+    plainer: tuple[FreeEffect, ...]
+    cost: float
+    found: Search
+    settings: Settings
+
+    @property
+    def turns(self) -> tuple[Turn]:
+        """The machine with the effect, and what was found so far fitted to it."""
+        machine = replace(self.without, effects=(*self.without.effects, self.effect))
+        free = (*self.without.free, *self.plainer)
+        return (Turn(machine, self.without, free, self.without.free),)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """The axes (from 1) it acts on; none if on the whole arm."""
+        if self.effect.axes is not None:
+            return self.effect.axes
+        return () if self.effect.axis is None else (self.effect.axis,)
+
+    @property
+    def enough(self) -> float:
+        """The size, relative to the smallest that would show, at which it is named, too."""
+        return NAMED
+
+    def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
+        """Return the size relative to the smallest that would show, on the axis that shows most."""
+        (one,) = seen
+        new = repeats * one.samples
+        more = 1.0 + new / self.found.layout.samples()
+        shows = loss_that_shows(self.found, self.settings, self.cost, more)
+        # What the plainer law makes up for leaves the error of formulas.
+        left = np.maximum(one.left - FORMULA_ERROR * one.there, 0.0)
+        return float(np.sqrt(np.max(new * left / shows)))
+
+    def answered(self, plan: Plan, worth: float) -> ShowingExperiment:
+        """Return a planned experiment with what it shows."""
+        return ShowingExperiment(plan, self.asked, worth)
+
+
+def sought(found: Search, view: View, effect: Effect) -> Sought | str:
+    """Return the question whether a machine has an effect; why there is none, in words, otherwise.
+
+    What shapes the effect and is not given is as it is in a candidate of a diagnosis.
+    """
+    if effect.label in {e.label for e in found.model.effects}:
+        return "these logs show one already"
+    axes = None if effect.axis is None else (effect.axis,)
+    options = view.candidates(found.model, axes=axes or view.robot.axis_numbers())
+    option = next((o for o in options if o.effect.label == effect.label), None)
+    if option is None:
+        return "a diagnosis of these logs does not look for it there"
+    amplitudes, plain = _numbers(effect.name)
+    shape = {k: v for k, v in (option.effect.parameters or {}).items() if k not in amplitudes}
+    full = effect.with_values({**shape, **(effect.parameters or {})})
+    given = {n for n, value in (effect.parameters or {}).items() if value}
+    shared = tuple(n for n in option.free if n in plain) if given & (amplitudes - plain) else ()
+    bare = replace(
+        full, parameters={k: v for k, v in (full.parameters or {}).items() if k not in amplitudes}
+    )
+    plainer = (FreeEffect(bare, shared),) if shared else ()
+    return Sought(effect, full, found.model, plainer, numbers(option), found, view.settings)
+
+
+def _numbers(name: str) -> tuple[set[str], set[str]]:
+    """Return the amplitudes of an effect, and those of them that a plainer law has."""
+    info = effect_info(name)
+    amplitudes = {p.name for p in info.parameters if p.role == "amplitude"}
+    return amplitudes, amplitudes & {
+        p.name for law in info.contains for p in effect_info(law).parameters
+    }
