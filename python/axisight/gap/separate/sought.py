@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.gap.decide import FORMULA_ERROR, numbers
+from axisight.gap.decide import numbers
 from axisight.gap.detection import loss_that_shows
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.separate.experiment import NAMED, Plan, ShowingExperiment
@@ -19,6 +19,9 @@ from axisight.gap.state import Search
 from axisight.gap.view import View
 
 Array = NDArray[np.float64]
+
+# What one linear step of a plainer law leaves of what a fit of it would take away.
+_ONE_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +67,7 @@ class Sought:
         new = repeats * one.samples
         more = 1.0 + new / self.found.layout.samples()
         shows = loss_that_shows(self.found, self.settings, self.cost, more)
-        # What the plainer law makes up for leaves the error of formulas.
-        left = np.maximum(one.left - FORMULA_ERROR * one.there, 0.0)
+        left = np.maximum(one.left - _ONE_STEP * one.there, 0.0)
         return float(np.sqrt(np.max(new * left / shows)))
 
     def answered(self, plan: Plan, worth: float) -> ShowingExperiment:
