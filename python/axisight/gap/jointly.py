@@ -21,6 +21,7 @@ from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
 from axisight.gap.settings import Settings
+from axisight.gap.usual import ended_at_bound
 from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
@@ -55,13 +56,14 @@ class Pairs:
     def __init__(
         self,
         fitter: ModelFitter,
+        model: Evidence,
         trials: Sequence[Trial],
         current: Array,
         floor: Array,
         layout: Layout,
         settings: Settings,
     ) -> None:
-        self.fitter, self.trials, self.current = fitter, trials, current
+        self.fitter, self.model, self.trials, self.current = fitter, model, trials, current
         self.floor, self.layout, self.settings = floor, layout, settings
 
     def found(self, axis: int, first: float, tried: int) -> Pair | None:
@@ -75,7 +77,7 @@ class Pairs:
         if left <= self.settings.smallest_gain * samples:
             return None
         mine = [t for t in self.trials if self._hints(t, axis, left)]
-        mine = sorted(mine, key=lambda t: float(t.held_out[here].sum()))[:_PARTNERS]
+        mine = self._taken_apart(sorted(mine, key=lambda t: float(t.held_out[here].sum())))
         pairs = [p for p in combinations(mine, 2) if not _nested(*p)]
         fits = {(a.label, b.label): f for a, b in pairs if (f := self._both(a, b)) is not None}
         if not fits:
@@ -102,6 +104,33 @@ class Pairs:
         fall = float((self.current - t.held_out)[self.layout.axis == axis].sum())
         own = t.candidate.effect.axis == axis + 1
         return own and fall > _HINT * self.settings.smallest_score * left
+
+    def _taken_apart(self, mine: Sequence[Trial]) -> list[Trial]:
+        """Return the candidates that are tried in pairs, of all, the best first.
+
+        A composite with a number at its bound is another sum of its parts (a constant larger than the dry
+        friction is no friction that is larger one way): they are tried in its place.
+        """
+        partners = list(mine[:_PARTNERS])
+        present = {e.label for e in self.model.effects}
+        for composite in [t for t in partners if ended_at_bound(t)]:
+            parts = self._parts(composite, present | {t.label for t in partners})
+            if parts:
+                partners = [t for t in partners if t is not composite] + parts
+        return partners
+
+    def _parts(self, composite: Trial, known: set[str]) -> list[Trial]:
+        """Return the parts of a composite that are not known, each on top of the model."""
+        effect, bounds = composite.evidence.effects[-1], composite.candidate.bounds
+        free = [_part(name, effect, bounds) for name in effect_info(effect.name).parts]
+        try:
+            return [
+                trial(f, self.fitter.fit([*self.model.free, f], self.model))
+                for f in free
+                if _new(f, known)
+            ]
+        except InputError:
+            return []
 
     def _both(self, one: Trial, other: Trial) -> Trial | None:
         """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""

@@ -35,10 +35,21 @@ def promising(starts: Sequence[Start], worth: Array) -> list[Start]:
             for k, s in enumerate(mine)
             if s.gain > least and (k < _FITTED or (k < 2 * _FITTED and s.gain > _NEAR * best[axis]))
         ]
+        keep += [s for s in _at_home(mine, least) if all(s is not k for k in keep)]
     of_the_arm = least_of_the_arm(worth, best)
     keep += [s for s in ranked if s.falls is not None and np.any(s.falls > of_the_arm)]
     # Where nothing is worth a cause, the best of all still say what was looked at.
     return keep or ranked[:_LOOKED_AT]
+
+
+def _at_home(mine: Sequence[Start], least: float) -> list[Start]:
+    """Return the best of an axis by what they gain there.
+
+    One whose gain lies elsewhere (a link whose weight the axis before it feels) takes no place from them.
+    """
+    gains = [(start.gain if start.at_home is None else start.at_home, start) for start in mine]
+    ranked = sorted(gains, key=lambda pair: -pair[0])[:_FITTED]
+    return [start for gain, start in ranked if gain > max(least, _NEAR * ranked[0][0])]
 
 
 def least_of_the_arm(worth: Array, best: Array) -> Array:

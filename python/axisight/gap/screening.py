@@ -53,8 +53,8 @@ def kept_beside(free: Sequence[FreeEffect], new: FreeEffect) -> list[FreeEffect]
 class Start:
     """Where the fit of a candidate begins, and the gain it promises.
 
-    ``falls`` (n_axes,): by axis, of one that acts on the whole arm; ``sensitivity``: of one that does
-    nothing as it is.
+    ``falls`` (n_axes,): by axis, of one that acts on the whole arm; ``at_home``: what of the gain is on its
+    axis, of one that has one; ``sensitivity``: of one that does nothing as it is.
     """
 
     option: FreeEffect
@@ -62,6 +62,7 @@ class Start:
     gain: float
     falls: Array | None = None
     sensitivity: Sensitivity | None = None
+    at_home: float | None = None
 
 
 class Bench:
@@ -175,7 +176,9 @@ class Screen:
     def _scaled(self, start: Start) -> Start:
         falls = None if start.falls is None else self.scale * start.falls
         known = None if start.sensitivity is None else start.sensitivity.scaled(self.more)
-        return replace(start, gain=self.scale * start.gain, falls=falls, sensitivity=known)
+        home = None if start.at_home is None else self.scale * start.at_home
+        gain = self.scale * start.gain
+        return replace(start, gain=gain, falls=falls, sensitivity=known, at_home=home)
 
     def _evaluated(self, options: Sequence[FreeEffect]) -> list[Linearized | None]:
         """Return the model with each of several candidates of one size, as many at a time as go."""
@@ -227,12 +230,13 @@ class Screen:
         if evidence is None:
             return Start(option, self.model.robot_values, -np.inf)
         gain = self.model.total - evidence.total + linear_gain(evidence) - self._own
-        falls = None
-        if option.effect.axis is None:
-            fall = self.model.loss - evidence.loss + linear_falls(evidence) - self._own_falls
-            falls = np.bincount(self.model.axis, fall).astype(np.float64)
+        fall = self.model.loss - evidence.loss + linear_falls(evidence) - self._own_falls
+        falls = np.bincount(self.model.axis, fall).astype(np.float64)
         known = sensitivity(option, evidence, self.model.axis)
-        return Start(option, self.model.robot_values, gain, falls, known)
+        start = Start(option, self.model.robot_values, gain, sensitivity=known)
+        if option.effect.axis is None:
+            return replace(start, falls=falls)
+        return replace(start, at_home=float(falls[option.effect.axis - 1]))
 
     def best_of_starts(self, option: FreeEffect) -> Start:
         """Return the candidate at the best of its own starts, and what it gains there.

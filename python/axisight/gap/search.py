@@ -242,7 +242,9 @@ def _pairs(
 ) -> list[tuple[Ranked, Standing]]:
     """Return the pairs of causes, on axes that do not feel one another, where none shows alone."""
     first = state.layout.by_axis(held_out_loss(state.baseline) - state.floor)
-    pairs = Pairs(round_.fitter, trials, round_.current, state.floor, state.layout, settings)
+    pairs = Pairs(
+        round_.fitter, state.model, trials, round_.current, state.floor, state.layout, settings
+    )
     found = [pairs.found(axis, float(first[axis]), tried) for axis in range(state.layout.n_axes)]
     seen = sorted((p for p in found if p is not None), key=lambda p: -p.gain)
     fall = falls([p.both for p in seen], round_.current, state.layout)
