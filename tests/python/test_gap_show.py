@@ -175,9 +175,19 @@ def test_the_command_designs_what_is_to_show(tmp_path: Path):
     assert speed <= 10.0 * (1 + 1e-9)
 
 
+@pytest.mark.parametrize("half_width_rad", [2e-7, 1e-6, 4e-6])
+def test_play_of_a_gear_that_is_hardly_bent_is_found(half_width_rad: float):
+    """Recovery: the largest torque bends this gear by 1.6e-5 rad, a sixth of what other gear laws begin with."""
+    play = Effect("backlash", 1, {"half_width_rad": half_width_rad})
+    found = shown(logs_of([play]), [])
+    assert (found.verdict, [c.label for c in found.causes]) == ("explained", ["backlash@1"])
+    value = found.causes[0].parameters["half_width_rad"].value
+    assert value == pytest.approx(half_width_rad, rel=0.2)
+
+
 def test_what_no_colour_of_noise_makes_is_not_nothing():
     """Noise drowns the torque of these logs, but not where they were made to look: a hundred times as much."""
-    play = Effect("backlash", 1, {"half_width_rad": 2e-6})
+    play = Effect("backlash", 1, {"half_width_rad": 1e-6})
     found = shown(logs_of([play], 0.1), [])
     assert found.gap.before < found.gap.floor
     assert max(a.excess for a in found.axes) > 50.0

@@ -136,6 +136,8 @@ _SMALL_SHARE = 0.1
 
 # A tenth of it, where searches begin, is ten times the least that effects take.
 _LEAST_DEFLECTION_RAD = 1e-4
+# Play may be that of a gear that is bent far less; this is next to nothing.
+_HARDLY_BENT_RAD = 1e-6
 
 
 def _stiffness(trial: Trial) -> float:
@@ -148,9 +150,14 @@ def _deflection_rad(trial: Trial, size: Callable[[Array], Any] = np.std) -> floa
 
     Not less than what shapes of gears are stated for.
     """
+    return max(_bent_rad(trial, size), _LEAST_DEFLECTION_RAD)
+
+
+def _bent_rad(trial: Trial, size: Callable[[Array], Any] = np.std) -> float:
+    """Return the same, however small."""
     ratio = abs(float(trial.robot.gear_ratio[trial.index]))
     most = max(float(size(torque)) for torque in trial.torque())
-    return max(most / ratio / _stiffness(trial), _LEAST_DEFLECTION_RAD)
+    return max(most / ratio / _stiffness(trial), _HARDLY_BENT_RAD)
 
 
 # Beyond these shares of the samples torques say little of a gear's law.
@@ -176,7 +183,7 @@ def _play(trial: Trial) -> FreeEffect:
     Up to most of it, or the play of a gear that is stiffer than that. What is damped in the gap is found
     where it ended.
     """
-    i, deflection = trial.index, _deflection_rad(trial)
+    i, deflection = trial.index, _bent_rad(trial)
     begin = replace(_of_a_gear(trial), free=("half_width_rad",))
     if _axis_share(trial.at, i) <= _SMALL_SHARE:
         return begin
