@@ -134,6 +134,7 @@ def test_what_is_named_already_needs_no_experiment():
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
+        ({"within": LIMITS}, "within: expected with separate or to_show"),
         ({"to_show": Effect("backlash", 1)}, "to_show: expected backlash@1 of a size"),
         ({"to_show": Effect("backlash", 2, {"half_width_rad": 1e-4})}, "axis"),
         (

@@ -294,8 +294,8 @@ class Diagnosis:
     the names of `Settings`.
     ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
     parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
-    causes apart that stay open, where it was asked for. ``simulator``: how far the model reproduces the
-    user's own, where its logs were given.
+    causes apart that stay open, or shows an effect, where it was asked for. ``simulator``: how far the
+    model reproduces the user's own, where its logs were given.
     ``signals``: where they were asked for, of each log, estimation logs first, a Dataset with the dims (time_s,
     axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
     simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind

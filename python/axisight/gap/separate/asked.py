@@ -73,8 +73,10 @@ def asked_of(
 ) -> Asked | None:
     """Return what is asked for; None if nothing is.
 
-    Raises InputError for an effect that the robot cannot have, or that does nothing.
+    Raises InputError for an effect that the robot cannot have, or that does nothing, and for limits of nothing.
     """
+    if within is not None and to_show is None and not separate:
+        raise InputError(f"within: expected with separate or to_show only, got {within}")
     if to_show is not None:
         if not to_show.acts:
             raise InputError(
