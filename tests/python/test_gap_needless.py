@@ -47,3 +47,37 @@ def test_a_cause_is_dropped_unless_a_loop_swings_without_it(needed, dropped, mon
     )
     # Of noise of one a per cent is worth a cause: one by chance takes a four-hundredth.
     assert reconsider.drop_idle(fits, state, Settings(smallest_gain=0.01)) == dropped
+
+
+@pytest.mark.parametrize(("left", "dropped"), [(100.5, {"link_com@2"}), (200.0, set())])
+def test_what_stood_in_for_a_load_is_fitted_away_however_far_a_step_goes(
+    left: float, dropped: set[str], monkeypatch
+):
+    """One step from a load that lies elsewhere promises nothing; a fit may leave no more than both did."""
+    free = [
+        FreeEffect(Effect("link_com", 2), ("x_m",)),
+        FreeEffect(Effect("payload", None), ("mass_kg",)),
+        FreeEffect(Effect("viscous_friction", 1), ("viscous_nm_s_rad",)),
+    ]
+    state = SimpleNamespace(
+        model=SimpleNamespace(free=free, total=100.0, robot_values={}),
+        layout=SimpleNamespace(samples=lambda: np.array([400.0, 400.0])),
+    )
+
+    class Steps:
+        def evaluate(self, free, start, *, robot_values):
+            del free, start, robot_values
+            return SimpleNamespace(total=1000.0)
+
+    tried = []
+
+    def fitted(_, rest, start):
+        del start
+        tried.append([f.effect.label for f in rest])
+        return SimpleNamespace(free=rest, total=left, robot_values={})
+
+    monkeypatch.setattr(reconsider, "linear_gain", lambda _: 0.0)
+    monkeypatch.setattr(reconsider, "settled", fitted)
+    assert reconsider.drop_idle(Steps(), state, Settings(smallest_gain=0.01)) == dropped
+    # Friction stands in for no load.
+    assert tried == [["payload", "viscous_friction@1"]]

@@ -8,10 +8,11 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, stand, trial
 from axisight.gap.edge import BENT, bent
-from axisight.gap.evidence import FreeEffect
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.merged import one_for_several
 from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain
@@ -105,11 +106,38 @@ def drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[str
             gains.append(left / float(worth))
         worst = int(np.argmin(gains))
         if gains[worst] > settings.smallest_gain:
-            break
+            stood_in = _stood_in(fitter, state, settings)
+            if stood_in is None:
+                break
+            label, state.model = stood_in
+            dropped.add(label)
+            continue
         dropped.add(free[worst].effect.label)
         rest = [*free[:worst], *free[worst + 1 :]]
         state.model = settled(fitter, rest, state.model)
     return dropped
+
+
+def _stood_in(
+    fitter: ModelFitter, state: Search, settings: Settings
+) -> tuple[str, Evidence] | None:
+    """Return what stood in for an effect of the whole arm that was found after it, and the fit without.
+
+    A load that came in beside a link with another centre of mass lies elsewhere itself, further than one
+    step goes.
+    """
+    free = state.model.free
+    families = {effect_info(f.effect.name).family for f in free if f.effect.place is None}
+    for i, f in enumerate(free):
+        axis = f.effect.axis
+        if axis is None or effect_info(f.effect.name).family not in families:
+            continue
+        with suppress(InputError):
+            without = settled(fitter, [*free[:i], *free[i + 1 :]], state.model)
+            left = without.total - state.model.total
+            if left <= settings.smallest_gain * float(state.layout.samples()[axis - 1]):
+                return f.effect.label, without
+    return None
 
 
 def withdraw_doubtful(fitter: ModelFitter, state: Search, settings: Settings) -> None:
