@@ -139,11 +139,11 @@ def test_what_is_named_already_needs_no_experiment():
         ({"to_show": Effect("backlash", 2, {"half_width_rad": 1e-4})}, "axis"),
         (
             {"separate": True, "within": Limits(velocity_rad_s=-1.0)},
-            "within.velocity_rad_s: expected pos",
+            "experiment, velocity_rad_s: expected pos",
         ),
         (
             {"separate": True, "within": Limits(torque_nm=[1.0, 2.0])},
-            "within.torque_nm: expected 1 finite",
+            "experiment, torque_nm: expected 1 finite",
         ),
         (
             {"separate": True, "within": Limits(acceleration_rad_s2=1.0)},

@@ -71,15 +71,15 @@ def _stated(seen: Range, limits: Limits) -> Range:
     """Return what was seen with the limits that are stated in place of it."""
     if limits.acceleration_rad_s2 is not None:
         raise InputError(
-            f"within.acceleration_rad_s2: expected None, as motions are chosen by speed and torque, got "
-            f"{limits.acceleration_rad_s2}"
+            f"limits of the experiment, acceleration_rad_s2: expected None, as motions are chosen by "
+            f"speed and torque, got {limits.acceleration_rad_s2}"
         )
     stated = {"speed": limits.velocity_rad_s, "torque": limits.torque_nm}
     fields = {"speed": "velocity_rad_s", "torque": "torque_nm"}
     given: dict[str, Array] = {}
     for quantity, value in stated.items():
         if value is not None:
-            field = f"within.{fields[quantity]}"
+            field = f"limits of the experiment, {fields[quantity]}"
             given[quantity] = per_item(field, value, len(seen.speed))
             if np.any(given[quantity] <= 0):
                 raise InputError(f"{field}: expected positive numbers, got {value}")
