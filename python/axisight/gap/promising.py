@@ -43,13 +43,14 @@ def promising(starts: Sequence[Start], worth: Array) -> list[Start]:
 
 
 def _at_home(mine: Sequence[Start], least: float) -> list[Start]:
-    """Return the best of an axis by what they gain there.
+    """Return the best of an axis by what they gain there, of those that are worth it in all.
 
     One whose gain lies elsewhere (a link whose weight the axis before it feels) takes no place from them.
     """
-    gains = [(start.gain if start.at_home is None else start.at_home, start) for start in mine]
+    worthy = [start for start in mine if start.gain > least]
+    gains = [(start.gain if start.at_home is None else start.at_home, start) for start in worthy]
     ranked = sorted(gains, key=lambda pair: -pair[0])[:_FITTED]
-    return [start for gain, start in ranked if gain > max(least, _NEAR * ranked[0][0])]
+    return [start for gain, start in ranked if gain > _NEAR * ranked[0][0]]
 
 
 def least_of_the_arm(worth: Array, best: Array) -> Array:
