@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import Diagnosis, Effect, Log, Robot, diagnose, load_robot, simulate
+from axisight.gap import ExperimentLimits
 
 Array = NDArray[np.float64]
 
@@ -58,8 +59,8 @@ class Wave:
 class Row:
     """What is withheld, and logs that hardly show it.
 
-    ``noise_rad`` of the positions; ``own_nm``: dry friction that simulator and machine have; ``shows``:
-    the experiment is to show it.
+    ``noise_rad`` of the positions; ``own_nm``: dry friction that simulator and machine have; ``shows``: the
+    experiment is to show it; ``within``: what motors may do in the experiment.
     """
 
     withheld: Effect
@@ -67,6 +68,7 @@ class Row:
     noise_rad: float = FINE_RAD
     own_nm: float = 0.0
     shows: bool = False
+    within: ExperimentLimits | None = None
 
 
 def friction(coulomb_nm: float) -> Effect:
@@ -111,6 +113,12 @@ ROWS = {
         LOAD_FRICTION, Wave(6.0, (0.5, 1.5), rises_s=1.5), 5e-5, own_nm=0.3
     ),
     "Stribeck, other friction": Row(STRIBECK, Wave(6.0, (0.5, 1.5), rises_s=1.5), 5e-5, own_nm=0.3),
+    "backlash, cubic stiffness, one sine": Row(
+        PLAY.with_values({"half_width_rad": 1.1e-7}),
+        Wave(2.0, (3.0, 3.1)),
+        COARSE_RAD,
+        within=ExperimentLimits(velocity_rad_s=4.0, travel_rad=3.0, torque_nm=6.0),
+    ),
     "backlash, cubic stiffness": Row(PLAY, Wave(1.0, (1.0, 6.0), square=2.0)),
     "cubic stiffness, backlash": Row(CUBIC, Wave(1.0, (1.0, 6.0), square=1.0)),
     "inertia, torque constant": Row(
@@ -184,7 +192,12 @@ def run(row: Row) -> tuple[Diagnosis, Diagnosis | None]:
     logs = [log_of(machine, row.withheld, r, k) for k, r in enumerate(refs)]
     sought = row.withheld if row.shows else None
     before = diagnose(
-        robot=robot, estimation=logs[:2], validation=logs[2:], separate=True, to_show=sought
+        robot=robot,
+        estimation=logs[:2],
+        validation=logs[2:],
+        separate=True,
+        to_show=sought,
+        within=row.within,
     )
     made = before.experiment
     if made is None or not made.decides:

@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from axisight import Diagnosis, Effect, InputError, Log, diagnose
 from axisight.cli import app
-from axisight.excitation import Limits, read_references
+from axisight.excitation import read_references
+from axisight.gap import ExperimentLimits
 from axisight.gap.separate.experiment import Experiment, ShowingExperiment
 from axisight.gap.separate.waves import seen_range
 from gap_data import bare_axis, bare_case, log_of, scattered
@@ -17,7 +18,7 @@ MACHINE = scattered(bare_axis(), 4)
 # Below what these logs show of it, which is tested.
 SIZE = 6e11
 HARDER = Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": SIZE})
-LIMITS = Limits(velocity_rad_s=10.0, torque_nm=20.0)
+LIMITS = ExperimentLimits(velocity_rad_s=10.0, torque_nm=20.0)
 
 
 def quiet(seed: int, size_rad_s: float = 0.5) -> np.ndarray:
@@ -96,6 +97,9 @@ def test_limits_take_the_place_of_what_was_seen():
     assert seen.speed[0] < 2.0
     assert (stated.speed.tolist(), stated.torque.tolist()) == ([10.0], [20.0])
     assert (stated.back, stated.forth) == (seen.back, seen.forth)
+    further = seen_range(logs, ExperimentLimits(travel_rad=[7.0]))
+    assert (further.back.tolist(), further.forth.tolist()) == ([-7.0], [7.0])
+    assert (further.speed, further.torque) == (seen.speed, seen.torque)
 
 
 def test_ten_times_smaller_takes_more_than_there_is():
@@ -138,16 +142,12 @@ def test_what_is_named_already_needs_no_experiment():
         ({"to_show": Effect("backlash", 1)}, "to_show: expected backlash@1 of a size"),
         ({"to_show": Effect("backlash", 2, {"half_width_rad": 1e-4})}, "axis"),
         (
-            {"separate": True, "within": Limits(velocity_rad_s=-1.0)},
+            {"separate": True, "within": ExperimentLimits(velocity_rad_s=-1.0)},
             "experiment, velocity_rad_s: expected pos",
         ),
         (
-            {"separate": True, "within": Limits(torque_nm=[1.0, 2.0])},
+            {"separate": True, "within": ExperimentLimits(torque_nm=[1.0, 2.0])},
             "experiment, torque_nm: expected 1 finite",
-        ),
-        (
-            {"separate": True, "within": Limits(acceleration_rad_s2=1.0)},
-            "acceleration_rad_s2: expected None",
         ),
     ],
 )

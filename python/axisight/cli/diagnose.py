@@ -136,6 +136,13 @@ def diagnose_command(
             help="Of each motor or all (rad/s) in the experiment. Default: what the logs show.",
         ),
     ] = None,
+    travel_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            help="How far each motor or all may turn in the experiment, either way (rad). Default: what the logs show.",
+        ),
+    ] = None,
     torque_limit: Annotated[
         str | None,
         typer.Option(
@@ -204,6 +211,7 @@ def diagnose_command(
             "--next-experiment": next_experiment,
             "--to-show": to_show,
             "--velocity-limit": velocity_limit,
+            "--travel-limit": travel_limit,
             "--torque-limit": torque_limit,
             "--write-model": write_model,
             "--signals": signals,
@@ -229,7 +237,9 @@ def diagnose_command(
             raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
         if out or workers or scheduler:
             raise InputError("--out, --workers, --scheduler: expected with --fleet only")
-        asked = asked_experiment(next_experiment, to_show, velocity_limit, torque_limit)
+        asked = asked_experiment(
+            next_experiment, to_show, velocity_limit, travel_limit, torque_limit
+        )
         options = ModelOptions(base, tip, payload)
         load = partial(load_simulator, given=parse_effects(effect), options=options)
         inputs = read_inputs(

@@ -7,12 +7,16 @@ from pathlib import Path
 from axisight.cli.common import one_or_each
 from axisight.cli.robot import parse_effect
 from axisight.errors import InputError
-from axisight.excitation import Limits
+from axisight.gap import ExperimentLimits
 from axisight.gap.separate.asked import Asked
 
 
 def asked_experiment(
-    folder: Path | None, to_show: str | None, velocity_limit: str | None, torque_limit: str | None
+    folder: Path | None,
+    to_show: str | None,
+    velocity_limit: str | None,
+    travel_limit: str | None,
+    torque_limit: str | None,
 ) -> Asked | None:
     """Return the experiment that goes into a folder; None without one.
 
@@ -22,6 +26,7 @@ def asked_experiment(
     options = {
         "--to-show": to_show,
         "--velocity-limit": velocity_limit,
+        "--travel-limit": travel_limit,
         "--torque-limit": torque_limit,
     }
     if folder is None:
@@ -29,8 +34,9 @@ def asked_experiment(
             if given is not None:
                 raise InputError(f"{option}: expected with --next-experiment FOLDER only")
         return None
-    limits = Limits(
+    limits = ExperimentLimits(
         velocity_rad_s=one_or_each("--velocity-limit", velocity_limit),
+        travel_rad=one_or_each("--travel-limit", travel_limit),
         torque_nm=one_or_each("--torque-limit", torque_limit),
     )
     effect = None if to_show is None else parse_effect(to_show, "--to-show")

@@ -17,6 +17,7 @@ from axisight.gap.result import (
     Where,
 )
 from axisight.gap.schema import verdict_schema
+from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.settings import Settings
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Candidate",
     "Cause",
     "Diagnosis",
+    "ExperimentLimits",
     "Finding",
     "Gap",
     "Interval",

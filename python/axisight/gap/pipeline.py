@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect
 from axisight.errors import CaseError, InputError
-from axisight.excitation import Limits
 from axisight.gap import own_simulator
 from axisight.gap.begun import from_rest
 from axisight.gap.beyond import beyond_torque
@@ -52,6 +51,7 @@ from axisight.gap.result import (
 )
 from axisight.gap.search import search
 from axisight.gap.separate.asked import asked_of
+from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.state import Search
@@ -85,7 +85,7 @@ def diagnose(
     progress: Progress = _silent,
     separate: bool = False,
     to_show: Effect | None = None,
-    within: Limits | None = None,
+    within: ExperimentLimits | None = None,
     signals: bool = False,
     simulated: Sequence[Log] = (),
 ) -> Diagnosis:
@@ -102,7 +102,7 @@ def diagnose(
     separate : also design the experiment that tells the causes apart which stay open,
         ``Diagnosis.experiment`` (closed loop only).
     to_show : design the one that shows this effect instead, of this size, if the machine has it.
-    within : limits of speed and torque for either; by default what the logs show.
+    within : limits of speed, travel and torque for either; by default what the logs show.
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
     simulated : logs of one's own simulator under the same references, or along the same motion, one for
         each estimation log and then each validation log: how far the model reproduces it,

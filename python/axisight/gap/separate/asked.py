@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.excitation import Limits
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.result import Diagnosis
 from axisight.gap.separate.design import designed
@@ -14,7 +13,7 @@ from axisight.gap.separate.experiment import Experiment, placed
 from axisight.gap.separate.question import Question
 from axisight.gap.separate.rivals import rivals_of
 from axisight.gap.separate.sought import sought
-from axisight.gap.separate.waves import seen_range
+from axisight.gap.separate.waves import ExperimentLimits, seen_range
 from axisight.gap.state import Search
 from axisight.gap.view import View
 from axisight.robot import Robot
@@ -29,7 +28,7 @@ class Asked:
     """
 
     to_show: Effect | None
-    within: Limits | None
+    within: ExperimentLimits | None
 
     def check_limits(self, view: View) -> None:
         """Raise InputError for limits that are no limits of these motors."""
@@ -69,7 +68,7 @@ class Asked:
 
 
 def asked_of(
-    robot: Robot, separate: bool, to_show: Effect | None, within: Limits | None
+    robot: Robot, separate: bool, to_show: Effect | None, within: ExperimentLimits | None
 ) -> Asked | None:
     """Return what is asked for; None if nothing is.
 

@@ -6,13 +6,13 @@ None goes beyond what the logs show the machine to do: speeds, travel, torques.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from axisight.errors import InputError
-from axisight.excitation import Limits, multisine, square
+from axisight.excitation import multisine, square
 from axisight.excitation.checks import per_item
 from axisight.logs import Log
 
@@ -38,6 +38,19 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class ExperimentLimits:
+    """What motors may do in an experiment, in place of what the logs show; None for that.
+
+    Largest absolute values, one number for all axes or one each: ``velocity_rad_s`` of the reference,
+    ``travel_rad`` from where an experiment begins, ``torque_nm``; motor side.
+    """
+
+    velocity_rad_s: ArrayLike | None = None
+    travel_rad: ArrayLike | None = None
+    torque_nm: ArrayLike | None = None
+
+
+@dataclass(frozen=True)
 class Range:
     """What motors may do: ``speed`` [rad/s], travel ``back`` and ``forth`` [rad], ``torque`` [Nm], (n_axes,) each."""
 
@@ -47,11 +60,11 @@ class Range:
     torque: Array
 
 
-def seen_range(logs: Sequence[Log], limits: Limits | None = None) -> Range:
+def seen_range(logs: Sequence[Log], limits: ExperimentLimits | None = None) -> Range:
     """Return what the motors do in logs, from where each begins.
 
-    Or may do: ``limits`` of speed and torque take the place of what was seen. Raises InputError for
-    limits that are not positive, not one for each axis or for all, or of acceleration.
+    Or may do: ``limits`` take the place of what was seen. Raises InputError for limits that are not
+    positive, or not one for each axis or for all.
     """
     speeds, turned = [], []
     for log in logs:
@@ -67,23 +80,22 @@ def seen_range(logs: Sequence[Log], limits: Limits | None = None) -> Range:
     return seen if limits is None else _stated(seen, limits)
 
 
-def _stated(seen: Range, limits: Limits) -> Range:
+def _stated(seen: Range, limits: ExperimentLimits) -> Range:
     """Return what was seen with the limits that are stated in place of it."""
-    if limits.acceleration_rad_s2 is not None:
-        raise InputError(
-            f"limits of the experiment, acceleration_rad_s2: expected None, as motions are chosen by "
-            f"speed and torque, got {limits.acceleration_rad_s2}"
-        )
-    stated = {"speed": limits.velocity_rad_s, "torque": limits.torque_nm}
-    fields = {"speed": "velocity_rad_s", "torque": "torque_nm"}
     given: dict[str, Array] = {}
-    for quantity, value in stated.items():
+    for name, value in vars(limits).items():
         if value is not None:
-            field = f"limits of the experiment, {fields[quantity]}"
-            given[quantity] = per_item(field, value, len(seen.speed))
-            if np.any(given[quantity] <= 0):
+            field = f"limits of the experiment, {name}"
+            given[name] = per_item(field, value, len(seen.speed))
+            if np.any(given[name] <= 0):
                 raise InputError(f"{field}: expected positive numbers, got {value}")
-    return replace(seen, **given)
+    travel = given.get("travel_rad")
+    return Range(
+        given.get("velocity_rad_s", seen.speed),
+        seen.back if travel is None else -travel,
+        seen.forth if travel is None else travel,
+        given.get("torque_nm", seen.torque),
+    )
 
 
 def standard(seen: Range, sample_time_s: float, seed: int) -> list[Motion]:
