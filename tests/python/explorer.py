@@ -62,9 +62,11 @@ def explorer(*arguments: str | Path) -> Iterator[Running]:
         finally:
             process.send_signal(signal.SIGINT)
             try:
-                process.communicate(timeout=20)
+                # Work that runs ends its step first, which takes long on a busy machine.
+                process.communicate(timeout=90)
             except subprocess.TimeoutExpired:
                 process.kill()
+                process.wait()
             running.status = process.returncode
 
 
