@@ -25,7 +25,7 @@ from axisight.gap import ExperimentLimits
 Array = NDArray[np.float64]
 
 SECONDS = 6.0
-# Of a sine of 15 bits in a turn of the motor, and of the preset.
+# Noise of the positions of a motor: of 15 bits in a turn, and of the preset.
 COARSE_RAD, FINE_RAD = 2e-4, 1.2e-5
 
 

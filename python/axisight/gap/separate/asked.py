@@ -50,21 +50,18 @@ class Asked:
 
         By inverse dynamics there is no loop to simulate, and no experiment.
         """
-        question: Question | str | None
         if not isinstance(view, ClosedLoopView):
-            question = (
-                None if self.to_show is None else "by inverse dynamics there is no loop to run"
-            )
-        elif self.to_show is None:
-            question = rivals_of(found)
-        else:
-            question = sought(found, view, self.to_show)
-        if isinstance(question, str):
-            assert self.to_show is not None  # rivals are there or not
-            return f"No experiment to show {placed(self.to_show.label)}: {question}."
-        if question is None or not isinstance(view, ClosedLoopView):
-            return None
+            return self._no_experiment("by inverse dynamics there is no loop to run")
+        question: Question | str | None
+        question = rivals_of(found) if self.to_show is None else sought(found, view, self.to_show)
+        if question is None or isinstance(question, str):
+            return self._no_experiment(question or "")
         return designed(view, question, seen_range(view.logs, self.within))
+
+    def _no_experiment(self, why: str) -> str | None:
+        if self.to_show is None:
+            return None
+        return f"No experiment to show {placed(self.to_show.label)}: {why}."
 
 
 def asked_of(

@@ -119,7 +119,9 @@ def _seen(
             if alone:
                 fitter.weighting = view.weighting_with(run.records[group[0]][1])
             left, samples = _left(fitter, turn.other, turn.free, n_axes)
-            there, _ = _left(fitter, turn.other, turn.neither, n_axes)
+            there = left
+            if turn.neither != turn.free:
+                there, _ = _left(fitter, turn.other, turn.neither, n_axes)
             for k, a, b in zip(group, left, there, strict=True):
                 out[k][place] = Seen(a, b, samples)
     return out

@@ -138,10 +138,14 @@ class ShowingExperiment(Experiment):
         sizes = ", ".join(f"{k} = {v:.4g}" for k, v in (self.effect.parameters or {}).items())
         what = f"{placed(self.effect.label)} ({sizes})"
         if not self.decides:
+            larger = (
+                f"would have to be {1 / self.share:.2g} times as large"
+                if self.share
+                else "never shows"
+            )
             return (
                 f"No motion within the limits of speed, travel and torque shows {what}: with the "
-                f"best of those tried ({_begun_small(self.plan)}) it would have to be "
-                f"{1 / max(self.share, 1e-3):.2g} times as large."
+                f"best of those tried ({_begun_small(self.plan)}) it {larger}."
             )
         named = "" if self.share >= NAMED else ": it may be seen and not named"
         return (
