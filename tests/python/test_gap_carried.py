@@ -10,7 +10,7 @@ from axisight import Log, Settings
 from axisight.effects import Effect
 from axisight.gap.carried import carried_over
 from axisight.gap.howfar import Stages, gap_figures, stage
-from axisight.gap.result import AxisVerdict, Interval
+from axisight.gap.result import AxisVerdict, Candidate, Interval
 from axisight.gap.verdict import Conclusion, NamedCause
 
 N, T = 4000, 1e-3
@@ -73,6 +73,16 @@ def test_causes_that_leave_the_gap_are_withdrawn(after: float, words: str):
     assert (found.verdict, found.causes) == ("unknown", ())
     assert words in (found.withdrawn or "")
     assert all(a.verdict == "unknown" and a.causes == () for a in found.axes)
+
+
+def test_a_withdrawn_cause_is_the_likeliest_alternative():
+    first, second = (
+        Candidate(effect, 1, probability, 0.9, 5.0, "converged")
+        for effect, probability in (("coulomb_friction", 0.88), ("asymmetric_friction", 0.11))
+    )
+    conclusion = replace(named(), ranking=(first, second), alternatives=(second,))
+    assert judged(conclusion, stages(0.5, 0.06)).alternatives == (second,)
+    assert judged(conclusion, stages(0.5, 0.06), bent=0.3).alternatives == (first, second)
 
 
 def test_causes_of_no_size_that_hold_nowhere_are_none():

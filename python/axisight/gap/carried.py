@@ -71,11 +71,7 @@ def carried_over(
     if withdrawn is None:
         return conclusion
     return replace(
-        conclusion,
-        verdict="unknown",
-        causes=(),
-        equivalent=(),
-        axes=tuple(replace(a, causes=(), verdict="unknown") for a in conclusion.axes),
+        conclusion.without_causes("unknown"),
         next_experiment=(
             "Look at the log and axis named: what was different there (load, pose, speed, torque "
             "range)? Record more of it for estimation."
@@ -99,12 +95,8 @@ def _nothing(conclusion: Conclusion) -> Conclusion:
         c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in conclusion.causes
     )
     return replace(
-        conclusion,
-        verdict="none",
-        causes=(),
-        equivalent=(),
+        conclusion.without_causes("none"),
         next_experiment=None,
-        axes=tuple(replace(a, causes=(), verdict="none") for a in conclusion.axes),
         checks=(
             *conclusion.checks,
             f"{names} explains a little of the estimation logs, where the simulator leaves next to what noise "

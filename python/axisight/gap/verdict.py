@@ -45,6 +45,17 @@ class Conclusion:
         """Return the same with further checks."""
         return replace(self, checks=(*self.checks, *more))
 
+    def without_causes(self, verdict: VerdictKind) -> Conclusion:
+        """Return the same with another verdict, for which its causes are candidates among others."""
+        return replace(
+            self,
+            verdict=verdict,
+            causes=(),
+            equivalent=(),
+            alternatives=self.ranking[:_ALTERNATIVES],
+            axes=tuple(replace(a, causes=(), verdict=verdict) for a in self.axes),
+        )
+
     def rivals_of(self, label: str) -> tuple[str, ...]:
         """Return what the data cannot tell from a cause, none of which is a cause itself."""
         causes = {c.label for c in self.causes}
@@ -54,6 +65,8 @@ class Conclusion:
 
 # Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
 _EDGE = 5.0
+# Candidates that a verdict lists.
+_ALTERNATIVES = 5
 # What the controller's own law shows could still be something else that looks alike: a limit of the
 # supply, not of the drive.
 _SHOWN = 0.99
@@ -109,7 +122,7 @@ def conclude(
     return Conclusion(
         verdict=verdict,
         causes=less_their_twins(causes, n_axes),
-        alternatives=tuple(c for c in ranking if c.label not in named)[:5],
+        alternatives=tuple(c for c in ranking if c.label not in named)[:_ALTERNATIVES],
         equivalent=(*open_groups, *open_twins(causes, n_axes)) if believed else (),
         next_experiment=advice,
         ranking=ranking,
