@@ -54,16 +54,24 @@ from axisight.gap.separate.asked import asked_of
 from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
+from axisight.gap.slipping import with_bristles_followed
 from axisight.gap.state import Search
 from axisight.gap.straight import bent_for
 from axisight.gap.targets import Commanded, with_commands
 from axisight.gap.told import with_constants_told
 from axisight.gap.tolerances import with_tolerances
-from axisight.gap.torques import AS_GIVEN, Variant, relative_squares
+from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
-from axisight.gap.where import ErrorLog, band_map, findings, led_by_weight, regime_maps
+from axisight.gap.where import (
+    ErrorLog,
+    band_map,
+    findings,
+    led_by_weight,
+    regime_maps,
+    stands_out,
+)
 from axisight.logs import Case, Log, read_case
 from axisight.robot import Robot, load_robot
 
@@ -139,7 +147,7 @@ def diagnose(
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)
     progress("measuring the gap", 0, 1)
     error_logs = _error_logs(view, found)
-    told = partial(conclude, settings=chosen, stands_out=_stands_out(error_logs), shown=view.shown)
+    told = partial(conclude, settings=chosen, stands_out=stands_out(error_logs), shown=view.shown)
     unknown = [one.axis for one in inputs.nominal]
 
     def said(one: Search) -> Conclusion:
@@ -259,6 +267,7 @@ def behind_gate(
 
     ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
     """
+    robot, slowed = with_bristles_followed(robot)
     read = in_torques(robot, estimation, validation)
     if read.nominal and simulated:
         raise InputError(
@@ -266,7 +275,7 @@ def behind_gate(
         )
     begun = from_rest(robot, read.estimation, read.validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
-    found, beside = begun.findings, begun.simulated
+    found, beside = (*slowed, *begun.findings), begun.simulated
     commanded = with_commands(robot, logs)
     if commanded is not None:
         logged = commanded.as_logged()
@@ -344,18 +353,6 @@ def _error_logs(view: View, found: Search) -> list[ErrorLog]:
         noises = noise.result()
     errors = _errors(refit, [view.measured(log) for log in view.logs])
     return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
-
-
-# An error in torque this much above the floor is seen by eye; noise of an unexpected
-# colour also lies above the floor in some band, but not in all of the torque.
-_SEEN = 0.02
-
-
-def _stands_out(logs: Sequence[ErrorLog]) -> bool:
-    """Whether the plain torque error lies above the noise on some axis."""
-    error = np.mean([relative_squares(x.log, x.error).mean(axis=0) for x in logs], axis=0)
-    noise = np.mean([relative_squares(x.log, x.noise).mean(axis=0) for x in logs], axis=0)
-    return bool(np.any(error > 1.05 * noise + _SEEN**2))
 
 
 @dataclass(frozen=True)

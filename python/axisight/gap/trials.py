@@ -35,6 +35,7 @@ from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.screening import Bench, Screen, Start, thinned
 from axisight.gap.sensitivity import Sensitivity
 from axisight.gap.settings import Settings
+from axisight.gap.sticking import begun_sticking
 from axisight.gap.tryout import Tryout
 from axisight.gap.usual import begun_where_it_ended, ended_at_bound, more_usual
 from axisight.gap.wider import begun_wider
@@ -227,6 +228,8 @@ class Trials:
         trials = self._with_gears(pool, trials, options)
         wider = begun_wider(self.standings(trials), trials, self.offered)
         trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
+        sticking = begun_sticking(self.standings(trials), options)
+        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in sticking])
         return self._with_lags(trials, options)
 
     def _with_gears(

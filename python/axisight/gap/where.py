@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 
 from axisight.gap.result import Where
+from axisight.gap.torques import relative_squares
 from axisight.logs import Log, lowpass
 
 Array = NDArray[np.float64]
@@ -28,6 +29,18 @@ class ErrorLog:
     log: Log
     error: Array
     noise: Array
+
+
+# An error in torque this much above the floor is seen by eye; noise of an unexpected
+# colour also lies above the floor in some band, but not in all of the torque.
+_SEEN = 0.02
+
+
+def stands_out(logs: Sequence[ErrorLog]) -> bool:
+    """Whether the plain torque error lies above the noise on some axis."""
+    error = np.mean([relative_squares(x.log, x.error).mean(axis=0) for x in logs], axis=0)
+    noise = np.mean([relative_squares(x.log, x.noise).mean(axis=0) for x in logs], axis=0)
+    return bool(np.any(error > 1.05 * noise + _SEEN**2))
 
 
 def band_map(logs: Sequence[ErrorLog], block_s: float) -> xr.Dataset:
