@@ -72,6 +72,7 @@ MEANINGS: dict[str, str] = {
     "position_offset": "positions count from another zero than the robot's",
     "gap_beyond_torque": "a simulator that is off by more than ten times the torque",
     "bristles_slowed": "bristles of the simulator that slip faster than a step of a fit",
+    "effect_within_scatter": "an effect of the simulator that the machine has within the scatter of its type",
     "reversals_smeared": "what remains lies around reversals, which the low-pass smears",
     "refit_worse": "a re-fit of the simulator's own parameters that held-out logs contradict",
     "parameter_at_edge": "a parameter of the simulator that the re-fit took to the edge of its tolerance",

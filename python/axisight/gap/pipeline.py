@@ -56,10 +56,11 @@ from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.slipping import with_bristles_followed
 from axisight.gap.state import Search
+from axisight.gap.stated_scatter import with_scatter_taken
 from axisight.gap.straight import bent_for
 from axisight.gap.targets import Commanded, with_commands
 from axisight.gap.told import with_constants_told
-from axisight.gap.tolerances import with_tolerances
+from axisight.gap.tolerances import loaded
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.trials import Progress
 from axisight.gap.verdict import Conclusion, conclude
@@ -73,7 +74,7 @@ from axisight.gap.where import (
     stands_out,
 )
 from axisight.logs import Case, Log, read_case
-from axisight.robot import Robot, load_robot
+from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -133,7 +134,7 @@ def diagnose(
     started = time.monotonic()
     chosen = settings or Settings()
     found_name, source, fit_logs, held_logs = _inputs(case, robot, estimation, validation)
-    machine, chosen = _with_robot(source, chosen, fit_logs[0].sample_time_s)
+    machine, chosen = loaded(source, chosen, fit_logs[0].sample_time_s)
     asked = asked_of(machine, separate, to_show, within)
     progress("looking at the logs", 0, 1)
     inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, simulated)
@@ -141,8 +142,13 @@ def diagnose(
     inputs, view = inputs.compared(chosen)
     if asked is not None:
         asked.check_limits(view)
-    machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    taken, scatter = with_scatter_taken(inputs.robot, found, chosen)
+    if scatter:
+        inputs = replace(inputs, robot=taken, noted=(*inputs.noted, *scatter))
+        view = inputs.view(chosen)
+        found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = with_constants_told(found, view.fitter, view.shown)
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)
     progress("measuring the gap", 0, 1)
@@ -324,21 +330,6 @@ def _inputs(
             f"got {len(fit_logs)} and {len(held_logs)}"
         )
     return name, source, fit_logs, held_logs
-
-
-def _with_robot(
-    source: Robot | Path | str, settings: Settings, sample_time_s: float
-) -> tuple[Robot, Settings]:
-    """Return the simulator and settings with the tolerances that stand beside its file.
-
-    ``sample_time_s``: of a model file that states none.
-    """
-    if isinstance(source, Robot):
-        return source, settings
-    machine = load_robot(source, sample_time_s=sample_time_s)
-    if settings.tolerances is not None:
-        return machine, settings
-    return machine, with_tolerances(settings, machine, source)
 
 
 def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:

@@ -14,7 +14,7 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.stated import SPRING_CHANGES
 from axisight.fitting import robot_parameters
 from axisight.gap.settings import Settings
-from axisight.robot import Robot
+from axisight.robot import Robot, load_robot
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
 
@@ -53,6 +53,21 @@ def with_tolerances(
     # One given for a quantity is meant for all parameters of it.
     known = {n: t for n, t in known.items() if n.rsplit(".", 1)[1] not in given}
     return replace(settings, tolerances={**settings.tolerances_of(robot), **known, **given})
+
+
+def loaded(
+    source: Robot | Path | str, settings: Settings, sample_time_s: float
+) -> tuple[Robot, Settings]:
+    """Return the simulator and settings with the tolerances that stand in and beside its file.
+
+    ``sample_time_s``: of a model file that states none.
+    """
+    if isinstance(source, Robot):
+        return source, settings
+    machine = load_robot(source, sample_time_s=sample_time_s)
+    if settings.tolerances is not None:
+        return machine, settings
+    return machine, with_tolerances(settings, machine, source)
 
 
 def identified_tolerances(robot_file: Path | str, model_error: float) -> dict[str, float]:
