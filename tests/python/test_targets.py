@@ -11,10 +11,12 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from axisight import Effect, Log, Robot, diagnose, load_robot, read_log, simulate
+from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, read_log, simulate
+from axisight.effects.stated import VISCOUS_FRICTION
 from axisight.errors import InputError, LogError, RobotError
 from axisight.gap import RefusedInputError
 from axisight.gap.gate.follows_target import check_follows_target
+from axisight.gap.settings import DEFAULT_TOLERANCES
 from axisight.gap.simulated import simulated_positions
 from axisight.gap.targets import _earlier, between, with_commands
 from axisight.gap.torques import AS_GIVEN
@@ -127,6 +129,20 @@ def test_what_a_machine_lacks_is_named(robot: Robot, lacks: str) -> None:
     if lacks == "coulomb_friction@2":
         value = found.causes[0].parameters["coulomb_nm"]
         assert value.value == pytest.approx(2.5, rel=0.1)
+
+
+def test_friction_that_is_stated_is_known_within_scatter(robot: Robot) -> None:
+    """A quarter off, where three tolerances are 27 per cent."""
+    logs = [MACHINES["coulomb_friction@2"].log(run) for run in (1, 2, 3)]
+    stated = Effect("coulomb_friction", 2, {"coulomb_nm": 2.5 / 1.25, "smoothing_rad_s": 0.01})
+    found = diagnose(
+        robot=robot.with_effects([stated]),
+        estimation=logs[:2],
+        validation=logs[2:],
+        settings=Settings(tolerances={**DEFAULT_TOLERANCES, VISCOUS_FRICTION: 0.09}),
+    )
+    assert (found.verdict, found.causes) == ("none", ())
+    assert [f.axis for f in found.findings if f.name == "effect_within_scatter"] == [2]
 
 
 @pytest.mark.parametrize("limit_nm", [45.0, 60.0])

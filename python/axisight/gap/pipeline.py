@@ -145,7 +145,7 @@ def diagnose(
     found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     taken, scatter = with_scatter_taken(inputs.robot, found, chosen)
     if scatter:
-        inputs = replace(inputs, robot=taken, noted=(*inputs.noted, *scatter))
+        inputs = inputs.with_effects_of(taken, scatter)
         view = inputs.view(chosen)
         found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
@@ -250,6 +250,11 @@ class _Inputs:
             commanded=commanded,
             simulator=found,
         )
+
+    def with_effects_of(self, robot: Robot, why: Sequence[Finding]) -> _Inputs:
+        """Return the same with a simulator that states its effects otherwise."""
+        commanded = None if self.commanded is None else replace(self.commanded, robot=robot)
+        return replace(self, robot=robot, commanded=commanded, noted=(*self.noted, *why))
 
     def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
         """Return what is to be known of the logs."""
