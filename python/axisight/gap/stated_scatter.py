@@ -1,7 +1,7 @@
 """Effects that the simulator states itself, and the machine has within the scatter of its type.
 
-Dry friction of a machine is a few per cent off that of its simulator, as its viscous friction is. Of that the re-fit
-makes up by itself; an effect is no parameter of it, and would be a cause of a gap that nobody has.
+Dry friction of a machine is a few per cent off that of its simulator, as its viscous friction is. The re-fit makes up
+for viscous friction. An effect is none of its parameters, and would be called a cause.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def with_scatter_taken(
     tolerance = settings.tolerances_of(robot).get(VISCOUS_FRICTION, 0.0)
     fitted = [*_rivals(found), *zip(found.model.free, found.model.effects, strict=False)]
     taken = {e.label: (f, e) for f, e in fitted if _is_scatter(f, e, tolerance)}
-    effects = [taken[e.label][1] if e.label in taken else e for e in robot.effects]
     if not taken:
         return robot, ()
+    effects = [taken[e.label][1] if e.label in taken else e for e in robot.effects]
     return robot.with_effects(effects), tuple(_told(f, e, tolerance) for f, e in taken.values())
 
 

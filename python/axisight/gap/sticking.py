@@ -38,11 +38,11 @@ def begun_sticking(
         if bristles is None or falling is None:
             continue
         evidence, yielding = bristles.trial.evidence, bristles.trial.candidate
-        ended = {k: float(v) for k, v in (evidence.effects[-1].parameters or {}).items()}
         first = float((falling.effect.parameters or {})[speed])
         for over in sorted({first, *(s.get(speed, first) for s in falling.starts)}):
             option = replace(
-                yielding.at({**ended, _RATIO: _HOLDS, speed: over}),
+                yielding,
+                effect=evidence.effects[-1].with_values({_RATIO: _HOLDS, speed: over}),
                 free=(*yielding.free, _RATIO, speed),
                 bounds={
                     **yielding.bounds,

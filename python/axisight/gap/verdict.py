@@ -99,8 +99,8 @@ def conclude(
     ranking = with_twins(ranking, n_axes)
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
-    coloured = _most(found, found.baseline.loss) <= _OF_COLOUR
-    gap = (stands_out or not coloured) and _significant(found, settings)
+    beyond_colour = _most(found, found.baseline.loss) > _OF_COLOUR
+    gap = (stands_out or beyond_colour) and _significant(found, settings)
     if not accepted and not shown:
         verdict: VerdictKind = "unknown" if gap else "none"
     elif (accepted or gap) and _too_little(found, explained, settings):
