@@ -149,3 +149,13 @@ def test_what_is_left_open_stands_above_no_floor():
     assert judged(nothing, seen).verdict == "unknown"
     opened = stage([log()], [0.3 * np.ones((N, 1))], 1.0)
     assert judged(nothing, replace(seen, open=opened)).verdict == "none"
+
+
+def test_what_the_steps_of_an_encoder_leave_is_noise():
+    """A motor that swings between two steps makes up to half more of the noise that they are taken for."""
+    swinging = stages(0.08, 0.06)
+    stepped = np.array([True])
+    assert judged(named(), swinging).verdict == "unknown"
+    assert judged(named(), swinging, stepped=stepped) == named()
+    assert judged(named(), stages(0.08, 0.07), stepped=stepped).verdict == "unknown"
+    assert judged(named(), swinging, stepped=~stepped).verdict == "unknown"

@@ -28,6 +28,9 @@ _SEEN = 0.03
 _ENOUGH = 0.8
 # Share of what stands above the floor that a cause of the size of noise has to remove.
 _HALF = 0.5
+# By how much more of its squares than the floor says the steps of an encoder may leave: a motor that is
+# held between two of them swings as it likes.
+_BY_STEPS = 0.5
 # Noise cannot be this much larger than a gap that contains it.
 _ABSURD = 1.25
 
@@ -41,6 +44,7 @@ def carried_over(
     own: OwnAxes | None = None,
     bent: float = 0.0,
     removed: float | None = None,
+    stepped: NDArray[np.bool_] | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -50,7 +54,8 @@ def carried_over(
     larger than a gap that is seen. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
     of their tolerance, where that counts. ``removed``: share of what weighted residuals of the validation
-    logs have above noise that the causes remove; None where it is not known.
+    logs have above noise that the causes remove; None where it is not known. ``stepped`` (n_axes,): where the
+    noise is that of an encoder's steps, of no axis by default.
     """
     withdrawn = None
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
@@ -65,7 +70,7 @@ def carried_over(
     elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
     elif conclusion.causes:
-        withdrawn = _no_fall(stages, gap, names, settings) or _out_of_shape(bent)
+        withdrawn = _no_fall(stages, gap, names, settings, stepped) or _out_of_shape(bent)
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
     if withdrawn is None:
@@ -130,8 +135,22 @@ def _squares(stage: Stage) -> Array:
     return np.array(stage.per_log())
 
 
-def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings) -> str | None:
+def _floor(stages: Stages, stepped: NDArray[np.bool_] | None) -> float:
+    """Return the mean square of the floor, with what the steps of encoders make of what is left."""
+    noise, left = _squares(stages.floor), _squares(stages.after)
+    more = np.clip(left - noise, 0.0, _BY_STEPS * noise)
+    return float(np.mean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
+
+
+def _no_fall(
+    stages: Stages,
+    gap: Gap,
+    names: Sequence[str],
+    settings: Settings,
+    stepped: NDArray[np.bool_] | None,
+) -> str | None:
     """Say so where the causes remove too little of the gap."""
+    floor = _floor(stages, stepped)
     if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
         return (
             f"What explains the estimation logs does not carry over to the validation logs: there the "
@@ -139,9 +158,9 @@ def _no_fall(stages: Stages, gap: Gap, names: Sequence[str], settings: Settings)
             f"of the {torque_of(gap.compared)}, with it {percent(gap.after)}."
         )
     # Where little stands above the noise, what is left of it is the noise of the floor.
-    if gap.after**2 - gap.floor**2 <= settings.smallest_gain * gap.floor**2:
+    if gap.after**2 - floor <= settings.smallest_gain * floor:
         return None
-    explainable = gap.before**2 - gap.floor**2
+    explainable = gap.before**2 - floor
     share = (gap.before**2 - gap.after**2) / explainable if explainable > 0 else 0.0
     if share >= _ENOUGH:
         return None

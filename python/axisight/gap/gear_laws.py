@@ -129,7 +129,9 @@ def _damped_too(option: FreeEffect, leader: Effect) -> FreeEffect:
     if option.effect.name != PLAY[0] or _damps(option):
         return option
     # Laws without a gap damp everywhere.
-    begin = _HALF if leader.name == PLAY[0] else 1.0
+    begin = 1.0
+    if leader.name == PLAY[0]:
+        begin = (leader.parameters or {}).get(PLAY[1]) or _HALF
     return replace(option.at({PLAY[1]: begin}), free=(*option.free, PLAY[1]))
 
 

@@ -26,6 +26,7 @@ from axisight.gap.compared import Compared
 from axisight.gap.currents import Nominal, in_torques
 from axisight.gap.detection import detection_limits
 from axisight.gap.edge import parameters_at_edge
+from axisight.gap.encoder_steps import encoder_steps
 from axisight.gap.evidence import Evidence
 from axisight.gap.faults import Finding
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
@@ -480,8 +481,9 @@ def _assemble(
     share = bent_for(view.fitter, found)
     left = remainder_of(reach.judged, judged, reach.left, settings)
     removed = view.removed_there(found, held_logs) if conclusion.causes else None
+    stepped = encoder_steps(view.robot, view.logs) > 0
     conclusion = carried_over(
-        conclusion, reach.judged, judged, names, settings, own, share, removed
+        conclusion, reach.judged, judged, names, settings, own, share, removed, stepped
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects.stated import BEHIND_GEAR, BRISTLES
+from axisight.effects.stated import BEHIND_GEAR, BRISTLES, PLAY
 from axisight.gap.cutoff import rigid_below_hz
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.orders import passed, strongest_orders
@@ -180,8 +180,9 @@ _WIDER = 1.24
 def _play(trial: Trial) -> FreeEffect:
     """Begin at several widths, from a share of the deflection the largest torque gives.
 
-    Up to most of it, or the play of a gear that is stiffer than that. What is damped in the gap is found
-    where it ended.
+    Up to most of it, or the play of a gear that is stiffer than that; by teeth that rebound, and by such as
+    a film of grease stops, whose motion is another where gravity lets them fall from side to side. What is
+    damped in the gap is found where it ended.
     """
     i, deflection = trial.index, _bent_rad(trial)
     begin = replace(_of_a_gear(trial), free=("half_width_rad",))
@@ -192,7 +193,9 @@ def _play(trial: Trial) -> FreeEffect:
         widest = max(widest, _WIDEST_RAD)
     count = 1 + round(np.log(widest / (0.04 * deflection)) / np.log(_WIDER))
     widths = np.geomspace(0.04 * deflection, widest, count)
-    return replace(begin, starts=tuple({"half_width_rad": float(w)} for w in widths))
+    rebounding = [{"half_width_rad": float(w), PLAY[1]: 0.0} for w in widths]
+    stopped = [{"half_width_rad": float(w), PLAY[1]: 1.0} for w in widths[::2]]
+    return replace(begin, starts=(*rebounding, *stopped))
 
 
 # A cube as stiff at the deflection as so many linear springs: near one, a step from none of it says little.
