@@ -13,7 +13,7 @@ from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import Layout
 from axisight.gap.reconsider import weigh_again
-from axisight.gap.swaps import mending, nearly_as_good, straightened, weighed_again
+from axisight.gap.swaps import mending, nearly_as_good, open_rivals, straightened, weighed_again
 from gap_data import linear_evidence
 
 ROBOT = load_robot("irb6600_like").with_effects([])
@@ -27,7 +27,9 @@ class Model:
     free: list
     total: float
     off: float
-    """Relative change of every parameter of the simulator."""
+    """Relative change of the first parameters of the simulator."""
+    first: int | None = None
+    """So many of them; all by default."""
     renewed: bool = True
     converged: bool = True
     fresh: bool = False
@@ -38,7 +40,8 @@ class Model:
     def __post_init__(self):
         known = ROBOT.parameters()
         names = [n for n in known if n.rsplit(".", 1)[1] in TOLERANCE]
-        self.robot_values = {n: (1 + self.off) * known[n] for n in names}
+        self.robot_values = {n: known[n] for n in names}
+        self.robot_values |= {n: (1 + self.off) * known[n] for n in names[: self.first]}
 
 
 @dataclass
@@ -102,6 +105,26 @@ def test_one_that_explains_less_is_no_rival():
     known = {("payload",): (310.0, 0.0)}
     # The offset is not fitted at all: the table does not have it.
     assert swap(known, offset_score=0.9) is None
+
+
+@pytest.mark.parametrize(
+    ("total", "off", "probability", "swapped"),
+    [
+        (290.0, 0.0, 0.3, True),
+        (297.0, 0.0, 0.3, False),
+        (290.0, 0.1, 0.3, False),
+        (290.0, 0.0, 0.03, False),
+    ],
+)
+def test_one_parameter_at_the_edge_decides_between_what_could_not_be_told_apart(
+    total: float, off: float, probability: float, swapped: bool
+):
+    """A rival takes the place that leaves clearly less, with none there, and was open as the cause came in."""
+    first, second = ranked(MASS, 0.999, 0.7), ranked(LOAD, 0.998, probability)
+    entered = Standing(2, (first, second), 0.0, 0.01)
+    model = Model([MASS], 300.0, 0.1, first=1)
+    found = straightened(Fitter({("payload",): (total, off)}), model, [(first, (entered,))])
+    assert (found is not None) is swapped
 
 
 def test_bent_is_a_share_of_parameters_three_tolerances_off():
@@ -211,21 +234,53 @@ def test_another_law_of_the_same_dry_friction_or_gear_mends_a_cause():
     assert mending(dry, others) == []
 
 
+def test_rivals_that_stood_beside_a_cause_are_judged_again_once_others_are_in():
+    """The likeliest on any axis that it led; not those that are in themselves, nor where another one led."""
+
+    def at(axis: int, *shares: tuple[FreeEffect, float]) -> Standing:
+        return Standing(axis, tuple(ranked(f, 0.9, p) for f, p in shares), 0.0, 0.0)
+
+    first = at(0, (SOFT, 0.6), (CUBIC, 0.3), (PLAY, 0.1))
+    second = at(1, (SOFT, 0.5), (PLAY, 0.4), (CUBIC, 0.1))
+    elsewhere = at(2, (OFFSET, 0.6), (MASS, 0.4))
+    entered = (first, second, elsewhere)
+
+    def labels(final: set[str]) -> list[str]:
+        return [r.trial.label for r in open_rivals(first.best, entered, final)]
+
+    assert labels({"piecewise_stiffness@1", "torque_offset@3"}) == [
+        "backlash@1",
+        "nonlinear_stiffness@3",
+    ]
+    assert labels({"piecewise_stiffness@1", "backlash@1"}) == ["nonlinear_stiffness@3"]
+
+
 @pytest.mark.parametrize(
-    ("beside_none", "after", "swapped"),
-    [(True, -2.0, True), (True, 30.0, True), (False, 9.0, False), (False, 4.0, True)],
+    ("beside_none", "mends", "after", "swapped"),
+    [
+        (True, False, -2.0, True),
+        (True, False, 30.0, True),
+        (False, True, 9.0, False),
+        (False, True, 4.0, True),
+        (False, False, 9.0, True),
+        (False, False, 11.0, False),
+    ],
 )
 def test_only_a_law_that_mends_has_to_halve_what_is_left(
-    beside_none: bool, after: float, swapped: bool, monkeypatch: pytest.MonkeyPatch
+    beside_none: bool, mends: bool, after: float, swapped: bool, monkeypatch: pytest.MonkeyPatch
 ):
-    """What came in beside a cause that was none is judged by likelihood alone, at the floor or below it too."""
+    """What came in beside a cause that was none is judged by likelihood alone, at the floor or below it too.
+
+    What was a rival before others came in has to leave less.
+    """
     before = -1.0 if beside_none else 10.0
     sides = [SOFT, CUBIC] if beside_none else [SOFT]
     cause = SimpleNamespace(trial=SimpleNamespace(evidence=SimpleNamespace(free=sides)))
     standing = SimpleNamespace(axis=0)
     new = SimpleNamespace(name="new")
     state = SimpleNamespace(
-        model=SimpleNamespace(free=[SOFT]),
+        model=SimpleNamespace(free=[SOFT, PLAY]),
+        standings_of=lambda _cause: (),
         rounds=[SimpleNamespace(standings=())],
         accepted=[(cause, standing)],
         floor=np.zeros(1),
@@ -233,8 +288,10 @@ def test_only_a_law_that_mends_has_to_halve_what_is_left(
         left=lambda: np.array([before]),
         left_by=lambda _model: np.array([after]),
     )
-    for name in ("mending", "nearly_as_good"):
+    monkeypatch.setattr("axisight.gap.reconsider.mending", lambda *_: [cause] if mends else [])
+    for name in ("open_rivals", "nearly_as_good"):
         monkeypatch.setattr(f"axisight.gap.reconsider.{name}", lambda *_: [])
+    monkeypatch.setattr("axisight.gap.reconsider.drop_idle", lambda *_: set())
     monkeypatch.setattr(
         "axisight.gap.reconsider.weighed_again", lambda *_: (new, (cause, standing))
     )

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, stand, trial
-from axisight.gap.edge import BENT, bent
 from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.merged import one_for_several
 from axisight.gap.model import ModelFitter
 from axisight.gap.score import held_out_loss, linear_gain
 from axisight.gap.settings import Settings
 from axisight.gap.state import OPEN, Round, Search
-from axisight.gap.swaps import mending, nearly_as_good, straightened, weighed_again
+from axisight.gap.swaps import mending, nearly_as_good, open_rivals, straightened, weighed_again
 from axisight.gap.trials import settled
 
 Array = NDArray[np.float64]
@@ -29,8 +28,6 @@ _MENDED = 0.5
 
 def straighten(fitter: ModelFitter, state: Search) -> None:
     """Put a rival in the place of a cause that holds only with a bent simulator."""
-    if bent(fitter, state.model) < BENT:
-        return
     labels = {f.effect.label for f in state.model.free}
     entered = [
         (r, x.standings) for x in state.rounds for r, _ in x.accepted if r.trial.label in labels
@@ -61,11 +58,24 @@ def finish(fitter: ModelFitter, state: Search) -> None:
 
 
 def weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:
-    """Judge causes anew that came in beside others which turned out to be none, or that another law mends."""
-    final = {f.effect.label for f in state.model.free}
-    last = state.rounds[-1].standings
+    """Judge causes anew that were judged beside others than now.
+
+    Those that came in beside what turned out to be none, that another law mends, or that had rivals before
+    others came in.
+    """
+    last, before = state.rounds[-1].standings, state.model
     for cause, standing in state.accepted:
-        mended = {f.effect.label for f in cause.trial.evidence.free} <= final
+        final = {f.effect.label for f in state.model.free}
+        beside = {f.effect.label for f in cause.trial.evidence.free}
+        left, axis = state.left(), standing.axis
+        if not beside <= final:
+            rivals, most = nearly_as_good(state.model, cause, standing), np.inf
+        elif mends := mending(cause, last):
+            rivals, most = mends, _MENDED * left[axis]
+        elif beside < final:
+            rivals, most = open_rivals(cause, state.standings_of(cause), final), left[axis]
+        else:
+            continue
         found = weighed_again(
             fitter,
             state.model,
@@ -74,14 +84,13 @@ def weigh_again(fitter: ModelFitter, state: Search, settings: Settings) -> None:
             state.floor,
             state.layout,
             settings.explained_share,
-            mending(cause, last) if mended else nearly_as_good(state.model, cause, standing),
+            rivals,
         )
-        if found is None:
-            continue
-        left, axis = state.left(), standing.axis
-        if not mended or state.left_by(found[0])[axis] < _MENDED * left[axis]:
+        if found is not None and state.left_by(found[0])[axis] < most:
             state.model, taken = found
             state.rounds.append(Round((taken[1],), (taken,), left))
+    if state.model is not before:
+        drop_idle(fitter, state, settings)
 
 
 def drop_idle(fitter: ModelFitter, state: Search, settings: Settings) -> set[str]:

@@ -60,6 +60,10 @@ class Search:
         entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
         return [entered[f.effect.label] for f in self.model.free]
 
+    def standings_of(self, cause: Ranked) -> tuple[Standing, ...]:
+        """Return how the round stood in which a cause came in."""
+        return next(x.standings for x in self.rounds if any(r is cause for r, _ in x.accepted))
+
     def to_explain(self) -> Array:
         """Return the held-out loss of the re-fitted simulator above the floor, by axis (n_axes,)."""
         used = predictable(self.model)

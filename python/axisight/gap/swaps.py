@@ -7,7 +7,7 @@ noise, and the simulator's own parameters are bent to it as far as they go.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ Found = tuple[Ranked, Standing]
 # Rivals that are tried, and what they explain of what the cause does.
 _RIVALS = 3
 _AS_MUCH = 0.95
+# What a rival leaves at most, of what the cause does, where few parameters are at the edge.
+_CLEARLY = 0.98
 # The same where a cause was judged beside one that is none.
 _AGAIN = 2
 _NEARLY = 0.8
@@ -41,14 +43,21 @@ def straightened(
     """Return a model with a rival in the place of one of its causes, that cause, and the rival.
 
     ``entered``: the causes, each with the standings of the round it came in. None where no rival
-    leaves less with a simulator that is not bent.
+    leaves less with a simulator that is not bent. Of one that is hardly bent, only what could not be told
+    from the cause as it entered, and leaves clearly less with fewer parameters at the edge.
     """
+    how = bent(fitter, model)
+    hardly = how < BENT
+    most, share = (how, _CLEARLY) if hardly else (BENT, 1.0)
     best: tuple[Evidence, Ranked, Found] | None = None
-    for cause, standings in entered:
+    for cause, standings in entered if how > 0 else ():
+        known = {r.trial.label for r in open_rivals(cause, standings, ())}
         for rival in _rivals(cause, standings):
+            if hardly and rival[0].trial.label not in known:
+                continue
             other = in_its_place(fitter, model, cause, rival[0])
-            least = model.total if best is None else best[0].total
-            if other is not None and other.total < least and bent(fitter, other) < BENT:
+            least = share * model.total if best is None else best[0].total
+            if other is not None and other.total < least and bent(fitter, other) < most:
                 best = other, cause, rival
     return best
 
@@ -67,6 +76,20 @@ def nearly_as_good(model: Evidence, cause: Ranked, entered: Standing) -> list[Ra
         and r.trial.candidate.effect.axis == cause.trial.candidate.effect.axis
         and r.trial.label not in others
     ][:_AGAIN]
+
+
+def open_rivals(cause: Ranked, entered: Sequence[Standing], final: Collection[str]) -> list[Ranked]:
+    """Return what could not be told from a cause as it entered, and is not in the model itself.
+
+    What was explained since hid which of them it is. ``entered``: how its round stood.
+    """
+    label = cause.trial.label
+    led = [s for s in entered if s.best.trial.label == label]
+    found: dict[str, Ranked] = {}
+    for r in sorted((r for s in led for r in s.inseparable()), key=lambda r: r.probability):
+        found[r.trial.label] = r
+    others = [r for r in reversed(found.values()) if r.trial.label not in {label, *final}]
+    return others[:_RIVALS]
 
 
 def alike(one: Effect, other: Effect) -> bool:

@@ -17,7 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &[],
     twins: &[],
     stands_for: None,
-    linear: Linear::Waves { constant: 0, proportional: 0, reading: 12 },
+    linear: Linear::Waves { constant: 0, proportional: 0, reading: 15 },
     inverse_dynamics: false,
     absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
@@ -27,6 +27,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         "rad" 0.5 1e-3 "order_2" "cosine_2_rad" "sine_2_rad" 0.0,
         "rad" 0.5 1e-3 "order_3" "cosine_3_rad" "sine_3_rad" 0.0,
         "rad" 0.5 1e-3 "order_4" "cosine_4_rad" "sine_4_rad" 0.0,
+        "rad" 0.5 1e-3 "order_5" "cosine_5_rad" "sine_5_rad" 0.0,
     ),
 };
 

@@ -17,7 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &[],
     twins: &[],
     stands_for: None,
-    linear: Linear::Waves { constant: 9, proportional: 3, reading: 0 },
+    linear: Linear::Waves { constant: 15, proportional: 3, reading: 0 },
     inverse_dynamics: true,
     absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
@@ -26,6 +26,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         "Nm" 1e4 0.1 "order_1" "cosine_1_nm" "sine_1_nm" 1.0,
         "Nm" 1e4 0.1 "order_2" "cosine_2_nm" "sine_2_nm" 0.0,
         "Nm" 1e4 0.1 "order_3" "cosine_3_nm" "sine_3_nm" 0.0,
+        "Nm" 1e4 0.1 "order_4" "cosine_4_nm" "sine_4_nm" 0.0,
+        "Nm" 1e4 0.1 "order_5" "cosine_5_nm" "sine_5_nm" 0.0,
         "1" 1.0 0.02 "order_u" "cosine_u" "sine_u" 0.0,
     ),
 };
@@ -36,7 +38,7 @@ struct Ripple<S> {
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
-    let (constant, proportional) = p.split_at(9);
+    let (constant, proportional) = p.split_at(15);
     Box::new(Ripple {
         constant: Harmonics::new(constant),
         proportional: Harmonics::new(proportional),

@@ -370,7 +370,7 @@ mod tests {
             theta[layout().ripple(0)] = 0.11;
             theta[layout().ripple(0) + 1] = -0.06;
         });
-        let mut parameters = [0.0; 12];
+        let mut parameters = [0.0; 18];
         parameters[..3].copy_from_slice(&[ORDER, 0.11, -0.06]);
         let ripple = kernel("torque_ripple", &parameters);
         for angle in sweep() {
