@@ -344,6 +344,25 @@ def test_where_the_simulator_as_given_is_far_off_the_re_fitted_one_is_begun_from
     assert given.robot_values == {}
 
 
+def test_each_kind_of_start_has_a_valley_of_its_own():
+    """Between two starts that differ in more than the one number there is nothing to look for."""
+    model, true = evidence(), 1.7e-4
+
+    class TwoKinds(Valley):
+        def loss(self, free: Sequence[FreeEffect], *more: object, **others: object) -> float:
+            rebounds = (free[-1].effect.parameters or {})["damped"] == 0.0
+            return super().loss(free, *more, **others) + (model.total if rebounds else 0.0)
+
+    fitter = TwoKinds(lambda v: 2 * model.total * (1 - np.exp(-((v / true - 1) ** 2) / 0.06)))
+    option = play()
+    starts = tuple({**s, "damped": d} for d in (0.0, 1.0) for s in option.starts)
+    found = screen(model, fitter).best_of_starts(replace(option, starts=starts))
+    values = found.option.effect.parameters or {}
+    assert values["damped"] == 1.0
+    assert values["half_width_rad"] == pytest.approx(true, rel=0.01)
+    assert found.gain == pytest.approx(model.total, rel=1e-2)
+
+
 def test_part_of_the_logs_is_what_they_are_alone(view: ClosedLoopView, fitter: ClosedLoopFitter):
     start = model(fitter, FRICTION)
     kept = start.part([1])

@@ -65,10 +65,24 @@ def test_a_cube_is_looked_for_where_weight_bends_the_spring():
 
 def test_play_is_looked_for_up_to_that_of_a_gear_which_bends_less():
     option, _, _ = screened(Effect("backlash", 1, {"half_width_rad": 2e-4}))
-    widths = np.array([s["half_width_rad"] for s in option.starts])
-    assert widths[-1] >= 9e-4 * (1 - 1e-12)
-    # Impacts stay in phase from one width to the next.
-    assert np.all(widths[1:] / widths[:-1] < 1.26)
+    for damped, step in ((0.0, 1.26), (1.0, 1.26**2)):
+        widths = np.array([s["half_width_rad"] for s in option.starts if s["damped"] == damped])
+        assert widths[-1] >= 9e-4 / step
+        # Impacts stay in phase from one width to the next; where teeth do not rebound, there are fewer.
+        assert np.all(widths[1:] / widths[:-1] < step)
+
+
+@pytest.mark.parametrize("damped", [0.0, 1.0])
+def test_play_is_looked_for_with_teeth_that_rebound_and_such_that_do_not(damped: float):
+    true = {"half_width_rad": 2e-4, "damped": damped}
+    option, screen, explainable = screened(Effect("backlash", 1, true))
+    found = screen.best_of_starts(option)
+    assert found.gain > 0.9 * explainable
+    values = found.option.effect.parameters or {}
+    assert values["damped"] == damped
+    assert values["half_width_rad"] == pytest.approx(2e-4, rel=0.1)
+    others = tuple(s for s in option.starts if s["damped"] != damped)
+    assert screen.best_of_starts(replace(option, starts=others)).gain < found.gain
 
 
 def test_uneven_friction_is_looked_for_at_its_wave():

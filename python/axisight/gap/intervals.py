@@ -15,9 +15,9 @@ from axisight.gap.result import Interval
 # a linear model holds is the same in all books, and only integrators differ; of a law with several
 # numbers each makes up for what another formula says of the rest; so does a lag in the path of the torque, by how
 # a controller holds its command. From draws of the benchmark on foreign engines that were looked at
-# (seeds 3, 5, 110 and 120).
+# (seeds 3, 5, 110, 120 and 182 to 184: of 1,050 values of the last three 97 % are held).
 _EXACT = 0.004
-_LAW = 0.02
+_LAW = 0.01
 
 
 def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dict[str, Interval]:
