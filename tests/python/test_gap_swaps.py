@@ -240,7 +240,7 @@ def test_rivals_that_stood_beside_a_cause_are_judged_again_once_others_are_in():
     def at(axis: int, *shares: tuple[FreeEffect, float]) -> Standing:
         return Standing(axis, tuple(ranked(f, 0.9, p) for f, p in shares), 0.0, 0.0)
 
-    first = at(0, (SOFT, 0.6), (CUBIC, 0.3), (PLAY, 0.1))
+    first = at(0, (SOFT, 0.5), (CUBIC, 0.3), (PLAY, 0.2))
     second = at(1, (SOFT, 0.5), (PLAY, 0.4), (CUBIC, 0.1))
     elsewhere = at(2, (OFFSET, 0.6), (MASS, 0.4))
     entered = (first, second, elsewhere)

@@ -85,11 +85,10 @@ def open_rivals(cause: Ranked, entered: Sequence[Standing], final: Collection[st
     """
     label = cause.trial.label
     led = [s for s in entered if s.best.trial.label == label]
-    found: dict[str, Ranked] = {}
-    for r in sorted((r for s in led for r in s.inseparable()), key=lambda r: r.probability):
-        found[r.trial.label] = r
-    others = [r for r in reversed(found.values()) if r.trial.label not in {label, *final}]
-    return others[:_RIVALS]
+    stood = sorted((r for s in led for r in s.inseparable()), key=lambda r: -r.probability)
+    likeliest = {r.trial.label: r for r in reversed(stood)}
+    others = [r for r in stood if r is likeliest[r.trial.label]]
+    return [r for r in others if r.trial.label not in {label, *final}][:_RIVALS]
 
 
 def alike(one: Effect, other: Effect) -> bool:
