@@ -25,10 +25,14 @@ pub fn reference(n_samples: usize, n_axes: usize, sample_time: f64) -> Vec<f64> 
 
 /// Torque and resolver ripple of every axis (thesis, Table 8.1).
 pub fn table_8_1(n_axes: usize) -> Vec<EffectSetting<f64>> {
+    // An effect takes five waves: an order of zero switches one off.
+    const NONE: (f64, f64, f64) = (0.0, 0.0, 0.0);
     let torque = [
         (3.0, 0.06, 1.45),
         (36.0, 0.11, 0.90),
         (72.0, 0.08, 0.20),
+        NONE,
+        NONE,
         (18.0, 0.04, 0.0),
     ];
     let resolver = [
@@ -36,6 +40,7 @@ pub fn table_8_1(n_axes: usize) -> Vec<EffectSetting<f64>> {
         (10.0, 0.2e-3, 0.81),
         (12.0, 0.22e-3, 2.94),
         (48.0, 0.18e-3, 2.94),
+        NONE,
     ];
     // `a sin(n phi + p)` as order, cosine and sine amplitude.
     let terms = |table: &[(f64, f64, f64)]| -> Vec<f64> {

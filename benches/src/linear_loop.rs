@@ -93,10 +93,13 @@ impl PlainLoop {
             resolver: [[[0.0; 3]; 4]; M],
         };
         for axis in 0..M {
-            let torque = terms(axis, "torque_ripple")?;
-            out.constant[axis].copy_from_slice(&torque[..3]);
-            out.proportional[axis] = torque[3];
-            out.resolver[axis].copy_from_slice(&terms(axis, "resolver_ripple")?);
+            let (mut constant, resolver) = (
+                terms(axis, "torque_ripple")?,
+                terms(axis, "resolver_ripple")?,
+            );
+            out.proportional[axis] = constant.pop()?;
+            out.constant[axis].copy_from_slice(constant.first_chunk::<3>()?);
+            out.resolver[axis].copy_from_slice(resolver.first_chunk::<4>()?);
         }
         Some(out)
     }
