@@ -454,7 +454,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
         parameters: parameters.to_vec(),
     };
     let fixed = S::constant;
-    let mut ripple = effect::<S>("torque_ripple", Some(0), &[0.0; 12]);
+    let mut ripple = effect::<S>("torque_ripple", Some(0), &[0.0; 18]);
     ripple.parameters[..3].copy_from_slice(&[fixed(ORDER), value(9), value(10)]);
     let settings = [
         setting(

@@ -15,18 +15,23 @@ use std::sync::atomic::AtomicBool;
 
 const ONE: Method = Method::RungeKutta4 { substeps: 1 };
 
+/// An effect takes five waves: an order of zero switches one off.
+const NONE: [f64; 3] = [0.0; 3];
 /// Torque and resolver ripple of one axis (thesis, Table 8.1): order, amplitude, phase.
-const TORQUE: [[f64; 3]; 4] = [
+const TORQUE: [[f64; 3]; 6] = [
     [3.0, 0.06, 1.45],
     [36.0, 0.11, 0.90],
     [72.0, 0.08, 0.20],
+    NONE,
+    NONE,
     [18.0, 0.04, 0.0],
 ];
-const RESOLVER: [[f64; 3]; 4] = [
+const RESOLVER: [[f64; 3]; 5] = [
     [2.0, 0.4e-3, -1.84],
     [10.0, 0.2e-3, 0.81],
     [12.0, 0.22e-3, 2.94],
     [48.0, 0.18e-3, 2.94],
+    NONE,
 ];
 
 fn terms(table: &[[f64; 3]]) -> Vec<f64> {
@@ -197,7 +202,7 @@ fn fine_steps(robot: &RobotDescription, torque: &[f64], n_samples: usize) -> Vec
         let input = DVector::from_fn(m, |i, _| {
             let angle = rest.motor_angle[i] + phi[i];
             let constant: f64 = TORQUE[..3].iter().map(|t| wave(*t, angle)).sum();
-            u[i] - rest.motor_torque[i] + constant + u[i] * wave(TORQUE[3], angle)
+            u[i] - rest.motor_torque[i] + constant + u[i] * wave(TORQUE[5], angle)
         });
         &model.a * x + &model.b * input
     };
@@ -333,7 +338,7 @@ fn samples_show_ripple_at_the_true_angle() {
             let (angle, u) = (s.state[i], s.command[i]);
             let resolver: f64 = RESOLVER.iter().map(|t| wave(*t, angle)).sum();
             let constant: f64 = TORQUE[..3].iter().map(|t| wave(*t, angle)).sum();
-            let torque = constant + u * wave(TORQUE[3], angle);
+            let torque = constant + u * wave(TORQUE[5], angle);
             let error = noise[s.index * 3 + i] + resolver;
             worst[0] = worst[0].max((s.measured[i] - angle - error).abs());
             worst[1] = worst[1].max((s.position_disturbance[i] - error).abs());
@@ -452,7 +457,7 @@ fn misuse_is_refused_by_name() {
         (
             vec![effect("torque_ripple", Some(0), &[1.0])],
             vec![0.0; 3],
-            "effect `torque_ripple`: expected 12 parameters, got 1",
+            "effect `torque_ripple`: expected 18 parameters, got 1",
         ),
         (
             Vec::new(),
