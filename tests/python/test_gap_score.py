@@ -9,7 +9,13 @@ import scipy.optimize
 from axisight.effects import Effect
 from axisight.gap.decide import trial
 from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.score import held_out_loss, linear_gain, step_without, straight_step_without
+from axisight.gap.score import (
+    held_out_loss,
+    linear_gain,
+    linear_step,
+    step_without,
+    straight_step_without,
+)
 from gap_data import linear_evidence
 
 
@@ -158,6 +164,13 @@ def test_a_linear_step_does_not_lead_past_a_bound_that_is_no_tolerance():
     )
     assert linear_gain(at_nothing) == 0.0
     assert linear_gain(replace(at_nothing, at_bound=())) > 0.0
+
+
+def test_a_model_without_parameters_has_no_step():
+    """Without causes, and tolerances of nothing that the motion shows."""
+    bare = linear_evidence(np.zeros((40, 0)), np.ones(40), np.repeat([0, 1], 20))
+    assert linear_step(replace(bare, parameters=())).shape == (0,)
+    assert linear_gain(bare) == 0.0
 
 
 @pytest.fixture

@@ -223,7 +223,8 @@ def _at_end(evidence: Linearized) -> NDArray[np.bool_]:
 
     A tolerance of half the value and more would take it below zero.
     """
-    own = np.array([n[0] is None and n in evidence.at_bound for n in evidence.parameters])
+    stuck = [n[0] is None and n in evidence.at_bound for n in evidence.parameters]
+    own = np.array(stuck, dtype=bool)
     least, most = _room(evidence)
     # Not by its tolerance: that leaves room on both sides.
     inside = np.minimum(-least, most) > _SLIGHT * (most - least)
