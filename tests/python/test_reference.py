@@ -20,6 +20,8 @@ BOUND = 1e-5
 # Torque ripple (order, amplitude [Nm], phase) and resolver ripple of thesis Table 8.1.
 TORQUE_RIPPLE = [(3, 0.06, 1.45), (36, 0.11, 0.90), (72, 0.08, 0.20)]
 PROPORTIONAL_RIPPLE = (18, 0.04, 0.0)
+# An effect takes five waves: an order of zero switches one off.
+NO_WAVE = (0, 0.0, 0.0)
 RESOLVER_RIPPLE = [(2, 0.4e-3, -1.84), (10, 0.2e-3, 0.81), (12, 0.22e-3, 2.94), (48, 0.18e-3, 2.94)]
 
 
@@ -31,8 +33,10 @@ def _terms(*waves: tuple[float, float, float]) -> list[float]:
 def _ripple() -> Effects:
     out: Effects = []
     for axis in (1, 2, 3):
-        out.append(("torque_ripple", axis, _terms(*TORQUE_RIPPLE, PROPORTIONAL_RIPPLE)))
-        out.append(("resolver_ripple", axis, _terms(*RESOLVER_RIPPLE)))
+        out.append(
+            ("torque_ripple", axis, _terms(*TORQUE_RIPPLE, NO_WAVE, NO_WAVE, PROPORTIONAL_RIPPLE))
+        )
+        out.append(("resolver_ripple", axis, _terms(*RESOLVER_RIPPLE, NO_WAVE)))
     return out
 
 
