@@ -8,8 +8,8 @@ import pytest
 from axisight import Effect, diagnose
 from axisight.fitting import Weighting
 from axisight.gap.closed_loop import TRACKING_SPEED, records_of
-from axisight.gap.coarse import encoder_steps
 from axisight.gap.decay import slowest_decay_1_s
+from axisight.gap.encoder_steps import encoder_steps
 from gap_data import PLAN, bare_axis, logs_of, scattered
 
 STEP = 1e-3

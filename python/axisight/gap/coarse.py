@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.effects.stated import STEPS
-from axisight.gap.encoder_steps import OF_A_STEP, encoder_steps
+from axisight.gap.encoder_steps import OF_A_STEP
 from axisight.gap.howfar import Stage, Stages, gap_reduction
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Interval
@@ -34,6 +34,7 @@ _SURE = 0.99
 
 def with_coarse_encoders(
     conclusion: Conclusion,
+    steps: Array,
     view: View,
     logs: Sequence[Log],
     stages: Stages,
@@ -42,10 +43,10 @@ def with_coarse_encoders(
     """Return a conclusion with the steps of encoders among its causes, and what each explains of the gap.
 
     *Explained* by them instead of *none*. Where something is unknown, the floor tells nothing.
-    ``logs``: of validation, ``stages`` of them. Unchanged where nothing is made of steps.
+    ``steps`` (n_axes,): of positions [rad], where they exceed the sensor's noise. ``logs``: of validation,
+    ``stages`` of them. Unchanged where nothing is made of steps.
     """
-    steps = np.zeros(1) if conclusion.verdict == "unknown" else encoder_steps(view.robot, view.logs)
-    if not steps.any():
+    if conclusion.verdict == "unknown" or not steps.any():
         return conclusion, []
     quiet = measure(view.sensor_noises(logs, len(view.logs)))
     loud = np.mean(stages.floor.per_log(), axis=0) > _MOSTLY * np.mean(quiet.per_log(), axis=0)

@@ -481,13 +481,14 @@ def _assemble(
     share = bent_for(view.fitter, found)
     left = remainder_of(reach.judged, judged, reach.left, settings)
     removed = view.removed_there(found, held_logs) if conclusion.causes else None
-    stepped = encoder_steps(view.robot, view.logs) > 0
+    steps = encoder_steps(view.robot, view.logs)
     conclusion = carried_over(
-        conclusion, reach.judged, judged, names, settings, own, share, removed, stepped
+        conclusion, reach.judged, judged, names, settings, own, share, removed, steps > 0
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(
         conclusion,
+        steps,
         view,
         held_logs,
         reach.judged,

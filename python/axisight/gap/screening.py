@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -250,29 +250,24 @@ class Screen:
     def _scanned(self, option: FreeEffect, robot_values: Mapping[str, float]) -> Start:
         """Return it at the best value of its one number, for each of what starts have beside that."""
         name = option.free[0]
-        kinds = {frozenset((k, v) for k, v in s.items() if k != name) for s in option.starts}
-        found = (
-            self._along(option.at(dict(kind)), kind, robot_values)
-            for kind in sorted(kinds, key=sorted)
-        )
+        kinds: dict[frozenset[tuple[str, float]], list[float]] = {}
+        for start in option.starts:
+            beside = frozenset((k, v) for k, v in start.items() if k != name)
+            kinds.setdefault(beside, []).append(start[name])
+        found = (self._along(option.at(dict(k)), v, robot_values) for k, v in kinds.items())
         return max(found, key=lambda start: start.gain)
 
     def _along(
-        self,
-        option: FreeEffect,
-        kind: Set[tuple[str, float]],
-        robot_values: Mapping[str, float],
+        self, option: FreeEffect, begin: Sequence[float], robot_values: Mapping[str, float]
     ) -> Start:
-        """Return it at the best value of its one number, begun at those of its starts that are of a kind."""
+        """Return it at the best value of its one number, looked for among and between those to ``begin`` at."""
         name = option.free[0]
 
         def loss(value: float) -> float:
             found = self.bench.attempt(self.fitter.loss, option.at({name: value}), robot_values)
             return np.inf if found is None else found
 
-        values = sorted(
-            s[name] for s in option.starts if set(s.items()) - {(name, s[name])} == kind
-        )
+        values = sorted(begin)
         losses = [loss(v) for v in values]
         at = int(np.argmin(losses))
         least, value = losses[at], values[at]

@@ -1,4 +1,4 @@
-"""A cause that holds only with a bent simulator gives way to one that does as well without.
+"""A cause gives way to a rival: to one that bends the simulator less, or is likelier beside what came in since.
 
 Two effects may explain as much of an axis within what formulas differ by, and the simpler one leads: a
 heavier link for a load beside it. What it leaves is small against what it explains, not against
