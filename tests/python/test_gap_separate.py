@@ -1,5 +1,6 @@
 """The experiment that separates two causes: within what was seen, decisive, and honest where none is."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from axisight.gap.evidence import FreeEffect
 from axisight.gap.layout import layout_of
 from axisight.gap.separate.design import designed
 from axisight.gap.separate.experiment import Experiment
+from axisight.gap.separate.question import Seen
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
 from axisight.logs import lowpass
@@ -57,7 +59,9 @@ def rivals(view: ClosedLoopView, one: Effect, other: Effect) -> Rivals:
     bare = view.fitter.fit([])
     samples = layout_of(bare).samples()
     to_explain = np.maximum(layout_of(bare).by_axis(bare.loss) / samples - view.floor.expected, 0.0)
-    return Rivals((one.label, other.label), models, samples, to_explain)
+    return Rivals(
+        (one.label, other.label), models, samples, to_explain, view.settings.smallest_gain
+    )
 
 
 def separating_of(view: ClosedLoopView, both: Rivals) -> Experiment:
@@ -99,6 +103,25 @@ def test_a_cause_is_not_told_from_itself(view: ClosedLoopView):
     made = separating_of(view, rivals(view, FRICTION, FRICTION))
     assert made.log_ratio < 1e-3
     assert not made.decides
+
+
+def test_runs_that_hardly_show_the_cause_count_for_less(view: ClosedLoopView):
+    """As many runs as samples of the logs, half of all: 0.4 above the noise there are 0.2 in the whole, 4 times
+    what a cause needs; 0.05 are a quarter of twice that."""
+    both = rivals(view, FRICTION, OFFSET)
+    n = float(both.samples[0])
+
+    def worth(there: float) -> float:
+        # The other leaves half of it: the log-ratio is the same whatever the size.
+        return both.worth([Seen(np.array([0.5 * there]), np.array([there]), n)] * 2)
+
+    shares = (0.4, 0.05)
+    full, little = (worth(s) for s in shares)
+    bare = replace(both, least=0.0)
+    with np.errstate(divide="ignore"):
+        whole = [bare.worth([Seen(np.array([0.5 * s]), np.array([s]), n)] * 2) for s in shares]
+    assert full == pytest.approx(whole[0])
+    assert little == pytest.approx(0.25 * whole[1])
 
 
 def test_what_no_motion_tells_is_said(view: ClosedLoopView):

@@ -125,6 +125,11 @@ def test_one_parameter_at_the_edge_decides_between_what_could_not_be_told_apart(
     model = Model([MASS], 300.0, 0.1, first=1)
     found = straightened(Fitter({("payload",): (total, off)}), model, [(first, (entered,))])
     assert (found is not None) is swapped
+    if found is not None:
+        # What it takes the place of is its rival still: neither was clear.
+        odds = [(r.trial.label, r.probability) for r in found[2][1].ranked]
+        assert odds == [("payload", 0.7), ("link_mass@3", probability)]
+        assert found[2][0] is found[2][1].best
 
 
 def test_bent_is_a_share_of_parameters_three_tolerances_off():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import (
+    FORMULA_ERROR,
     Ranked,
     Standing,
     Trial,
@@ -204,7 +205,8 @@ def _rival_leads(
 ) -> bool:
     """Whether a rival of what leads a standing, of the same axis, surely leads another one.
 
-    By more than what the formula of the first may leave there, and rather than nothing or something unknown.
+    By more than what the formulas of the first and of the causes before it may leave there, and rather than
+    nothing or something unknown.
     """
     first, rival = led.best.trial, other.best.trial
     mine = first.candidate.effect.axis
@@ -216,6 +218,7 @@ def _rival_leads(
         return False
     more = fall[place[rival.label], other.axis] - fall[place[first.label], other.axis]
     formula = settings.model_error**2 * float(fall[place[first.label]].sum())
+    formula += FORMULA_ERROR * float(state.removed()[other.axis])
     sure = state.layout.significance(first.held_out, rival.held_out, other.axis)
     return bool(more > formula and sure > settings.significance)
 

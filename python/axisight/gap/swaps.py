@@ -8,6 +8,7 @@ noise, and the simulator's own parameters are bent to it as far as they go.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +59,24 @@ def straightened(
             other = in_its_place(fitter, model, cause, rival[0])
             least = share * model.total if best is None else best[0].total
             if other is not None and other.total < least and bent(fitter, other) < most:
-                best = other, cause, rival
+                best = other, cause, _beside(cause, rival[0], standings) if hardly else rival
     return best
+
+
+def _beside(cause: Ranked, rival: Ranked, standings: Sequence[Standing]) -> Found:
+    """Return a rival before the cause that it takes the place of, which stays its own rival.
+
+    Neither was clear as the cause entered, and neither is now: each has the other's probability.
+    """
+    label, its = cause.trial.label, rival.trial.label
+    led = (s for s in standings if s.best.trial.label == label)
+    entered = next(s for s in led if any(r.trial.label == its for r in s.inseparable()))
+    first, second = entered.best, next(r for r in entered.ranked if r.trial.label == its)
+    winner = replace(second, probability=first.probability)
+    loser = replace(first, probability=second.probability)
+    others = [r for r in entered.ranked if r.trial.label not in {label, its}]
+    behind = sorted([loser, *others], key=lambda r: -r.probability)
+    return winner, replace(entered, ranked=(winner, *behind))
 
 
 def nearly_as_good(model: Evidence, cause: Ranked, entered: Standing) -> list[Ranked]:

@@ -172,11 +172,15 @@ def _strongest(found: Search) -> Standing | None:
     """Return how candidates stood where the first cause was taken in, by what other axes say, too.
 
     Without a cause, where there was most to explain. What was taken in there and given up later is no
-    candidate any more.
+    candidate any more, but beside what it gave way to where that left it open.
     """
     first = found.rounds[0]
     if first.accepted:
-        standing, kept = first.accepted[0][1], {r.trial.label for r, _ in found.accepted}
+        (cause, standing), kept = first.accepted[0], {r.trial.label for r, _ in found.accepted}
+        if cause.trial.label not in kept:
+            rivals = ((s, {r.trial.label for r in s.ranked}) for _, s in found.accepted)
+            after = next((s for s, labels in rivals if cause.trial.label in labels), None)
+            standing, kept = after or standing, {*kept, *((cause.trial.label,) if after else ())}
         taken = {r.trial.label for x in found.rounds for r, _ in x.accepted}
         for label in taken - kept:
             standing = standing.without(label)

@@ -53,7 +53,11 @@ class Asked:
         if not isinstance(view, ClosedLoopView):
             return self._no_experiment("by inverse dynamics there is no loop to run")
         question: Question | str | None
-        question = rivals_of(found) if self.to_show is None else sought(found, view, self.to_show)
+        question = (
+            rivals_of(found, view.settings)
+            if self.to_show is None
+            else sought(found, view, self.to_show)
+        )
         if question is None or isinstance(question, str):
             return self._no_experiment(question or "")
         return designed(view, question, seen_range(view.logs, self.within))

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from axisight.gap.decide import log_ratio
 from axisight.gap.evidence import Evidence
-from axisight.gap.separate.experiment import ENOUGH, Plan, SeparatingExperiment
+from axisight.gap.separate.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
 from axisight.gap.separate.question import Seen, Turn
+from axisight.gap.settings import Settings
 from axisight.gap.state import Search
 
 Array = NDArray[np.float64]
@@ -26,15 +27,17 @@ class Rivals:
 
     Each in turn is the machine: its simulated run along a motion is fitted by the other. What that leaves
     is the log-likelihood ratio to expect once the run is among the logs, by the rules of a diagnosis. The
-    motion counts for the worse of the two.
+    motion counts for the worse of the two, and for less where it hardly shows that there is a cause.
     ``labels``: of these, ``effect@axis``. Of the logs, by axis: ``samples`` (n_axes,) and what there
     was ``to_explain`` (n_axes,), as a mean square of the weighted residual above the noise.
+    ``least``: of that, below which nothing is a cause.
     """
 
     labels: tuple[str, str]
     models: tuple[Evidence, Evidence]
     samples: Array
     to_explain: Array
+    least: float
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -61,7 +64,10 @@ class Rivals:
             samples = np.stack([self.samples, new], -1)
             explained = np.stack([self.to_explain, one.there], -1)
             left = np.stack([np.zeros_like(one.left), one.left], -1)
-            ratios.append(float(log_ratio(left, explained, samples).max()))
+            ratio = log_ratio(left, explained, samples)
+            # Beside the new runs the old ones weigh otherwise: what they show now may not show then.
+            shown = one.there * new / samples.sum(-1)
+            ratios.append(float((ratio * np.minimum(1.0, shown / (NAMED * self.least))).max()))
         return min(ratios)
 
     def answered(self, plan: Plan, worth: float) -> SeparatingExperiment:
@@ -73,7 +79,7 @@ def _turn(machine: Evidence, other: Evidence) -> Turn:
     return Turn(machine, other, other.free, other.free[:-1])
 
 
-def rivals_of(found: Search) -> Rivals | None:
+def rivals_of(found: Search, settings: Settings) -> Rivals | None:
     """Return the two causes of a search that are most nearly as likely; None where all is clear.
 
     Of every cause, the likeliest rival that is no cause itself, at least one in twenty.
@@ -94,4 +100,5 @@ def rivals_of(found: Search) -> Rivals | None:
         (first.evidence, other.evidence),
         samples,
         np.maximum(found.to_explain(), 0.0) / samples,
+        settings.smallest_gain,
     )
