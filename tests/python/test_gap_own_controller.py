@@ -144,6 +144,32 @@ def test_positions_read_late_are_no_filter():
     assert other_controllers(bare_axis(), late) == ()
 
 
+@pytest.mark.parametrize(("damping", "order"), [(np.sqrt(0.5), "second"), (1.0, "first")])
+def test_a_filter_of_the_second_order_is_told_by_its_lag(damping: float, order: str):
+    """Written out as two states whose steps use what was just computed: they lag slow motion a sample less.
+
+    Two of the first order in a row are all but one of the first, as far as these logs tell.
+    """
+    lag = 3e-3
+    out = []
+    for log in logs_of(scattered(bare_axis(), 4), [], PLAN | HELD):
+        time, measured = log.sample_time_s, log.position_rad[:, 0]
+        speed = np.diff(measured, prepend=measured[:1]) / time
+        corner, passed, rate, filtered = 2 * damping / lag, 0.0, 0.0, []
+        for wanted in speed:
+            rate += time * (corner**2 * (wanted - passed) - 2 * damping * corner * rate)
+            passed += time * rate
+            filtered.append(passed)
+        (gain,) = bare_axis().controller_gains["kp"]
+        torque = log.torque_nm + gain * (speed - filtered)[:, None]
+        out.append(replace(log, torque_nm=torque))
+    (cause,) = other_controllers(bare_axis(), out)
+    assert cause.name == "velocity_filter"
+    value = cause.values["time_constant_s"]
+    assert value.value == pytest.approx(lag - bare_axis().sample_time_s, rel=0.02)
+    assert ("second order" in cause.says) is (order == "second")
+
+
 def test_where_a_log_begins_commands_may_follow_from_what_it_does_not_hold():
     """Gains 4 % off, and a first speed that the controller knew of: in the log there is none."""
     off = {"relative_proportional": -0.04, "relative_integral": -0.04}

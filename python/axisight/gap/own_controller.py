@@ -38,6 +38,9 @@ _BEGUN = 5
 # Lags of a filter that are looked for [s], and how many before the search is refined.
 _LAGS_S = (1e-4, 0.05)
 _STEPS = 12
+# Damping of the filters that are tried: of the first order, Butterworth's, and two of the first in a row. What the
+# simulator has is of the first order; slow motion is told the lag alone.
+_FILTERS = (0.0, float(np.sqrt(0.5)), 1.0)
 # A gain this near the stated one is that; intervals are at least half as wide: filters are written
 # in several ways, of which a lag knows less.
 _SAME = 0.008
@@ -64,13 +67,13 @@ class _Piece:
         self._kept[: _BEGUN * period] = False
         self.torque = self._seen(torque)
 
-    def shares(self, lag_s: float = 0.0, late: int = 0) -> Array:
+    def shares(self, lag_s: float = 0.0, late: int = 0, damping: float = 0.0) -> Array:
         """Return what the proportional and the integral gain ask for (n, 2) [Nm].
 
-        ``lag_s``: of a filter on the speed; ``late``: samples by which positions are read late.
+        ``lag_s``: of a filter on the speed, of the second order with a ``damping``; ``late``: samples by which
+        positions are read late.
         """
-        keep = lag_s / (lag_s + self._time)
-        speed = np.asarray(scipy.signal.lfilter([1 - keep], [1, -keep], self._speed))
+        speed = _filtered(self._speed, lag_s, damping, self._time)
         error, angle = self._reference - speed, self._angle
         if late:
             error = self._reference - _later(speed, late)
@@ -90,6 +93,18 @@ class _Piece:
         return np.asarray(low - low.mean()) if len(low) else low
 
 
+def _filtered(speed: Array, lag_s: float, damping: float, time_s: float) -> Array:
+    """Return a speed through a low-pass that lags slow motion by ``lag_s``; without damping of the first order."""
+    if not damping or not lag_s:
+        keep = lag_s / (lag_s + time_s)
+        return np.asarray(scipy.signal.lfilter([1 - keep], [1, -keep], speed))
+    corner = 2 * damping / lag_s
+    poles = [1.0, 2 * damping * corner, corner**2]
+    return np.asarray(
+        scipy.signal.lfilter(*scipy.signal.bilinear(poles[2:], poles, 1 / time_s), speed)
+    )
+
+
 def _later(x: Array, samples: int) -> Array:
     return np.concatenate([np.full(samples, x[0]), x[:-samples]])
 
@@ -98,14 +113,15 @@ def _later(x: Array, samples: int) -> Array:
 class _Law:
     """A controller and the squares (n_logs,) that it leaves of the torque in every log.
 
-    ``factors``: of the two gains; ``lag_s``: of the filter; ``forward``: torque for the rate of the
-    reference and for the reference.
+    ``factors``: of the two gains; ``lag_s``: of the filter, of the second order with a ``damping``;
+    ``forward``: torque for the rate of the reference and for the reference.
     """
 
     factors: Array
     lag_s: float
     left: Array
     forward: Array
+    damping: float = 0.0
 
     @property
     def total(self) -> float:
@@ -168,21 +184,26 @@ def _of_axis(axis: int, stated: _Law, pieces: Sequence[_Piece]) -> list[ShownCau
 def _others(pieces: Sequence[_Piece]) -> Iterator[_Law]:
     """Yield other controllers than the stated one, the simplest first."""
     yield _law(pieces, _factors(pieces, 0.0), 0.0)
-    lag = _best_lag(pieces, lambda _lag: np.ones(2))
-    yield _law(pieces, np.ones(2), lag)
+    for damping in _FILTERS:
+        lag = _best_lag(pieces, lambda _lag: np.ones(2), damping)
+        yield _law(pieces, np.ones(2), lag, damping=damping)
     lag = _best_lag(pieces, lambda lag: _factors(pieces, lag))
     yield _law(pieces, _factors(pieces, lag), lag)
     yield _law(pieces, np.ones(2), 0.0, _fed_forward(pieces))
 
 
 def _law(
-    pieces: Sequence[_Piece], factors: Array, lag_s: float, forward: Array | None = None
+    pieces: Sequence[_Piece],
+    factors: Array,
+    lag_s: float,
+    forward: Array | None = None,
+    damping: float = 0.0,
 ) -> _Law:
-    errors = [p.torque - p.shares(lag_s) @ factors for p in pieces]
+    errors = [p.torque - p.shares(lag_s, damping=damping) @ factors for p in pieces]
     if forward is not None:
         errors = [e - p.forward() @ forward for e, p in zip(errors, pieces, strict=True)]
     left = np.array([float(e @ e) for e in errors])
-    return _Law(factors, lag_s, left, np.zeros(2) if forward is None else forward)
+    return _Law(factors, lag_s, left, np.zeros(2) if forward is None else forward, damping)
 
 
 def _fed_forward(pieces: Sequence[_Piece]) -> Array:
@@ -204,12 +225,14 @@ def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
     return out
 
 
-def _best_lag(pieces: Sequence[_Piece], factors: Callable[[float], Array]) -> float:
+def _best_lag(
+    pieces: Sequence[_Piece], factors: Callable[[float], Array], damping: float = 0.0
+) -> float:
     """Return the lag of a filter [s] that leaves least, the factors of the gains given by it."""
 
     def left(log_lag: float) -> float:
         lag = float(np.exp(log_lag))
-        return _law(pieces, factors(lag), lag).total
+        return _law(pieces, factors(lag), lag, damping=damping).total
 
     grid = np.linspace(np.log(_LAGS_S[0]), np.log(_LAGS_S[1]), _STEPS)
     at = int(np.argmin([left(x) for x in grid]))
@@ -265,8 +288,9 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
     if law.lag_s:
         lag = law.lag_s
         value = {SPEED_FILTER[1]: Interval(lag, lag * (1 - _OF_A_LAG), lag * (1 + _OF_A_LAG))}
+        order = " of the second order that lags it by" if law.damping else " of"
         says = (
-            f"Axis {axis + 1}: with the measured speed through a low-pass of {1e3 * lag:.3g} ms the stated "
+            f"Axis {axis + 1}: with the measured speed through a low-pass{order} {1e3 * lag:.3g} ms the stated "
             f"controller misses {100 * explained:.4g} % less of the logged torque."
         )
         out.append(ShownCause(SPEED_FILTER[0], axis + 1, value, samples, explained, says))

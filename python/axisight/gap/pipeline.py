@@ -56,6 +56,7 @@ from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.settings import Settings
 from axisight.gap.signals import signals_of
 from axisight.gap.slipping import with_bristles_followed
+from axisight.gap.speed_loop import as_speed_loop
 from axisight.gap.state import Search
 from axisight.gap.stated_scatter import with_scatter_taken
 from axisight.gap.straight import bent_for
@@ -287,6 +288,7 @@ def behind_gate(
         )
     begun = from_rest(robot, read.estimation, read.validation, simulated, despite)
     logs, n = [*begun.estimation, *begun.validation], len(estimation)
+    robot = as_speed_loop(robot, logs)
     found, beside = (*slowed, *begun.findings), begun.simulated
     commanded = with_commands(robot, logs)
     if commanded is not None:

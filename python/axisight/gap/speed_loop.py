@@ -1,0 +1,73 @@
+"""A controller of positions whose logs hold its references of speed: the speed loop that it is.
+
+``u = kp (phi_ref - phi) + kd (w_ref - w)`` with ``phi_ref`` the sum of ``w_ref`` is a ``pi_velocity`` with the gain
+``kd`` of speed and ``kp`` of the sum. As such machine and simulator run under the same references, which
+tells of elastic gears what inverse dynamics does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import tomlkit
+
+from axisight.effects.stated import OTHER_GAINS
+from axisight.gap.feedback import before
+from axisight.gap.own_controller import other_controllers
+from axisight.logs import Log
+from axisight.robot import Robot
+
+# What such a law may have that no speed loop has.
+_MORE = ("gravity_compensation", "computed_torque", "continuous")
+# Of a motor's travel: targets that stray further from the sum of their rates are others.
+_SAME = 1e-6
+
+
+def as_speed_loop(robot: Robot, logs: Sequence[Log]) -> Robot:
+    """Return the robot with the speed loop that its ``pd_position`` is along logs of torques and speeds.
+
+    Or of torques alone, from which references may be recovered. As it is where a log has no torque, targets
+    without speeds or others than their sum; where gains are uncertain, or others than those stated
+    show, which are told by their names in the file.
+    """
+    if robot.controller_kind != "pd_position" or not _is_one(robot):
+        return robot
+    if not all(log.has_torque for log in logs):
+        return robot
+    if all(log.velocity_ref_rad_s is None and log.position_ref_rad is None for log in logs):
+        return _speed_loop(robot)
+    if not all(map(_told_by_speeds, logs)):
+        return robot
+    loop = _speed_loop(robot)
+    shown = other_controllers(loop, logs)
+    return robot if any(cause.name == OTHER_GAINS[0] for cause in shown) else loop
+
+
+def _is_one(robot: Robot) -> bool:
+    """Whether its law is one of samples, of the two gains alone, which are certain, and takes speeds."""
+    stated = tomlkit.parse(robot.toml).unwrap()["controller"]
+    more = any(stated.get(name) for name in _MORE) or robot.stepped is not None
+    return not more and robot.velocity_feedforward and not {"kp", "kd"} & robot.tolerances.keys()
+
+
+def _told_by_speeds(log: Log) -> bool:
+    speed, target = log.velocity_ref_rad_s, log.position_ref_rad
+    if speed is None:
+        return False
+    if target is None:
+        return True
+    off = target - np.stack([before(w) for w in speed.T], axis=1) * log.sample_time_s
+    return bool(np.all(np.ptp(off, axis=0) <= _SAME * np.maximum(np.ptp(target, axis=0), 1.0)))
+
+
+def _speed_loop(robot: Robot) -> Robot:
+    document = tomlkit.parse(robot.toml)
+    gains = robot.controller_gains
+    controller = {"kind": "pi_velocity", "kp": gains["kd"], "ki": gains["kp"]}
+    document["controller"] = {
+        k: v if k == "kind" else list(map(float, v)) for k, v in controller.items()
+    }
+    loop = Robot.from_toml(tomlkit.dumps(document))
+    loop = loop.with_parameters(robot.parameters()).with_effects(robot.effects)
+    return loop.with_torque_constants(robot.torque_constants)
