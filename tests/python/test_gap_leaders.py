@@ -123,6 +123,42 @@ def test_what_leads_where_candidates_wait_is_not_refined():
     assert Trials._worth_refining(field, [], {0}, even_felt=True) == [base.trial]
 
 
+@pytest.mark.parametrize(
+    ("effect", "promise", "waits"),
+    [(LOAD, 80.0, False), (LOAD, 40.0, True), (MASS, 80.0, True), (MASS, 95.0, False)],
+)
+def test_what_a_cause_elsewhere_explains_waits_unless_it_promises_as_much(
+    monkeypatch: pytest.MonkeyPatch, effect: Effect, promise: float, waits: bool
+):
+    """Of a load one step knows the mass alone: it is tried where it promises half as much as a link."""
+
+    def start(effect: Effect, gain: float):
+        return SimpleNamespace(option=SimpleNamespace(effect=effect), gain=gain)
+
+    link = start(Effect("link_com", 6), 100.0)
+    one = start(effect, promise)
+    fitted: list[SimpleNamespace] = []
+
+    def fit(_pool, starts):
+        fitted.extend(starts)
+        return [SimpleNamespace(candidate=SimpleNamespace(effect=x.option.effect)) for x in starts]
+
+    # The link explains all of what is left on the axis where the other one is tried.
+    monkeypatch.setattr(trials, "falls", lambda *_: np.full((1, 6), 10.0))
+    field = SimpleNamespace(
+        layout=SimpleNamespace(by_axis=lambda x: x, n_axes=6),
+        current=np.full(6, 10.0),
+        floor=np.zeros(6),
+        waiting=[],
+        progress=lambda *_: None,
+        _turns=lambda _: [(6, [link]), (3, [one])],
+        _fitted=fit,
+    )
+    Trials._fitted_by_place(field, None, [link, one], "")
+    assert fitted == ([link] if waits else [link, one])
+    assert field.waiting == ([one] if waits else [])
+
+
 LEFT = {"none": [40.0, 60.0], "leader": [10.0, 2.0], "behind": [30.0, 40.0], "near": [30.0, 20.0]}
 
 

@@ -50,6 +50,8 @@ _ROUGHLY = 0.3
 # Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
 # the one found before its shadow on another axis.
 _AS_MUCH = 0.9
+# The same for an effect of the whole arm: of a load one step knows the mass alone, not where it is.
+_HALF_AS_MUCH = 0.5
 # Leaders of an axis that are refined.
 _REFINED = 2
 # So many are refined at once, whatever the number of threads: what they show decides on the next.
@@ -113,6 +115,11 @@ def _renewed(fitter: ModelFitter, found: Evidence, max_iterations: int) -> Evide
 def _has_settled(found: Evidence) -> bool:
     """Whether steps of a fit bring no more."""
     return found.converged or found.stuck or linear_gain(found) < SETTLED * found.total
+
+
+def _as_much(start: Start) -> float:
+    """Return the share of the best promise from which a candidate is tried at once."""
+    return _HALF_AS_MUCH if start.option.effect.axis is None else _AS_MUCH
 
 
 def _taken_away(found: Evidence, model: Evidence, axis: int) -> float:
@@ -336,9 +343,9 @@ class Trials:
                 explained = falls(found, self.current, self.layout)[:, axis - 1] / left[axis - 1]
                 felt = found[int(np.argmax(explained))].candidate.effect.axis
                 if explained.max() > _FELT:
-                    bar = _AS_MUCH * (most.max() if felt is None else most[felt - 1])
-                    now = [s for s in here if s.gain > bar]
-                    self.waiting += [s for s in here if s.gain <= bar]
+                    bar = most.max() if felt is None else most[felt - 1]
+                    now = [s for s in here if s.gain > _as_much(s) * bar]
+                    self.waiting += [s for s in here if all(s is not n for n in now)]
             self.progress(label, done, len(chosen))
             found += self._fitted(pool, now)
             done += len(here)
