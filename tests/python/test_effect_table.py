@@ -79,6 +79,7 @@ def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
         "graybox/robot_values.py": {"torque_offset", "backlash"},
         # A key of controllers that are told positions.
         "robot_file/reader.rs": {"gravity_compensation"},
+        "gap/speed_loop.py": {"gravity_compensation"},
         # A load that is mounted, as drive data state it.
         "cli/model_options.py": {"payload"},
     }

@@ -15,6 +15,7 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
+from axisight.gap.deflected import deflection_torque
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
@@ -61,7 +62,8 @@ class InverseView(View):
         self._sample_time_s = logs[0].sample_time_s
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
         floor = inverse_floor(logs, self.noise, settings)
-        motions = [self.filtering(log) for log in logs]
+        self._robot = robot
+        motions = [self._as_rigid(log) for log in logs]
         self._dry_friction_nm = dry_friction_nm(motions, _without_effects(robot))
         fitter = InverseDynamicsFitter(
             robot,
@@ -80,19 +82,29 @@ class InverseView(View):
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
 
+    def _as_rigid(self, log: Log) -> Motion:
+        """Return the motion of a log, and its torque as rigid gears would have it."""
+        position, velocity, acceleration, torque = at = self.filtering(log)
+        bent = deflection_torque(self._robot, at, log.sample_time_s)
+        return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
+
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque."""
         return self._low_passed(log.torque_nm)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the predicted torque of every log, low-passed as the measured one."""
-        moved = (self.filtering(x) for x in logs)
-        return [self._low_passed(predicted_torque(self.robot, variant, at)) for at in moved]
+        return [self._low_passed(self._predicted(variant, log)) for log in logs]
+
+    def _predicted(self, variant: Variant, log: Log) -> Array:
+        at = self.filtering(log)
+        bent = deflection_torque(self._robot, at, log.sample_time_s)
+        return predicted_torque(self.robot, variant, at) + bent
 
     def taken_off(self, log: Log, off_nm: Array) -> Array:
         """Return what the torque of a log is off the predicted one (n, n_axes) [Nm], as others are low-passed later."""
         del off_nm
-        return log.torque_nm - predicted_torque(self.robot, AS_GIVEN, self.filtering(log))
+        return log.torque_nm - self._predicted(AS_GIVEN, log)
 
     def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
         """Return how far the motions of others are off those of logs (n_axes,) [1].
