@@ -1,13 +1,16 @@
 """From what a search found to a verdict."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from axisight import Settings
+from axisight import Effect, Settings
+from axisight.gap.decide import Ranked, Standing
 from axisight.gap.layout import layout_of
 from axisight.gap.score import held_out_loss
 from axisight.gap.state import Round, Search
-from axisight.gap.verdict import conclude
+from axisight.gap.verdict import _strongest, conclude
 from gap_data import linear_evidence
 
 NOISE = 0.3
@@ -29,3 +32,35 @@ def test_what_one_log_alone_tells_of_a_parameter_lacks_nothing(missing: float, v
     assert (held_out_loss(evidence) - floor).sum() > 2.0 * evidence.samples.sum()
     found = Search(evidence, evidence, floor, layout, rounds=[Round((), (), np.zeros(1))])
     assert conclude(found, Settings(), stands_out=False).verdict == verdict
+
+
+def ranked(label: str, probability: float, *beside: str) -> Ranked:
+    """A candidate with what its model has beside it."""
+    one, *others = (Effect(x[:-2], int(x[-1])) for x in (label, *beside))
+    free = [SimpleNamespace(effect=e) for e in (*others, one)]
+    trial = SimpleNamespace(label=label, candidate=free[-1], evidence=SimpleNamespace(free=free))
+    return Ranked(trial, 1.0, 1.0, 9.0, probability)
+
+
+@pytest.mark.parametrize(("beside", "open_still"), [((), True), (("torque_offset@1",), False)])
+def test_what_gave_way_stays_an_alternative_of_what_took_its_place(
+    beside: tuple[str, ...], open_still: bool
+):
+    """And of nothing else: what came in beside it and made it needless has no rival in it."""
+    offset, friction = ranked("torque_offset@1", 0.5), ranked("coulomb_friction@1", 0.4)
+    first = Standing(0, (offset, friction), 0.0, 0.1)
+    winner, loser = (
+        ranked("coulomb_friction@1", 0.5, *beside),
+        ranked("torque_offset@1", 0.4),
+    )
+    later = Standing(0, (winner, loser), 0.0, 0.1)
+    rounds = [
+        Round((first,), ((offset, first),), np.zeros(1)),
+        Round((later,), ((winner, later),), np.zeros(1)),
+    ]
+    found = SimpleNamespace(rounds=rounds, accepted=[(winner, later)])
+    standing = _strongest(found)
+    assert standing is not None
+    labels = [r.trial.label for r in standing.ranked]
+    assert ("torque_offset@1" in labels) is open_still
+    assert labels[0] == "coulomb_friction@1"

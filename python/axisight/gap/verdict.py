@@ -175,18 +175,29 @@ def _strongest(found: Search) -> Standing | None:
     candidate any more, but beside what it gave way to where that left it open.
     """
     first = found.rounds[0]
-    if first.accepted:
-        (cause, standing), kept = first.accepted[0], {r.trial.label for r, _ in found.accepted}
-        if cause.trial.label not in kept:
-            rivals = ((s, {r.trial.label for r in s.ranked}) for _, s in found.accepted)
-            after = next((s for s, labels in rivals if cause.trial.label in labels), None)
-            standing, kept = after or standing, {*kept, *((cause.trial.label,) if after else ())}
-        taken = {r.trial.label for x in found.rounds for r, _ in x.accepted}
-        for label in taken - kept:
-            standing = standing.without(label)
-        return standing
-    left = found.to_explain() / found.layout.samples()
-    return max(first.standings, key=lambda s: float(left[s.axis]), default=None)
+    if not first.accepted:
+        left = found.to_explain() / found.layout.samples()
+        return max(first.standings, key=lambda s: float(left[s.axis]), default=None)
+    cause, standing = first.accepted[0]
+    taken = {r.trial.label for x in found.rounds for r, _ in x.accepted}
+    gone = taken - {r.trial.label for r, _ in found.accepted}
+    if cause.trial.label in gone:
+        after = _gave_way(cause, standing.axis, found)
+        standing, gone = (standing, gone) if after is None else (after, gone - {cause.trial.label})
+    for label in gone:
+        standing = standing.without(label)
+    return standing
+
+
+def _gave_way(cause: Ranked, axis: int, found: Search) -> Standing | None:
+    """Return how a cause stands beside what took its place later; None where that left nothing open."""
+    label = cause.trial.label
+    for winner, standing in found.accepted:
+        beside = {f.effect.label for f in winner.trial.evidence.free}
+        ranked = {r.trial.label for r in standing.ranked}
+        if standing.axis == axis and label in ranked and label not in beside:
+            return standing
+    return None
 
 
 def _open(winner: Ranked, standing: Standing, accepted: set[str]) -> tuple[str, ...]:
