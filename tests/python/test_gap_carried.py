@@ -66,7 +66,11 @@ def test_causes_that_explain_the_validation_logs_stand():
 
 @pytest.mark.parametrize(
     ("after", "words"),
-    [(0.6, "does not carry over"), (0.45, "does not carry over"), (0.35, "leaves too much")],
+    [
+        (0.6, "does not carry over"),
+        (0.45, "does not carry over"),
+        (0.35, "(Coulomb friction on axis 1) leaves too much"),
+    ],
 )
 def test_causes_that_leave_the_gap_are_withdrawn(after: float, words: str):
     found = judged(named(), stages(0.5, after))

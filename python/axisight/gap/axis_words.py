@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from axisight.effects import phrase
+
 # Names that say no more than the number of the axis.
 _PLAIN = re.compile(r"(?:axis|joint|j|a|q)?[ _-]?0*(\d+)", re.IGNORECASE)
 # "axis 2", "axes 2 and 3"; more than so many are not told by name, a table has them.
@@ -28,6 +30,12 @@ def axis_label(axis: int, names: Sequence[str]) -> str:
     """Return ``3 (elbow_joint)``, or ``3`` where the joint has no name of its own."""
     name = own_name(axis, names)
     return f"{axis} ({name})" if name else str(axis)
+
+
+def placed(label: str) -> str:
+    """Return a candidate ``effect@axis`` in words."""
+    effect, _, axis = label.partition("@")
+    return f"{phrase(effect)} on axis {axis}" if axis else phrase(effect)
 
 
 def with_joints(text: str, names: Sequence[str]) -> str:

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.axis_words import placed
 from axisight.gap.by_axis import OwnAxes
 from axisight.gap.compared import torque_of
 from axisight.gap.edge import BENT
-from axisight.gap.headline import percent
+from axisight.gap.headline import listed, percent
 from axisight.gap.howfar import Stage, Stages
 from axisight.gap.result import Gap
 from axisight.gap.settings import Settings
@@ -70,7 +71,8 @@ def carried_over(
     elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
     elif conclusion.causes:
-        withdrawn = _no_fall(stages, gap, names, settings, stepped) or _out_of_shape(bent)
+        labels = [cause.label for cause in conclusion.causes]
+        withdrawn = _no_fall(stages, gap, names, settings, stepped, labels) or _out_of_shape(bent)
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
     if withdrawn is None:
@@ -148,8 +150,9 @@ def _no_fall(
     names: Sequence[str],
     settings: Settings,
     stepped: NDArray[np.bool_] | None,
+    causes: Sequence[str],
 ) -> str | None:
-    """Say so where the causes remove too little of the gap."""
+    """Say so where the causes, by label, remove too little of the gap."""
     floor = _floor(stages, stepped)
     if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
         return (
@@ -166,7 +169,8 @@ def _no_fall(
         return None
     if share >= 0.5 * settings.explained_share:
         return (
-            f"What explains part of the gap leaves too much of it: on the validation logs it goes from "
+            f"What explains part of the gap ({listed([placed(c) for c in causes])}) leaves too much of it: on the "
+            f"validation logs it goes from "
             f"{percent(gap.before)} to {percent(gap.after)} of the {torque_of(gap.compared)}, "
             f"{percent(gap.floor)} would be noise. Something else is missing."
         )

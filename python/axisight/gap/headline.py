@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from axisight.effects import Effect, article, noun, phrase
+from axisight.effects import Effect, article, noun
 from axisight.effects.stated import STEPS
-from axisight.gap.axis_words import removed_by_refit, with_joints
+from axisight.gap.axis_words import placed, removed_by_refit, with_joints
 from axisight.gap.beyond import LARGEST
 from axisight.gap.compared import gap_of, torque_of
 from axisight.gap.result import Cause, Gap, Interval, Where
@@ -110,7 +110,7 @@ def _of_causes(
         f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
-        rivals = listed([_placed(label) for label in conclusion.equivalent[0]])
+        rivals = listed([placed(label) for label in conclusion.equivalent[0]])
         return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
     return f"The simulator lacks {missing}: {shrinks}"
 
@@ -146,12 +146,6 @@ def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) 
             for (start, head, where), adjectives in phrases.items()
         ]
     )
-
-
-def _placed(label: str) -> str:
-    """Return a candidate ``effect@axis`` in words."""
-    effect, _, axis = label.partition("@")
-    return f"{phrase(effect)} on axis {axis}" if axis else phrase(effect)
 
 
 def _place(axes: Sequence[int], n_axes: int) -> str:

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 from axisight.effects import Effect
 from axisight.errors import InputError
+from axisight.gap.axis_words import placed
 from axisight.gap.closed_loop import ClosedLoopView
 from axisight.gap.result import Diagnosis
 from axisight.gap.separate.design import designed
-from axisight.gap.separate.experiment import Experiment, placed
+from axisight.gap.separate.experiment import Experiment
 from axisight.gap.separate.question import Question
 from axisight.gap.separate.rivals import rivals_of
 from axisight.gap.separate.sought import sought

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from axisight.effects import Effect, phrase
+from axisight.effects import Effect
 from axisight.excitation import References, write_references
+from axisight.gap.axis_words import placed
 from axisight.storage import write_whole
 
 # Log-likelihood ratio at which the wrong rival is less likely than one in twenty.
@@ -157,12 +158,6 @@ class ShowingExperiment(Experiment):
 def experiment_files(folder: Path | str) -> tuple[Path, Path]:
     """Return what `Experiment.write` writes into a folder: the references, and what they are for."""
     return Path(folder) / "references.parquet", Path(folder) / "experiment.txt"
-
-
-def placed(label: str) -> str:
-    """Return a label ``effect@axis`` in words."""
-    effect, _, axis = label.partition("@")
-    return f"{phrase(effect)} on axis {axis}" if axis else phrase(effect)
 
 
 def _begun_small(plan: Plan) -> str:
