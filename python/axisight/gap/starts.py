@@ -52,8 +52,9 @@ def _law(**shares: float) -> Callable[[Trial], FreeEffect]:
 
 _SMOOTHING = 0.003
 _STRIBECK = 0.1
-# Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load.
-_STRIBECK_STARTS = (0.003, 0.01, 0.03)
+# Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load; over more of that of
+# slow motions.
+_STRIBECK_STARTS = (0.003, 0.01, 0.03, 0.3)
 
 
 def _stribeck(trial: Trial) -> FreeEffect:
