@@ -62,8 +62,7 @@ class InverseView(View):
         self._sample_time_s = logs[0].sample_time_s
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
         floor = inverse_floor(logs, self.noise, settings)
-        self._robot = robot
-        motions = [self._as_rigid(log) for log in logs]
+        motions = [self._as_rigid(robot, log) for log in logs]
         self._dry_friction_nm = dry_friction_nm(motions, _without_effects(robot))
         fitter = InverseDynamicsFitter(
             robot,
@@ -82,10 +81,10 @@ class InverseView(View):
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
 
-    def _as_rigid(self, log: Log) -> Motion:
+    def _as_rigid(self, robot: Robot, log: Log) -> Motion:
         """Return the motion of a log, and its torque as rigid gears would have it."""
         position, velocity, acceleration, torque = at = self.filtering(log)
-        bent = deflection_torque(self._robot, at, log.sample_time_s)
+        bent = deflection_torque(robot, at, log.sample_time_s)
         return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
 
     def measured(self, log: Log) -> Array:
@@ -98,7 +97,7 @@ class InverseView(View):
 
     def _predicted(self, variant: Variant, log: Log) -> Array:
         at = self.filtering(log)
-        bent = deflection_torque(self._robot, at, log.sample_time_s)
+        bent = deflection_torque(self.robot, at, log.sample_time_s)
         return predicted_torque(self.robot, variant, at) + bent
 
     def taken_off(self, log: Log, off_nm: Array) -> Array:

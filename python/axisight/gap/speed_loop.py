@@ -63,11 +63,8 @@ def _told_by_speeds(log: Log) -> bool:
 
 def _speed_loop(robot: Robot) -> Robot:
     document = tomlkit.parse(robot.toml)
-    gains = robot.controller_gains
-    controller = {"kind": "pi_velocity", "kp": gains["kd"], "ki": gains["kp"]}
-    document["controller"] = {
-        k: v if k == "kind" else list(map(float, v)) for k, v in controller.items()
-    }
+    gains = {name: list(map(float, each)) for name, each in robot.controller_gains.items()}
+    document["controller"] = {"kind": "pi_velocity", "kp": gains["kd"], "ki": gains["kp"]}
     loop = Robot.from_toml(tomlkit.dumps(document))
     loop = loop.with_parameters(robot.parameters()).with_effects(robot.effects)
     return loop.with_torque_constants(robot.torque_constants)

@@ -345,7 +345,7 @@ class Trials:
                 if explained.max() > _FELT:
                     bar = most.max() if felt is None else most[felt - 1]
                     now = [s for s in here if s.gain > _as_much(s) * bar]
-                    self.waiting += [s for s in here if all(s is not n for n in now)]
+                    self.waiting += [s for s in here if s.gain <= _as_much(s) * bar]
             self.progress(label, done, len(chosen))
             found += self._fitted(pool, now)
             done += len(here)
