@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from axisight import Diagnosis, Effect, Log, Robot, diagnose, load_robot, simulate
@@ -58,6 +60,31 @@ class Wave:
 
 
 @dataclass(frozen=True)
+class FadingTurns:
+    """A velocity reference [rad/s] to and fro, its acceleration [rad/s^2] falling with speed as Stribeck's excess.
+
+    ``acceleration`` at standstill; to twice ``speed``, over which it falls to 1/e. From rest, without chance: of
+    even seeds the other way.
+    """
+
+    acceleration: float
+    speed: float
+
+    def __call__(self, seed: int, step: float) -> Array:
+        """Return one of them, (n, 1)."""
+        time = np.arange(round(SECONDS / step)) * step
+        speed = np.linspace(0.0, 2.0, 2000)
+        # The time to a speed, of v' = a exp(-(v / v_s)^2).
+        since_rest = (
+            0.5 * np.sqrt(np.pi) * scipy.special.erfi(speed) * self.speed / self.acceleration
+        )
+        quarter = since_rest[-1]
+        to_and_fro = quarter * scipy.signal.sawtooth(0.5 * np.pi * (time / quarter + 1), 0.5)
+        size = self.speed * np.interp(np.abs(to_and_fro), since_rest, speed)
+        return ((-1.0) ** (seed + 1) * np.sign(to_and_fro) * size)[:, None]
+
+
+@dataclass(frozen=True)
 class Row:
     """What is withheld, and logs that hardly show it.
 
@@ -66,7 +93,7 @@ class Row:
     """
 
     withheld: Effect
-    wave: Wave
+    wave: Callable[[int, float], Array]
     noise_rad: float = FINE_RAD
     own_nm: float = 0.0
     shows: bool = False
@@ -120,6 +147,13 @@ ROWS = {
         LOAD_FRICTION, Wave(6.0, (0.5, 1.5), rises_s=1.5), 5e-5, own_nm=0.3
     ),
     "Stribeck, other friction": Row(STRIBECK, Wave(6.0, (0.5, 1.5), rises_s=1.5), 5e-5, own_nm=0.3),
+    # The gear carries what accelerates the arm: its load falls with speed as the excess does.
+    "Stribeck, load-dependent friction": Row(
+        STRIBECK.with_values({"excess_nm": 0.06, "stribeck_speed_rad_s": 14.0}),
+        FadingTurns(100.0, 14.0),
+        6e-4,
+        own_nm=0.3,
+    ),
     # In the gear's resonance either makes much the same third harmonic of a sine; noise of 10,000 steps in a turn.
     "cubic stiffness, backlash, one sine": Row(
         CUBIC.with_values({"cubic_nm_rad3": 5e8}),

@@ -70,6 +70,48 @@ def test_steps_are_named_beside_another_cause(logs):
     assert "adding Coulomb friction on axis 1 shrinks" in said.headline
 
 
+def in_motion(logs):
+    """Logs without references that begin in motion: no loop is known by which they could be simulated."""
+    return [
+        replace(
+            x,
+            velocity_ref_rad_s=None,
+            **{k: getattr(x, k)[1000:] for k in ("time_s", "torque_nm", "position_rad")},
+        )
+        for x in logs
+    ]
+
+
+def test_steps_that_the_predicted_torque_does_not_feel_are_named_and_make_none_of_the_gap(logs):
+    held = logs_of(scattered(bare_axis(), 4), [steps_of(STEP)], HELD)
+    said = diagnose(
+        robot=bare_axis(),
+        estimation=in_motion(logs),
+        validation=in_motion(held),
+    )
+    assert said.mode == "inverse_dynamics"
+    assert (said.verdict, [c.label for c in said.causes]) == (
+        "explained",
+        ["position_quantization@1"],
+    )
+    assert said.causes[0].gap_reduction.high == 0.0
+    assert "does not feel" in said.headline
+    assert any("none of this gap" in check for check in said.checks)
+
+
+def test_steps_about_as_fine_as_the_stated_noise_are_no_cause_by_themselves(logs):
+    std = bare_axis().position_noise_std
+    # Noise of steps, over the square root of twelve, of twice the sensor's: another sensor has three times.
+    fine = logs_of(scattered(bare_axis(), 4), [steps_of(2 * np.sqrt(12.0) * std)], PLAN | HELD)
+    said = diagnose(
+        robot=bare_axis(),
+        estimation=in_motion(fine[:-2]),
+        validation=in_motion(fine[-2:]),
+    )
+    assert encoder_steps(bare_axis(), fine) > 0
+    assert (said.verdict, said.causes) == ("none", ())
+
+
 def test_where_something_is_unknown_the_floor_tells_nothing_of_steps(logs):
     hand = [
         replace(x, torque_nm=x.torque_nm + 15 * np.sin(2 * np.pi * 3.3 * x.time_s)[:, None])

@@ -94,6 +94,13 @@ def _of_causes(
 ) -> str:
     steps = [c for c in causes if c.effect == STEPS[0]]
     missing = named(causes, own, len(gap.before_per_axis))
+    felt = any(c.gap_reduction.high > 0 for c in steps)
+    if causes and len(steps) == len(causes) and not felt:
+        return (
+            f"The simulator lacks {missing}, which a torque predicted from the measured motion does not feel: "
+            f"re-fitted, it leaves {percent(gap.refitted)} of the {torque_of(gap.compared)}, sensor noise "
+            f"alone {percent(gap.floor)}."
+        )
     if causes and len(steps) == len(causes):
         return (
             f"The simulator lacks {missing}: the steps of the encoders are the noise at which the "
@@ -107,7 +114,7 @@ def _of_causes(
     shrinks = (
         f"adding {added} shrinks the {gap_of(gap.compared)} on held-out data from {percent(gap.before)} to "
         f"{percent(gap.after)} of the {torque_of(gap.compared)} "
-        f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
+        f"(noise{' and steps' if felt else ''} alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
         rivals = listed([placed(label) for label in conclusion.equivalent[0]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,9 @@ _STEP = 1e-3
 class InverseView(View):
     """Torque predicted from the measured motion."""
 
+    feels_steps: ClassVar[bool] = False
+    """What a loop makes of them moves the machine, and is in the torque as in the motion; the rest is smoothed."""
+
     def __init__(
         self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
     ) -> None:
@@ -67,12 +71,7 @@ class InverseView(View):
         fitter = InverseDynamicsFitter(
             robot,
             motions,
-            certainties(
-                motions,
-                self._dry_friction_nm,
-                floor.weighting,
-                lambda x: self.filtering.spread(x, self._sample_time_s),
-            ),
+            self._certain(logs, motions, floor),
             floor.weighting,
             settings.tolerances_of(robot),
             block_s(logs, self.filtering.cutoff_hz, settings),
@@ -81,6 +80,18 @@ class InverseView(View):
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
 
+    def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
+        """Return how far every sample of the estimation logs can be predicted, zero where it does not count."""
+        found = certainties(
+            motions,
+            self._dry_friction_nm,
+            floor.weighting,
+            lambda x: self.filtering.spread(x, self._sample_time_s),
+        )
+        # What counts in part has a part of what padding makes: the fit leaves it out.
+        whole = [np.floor(self.filtering.counted(log))[:, None] for log in logs]
+        return [certain * counts for certain, counts in zip(found, whole, strict=True)]
+
     def _as_rigid(self, robot: Robot, log: Log) -> Motion:
         """Return the motion of a log, and its torque as rigid gears would have it."""
         position, velocity, acceleration, torque = at = self.filtering(log)
@@ -88,12 +99,12 @@ class InverseView(View):
         return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
 
     def measured(self, log: Log) -> Array:
-        """Return the low-passed torque."""
-        return self._low_passed(log.torque_nm)
+        """Return the low-passed torque, where it is compared."""
+        return self._compared(log, log.torque_nm)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return the predicted torque of every log, low-passed as the measured one."""
-        return [self._low_passed(self._predicted(variant, log)) for log in logs]
+        """Return the predicted torque of every log, low-passed as the measured one, where it is compared."""
+        return [self._compared(log, self._predicted(variant, log)) for log in logs]
 
     def _predicted(self, variant: Variant, log: Log) -> Array:
         at = self.filtering(log)
@@ -114,15 +125,19 @@ class InverseView(View):
         torques = [self.torques(AS_GIVEN, each) for each in (logs, others)]
         return np.maximum(_relative(speeds, theirs), _relative(*torques))
 
-    def _low_passed(self, torque_nm: Array) -> Array:
-        return self.filtering.compared(torque_nm, self._sample_time_s)
+    def _compared(self, log: Log, torque_nm: Array) -> Array:
+        low = self.filtering.compared(torque_nm, self._sample_time_s)
+        return self.filtering.counted(log)[:, None] * low
 
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
         """Return the error that noise of position and torque causes, for every log."""
         del variant
-        return [self.noise.error(log, run) for run, log in enumerate(logs, start=first_run)]
+        return [
+            self.filtering.counted(log)[:, None] * self.noise.error(log, run)
+            for run, log in enumerate(logs, start=first_run)
+        ]
 
     def left_open(self, logs: Sequence[Log]) -> list[Array]:
         """Return what dry friction leaves open where motors stand or turn round.
@@ -144,6 +159,12 @@ class InverseView(View):
             f"Torques, predicted and measured, and their noise are low-passed alike at "
             f"{self.filtering.cutoff_hz:.3g} Hz, {chosen}; the motion an octave above."
         ]
+        cut = [log.name for log in self.logs if self.filtering.counted(log).min() < 1]
+        if cut:
+            out.append(
+                f"{', '.join(cut)}: where a log begins or ends in motion, no low-pass knows the torque before "
+                f"or after it; 1.5 of its periods there count for nothing."
+            )
         axes = [str(axis) for axis, used in enumerate(self.filtering.measured, 1) if used]
         if axes:
             out.append(

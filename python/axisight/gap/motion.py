@@ -25,6 +25,12 @@ _BELOW_NYQUIST = 0.45
 _RINGS = 3.0
 # The low-pass of `axisight.logs.lowpass`: fourth order, forward and backward.
 _ORDER = 8
+# Of a log that begins or ends in motion, periods of the cutoff until what was before or after it is forgotten
+# to a hundredth, and the largest share of the log at either end.
+_FORGETS = 1.5
+_AT_MOST = 0.2
+# A log is at rest at an end where no axis moves by this share of the most that it does in a quarter of a period.
+_RESTS = 0.02
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,24 @@ class Filtering:
         """Return a torque (n, n_axes), predicted or measured, as it is compared."""
         return lowpass(torque_nm, sample_time_s, self.cutoff_hz)
 
+    def counted(self, log: Log) -> Array:
+        """Return what every sample of a compared torque counts for (n,), from 0 to 1.
+
+        A low-pass needs the torque before and after a log. At rest it goes on as it is; in motion nobody
+        knows it, and what the ends are padded with is no torque of a machine: such ends count for nothing,
+        and what is next to them for a part.
+        """
+        n, cutoff = log.n_samples, self.cutoff_hz * log.sample_time_s
+        away = min(round(_FORGETS / cutoff), int(_AT_MOST * n))
+        ramp = np.sin(0.5 * np.pi * np.clip(np.arange(n) / max(1, away) - 1.0, 0.0, 1.0)) ** 2
+        out = np.ones(n)
+        for end, moves in zip(
+            (slice(None), slice(None, None, -1)), _moves(log, cutoff), strict=True
+        ):
+            if moves:
+                out[end] *= ramp
+        return out
+
     def spread(self, size_nm: Array, sample_time_s: float) -> Array:
         """Return how large (n, n_axes) `compared` leaves a torque of that size and unknown sign at most."""
         reach = round(_RINGS / (self.cutoff_hz * sample_time_s))
@@ -66,6 +90,17 @@ class Filtering:
     def gain(self, frequency_hz: Array) -> Array:
         """Return the gain of `compared` (n_freq,)."""
         return np.asarray(1 / (1 + (frequency_hz / self.cutoff_hz) ** _ORDER))
+
+
+def _moves(log: Log, cutoff: float) -> tuple[bool, bool]:
+    """Return whether a log begins and whether it ends in motion; ``cutoff``: periods in a sample."""
+    length = max(2, min(round(0.25 / cutoff), log.n_samples // 2))
+    parts = [
+        np.ptp(log.position_rad[i : i + length], axis=0)
+        for i in (*range(0, log.n_samples - length, length), log.n_samples - length)
+    ]
+    least = _RESTS * np.max(parts, axis=0)
+    return bool(np.any(parts[0] > least)), bool(np.any(parts[-1] > least))
 
 
 def motion(

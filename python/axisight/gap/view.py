@@ -40,6 +40,8 @@ class View(ABC):
     by_targets: ClassVar[bool] = False
     """Whether positions are compared under the same targets, not torques."""
     compared: ClassVar[Compared] = "torques"
+    feels_steps: ClassVar[bool] = True
+    """Whether steps of measured positions make the torque that is compared another one."""
 
     mode: Mode
     robot: Robot
