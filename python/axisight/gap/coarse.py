@@ -56,35 +56,19 @@ def with_coarse_encoders(
     if view.feels_steps:
         quiet = measure(view.sensor_noises(logs, len(view.logs)))
         loud = np.mean(stages.floor.per_log(), axis=0) > _MOSTLY * np.mean(quiet.per_log(), axis=0)
-        shares = {i: _share(i, stages, quiet, view.settings) for i in np.flatnonzero(steps * loud)}
+        shares = {
+            i: _share(i, stages, quiet, view.settings)
+            for i in np.flatnonzero(steps * loud).tolist()
+        }
     else:
         other = steps > _OTHER_SENSOR * np.sqrt(12.0) * view.robot.position_noise_std
-        shares = {i: Interval(0.0, 0.0, 0.0) for i in np.flatnonzero(other)}
+        shares = {i: Interval(0.0, 0.0, 0.0) for i in np.flatnonzero(other).tolist()}
     if not shares:
         return conclusion, []
     does = _RAISES if view.feels_steps else _MAKES_NONE
-    named = _with_causes(conclusion, [_named(int(i), float(steps[i])) for i in shares])
-    checks = [_says(int(i), float(steps[i]), does) for i in shares]
+    named = conclusion.with_causes_behind([_named(i, float(steps[i])) for i in shares])
+    checks = [_says(i, float(steps[i]), does) for i in shares]
     return named.with_checks(checks), list(shares.values())
-
-
-def _with_causes(conclusion: Conclusion, steps: Sequence[NamedCause]) -> Conclusion:
-    """Return a conclusion with steps of encoders behind its other causes."""
-    place = {c.axis: len(conclusion.causes) + k for k, c in enumerate(steps)}
-    axes = tuple(
-        replace(
-            a,
-            verdict="explained" if a.verdict == "none" else a.verdict,
-            causes=(*a.causes, place[a.axis]),
-        )
-        if a.axis in place
-        else a
-        for a in conclusion.axes
-    )
-    out = replace(conclusion, causes=(*conclusion.causes, *steps), axes=axes)
-    if conclusion.verdict != "none":
-        return out
-    return replace(out, verdict="explained", p_none=0.0, p_unknown=1.0 - _SURE)
 
 
 def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Interval:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.errors import InputError
 from axisight.frf.errors import reference_to_input
 from axisight.logs import Log
 from axisight.logs.frozen import runs
@@ -38,6 +39,25 @@ def as_taken(log: Log) -> tuple[Array, Array]:
         last = log.run_up.position_rad[-1:] - log.position_rad[0]
     speed = np.diff(position, axis=0, prepend=last) / log.sample_time_s
     return position - ahead, np.asarray(speed)
+
+
+def told_of(robot: Robot, log: Log, axis: int) -> tuple[Array, Array, Array]:
+    """Return what a controller is told of an axis from 0: speed, angle, and the rate of its reference, (n,) each.
+
+    Speeds are zero where targets of positions come without any, or their rates are not taken; angles count from
+    the first. Raises InputError for a log without references.
+    """
+    rates, targets, time = log.velocity_ref_rad_s, log.position_ref_rad, log.sample_time_s
+    if rates is None and targets is None:
+        raise InputError(f"log {log.name!r}: expected references, got none")
+    if rates is not None and (targets is None or not robot.told_positions):
+        speed = rates[:, axis]
+        return speed, before(speed) * time, speed
+    assert targets is not None  # one of both is there
+    target = targets[:, axis] - targets[0, axis]
+    moved = np.diff(target, prepend=target[:1]) / time
+    fed = robot.velocity_feedforward and rates is not None
+    return rates[:, axis] if fed and rates is not None else np.zeros(len(moved)), target, moved
 
 
 def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) -> Array:

@@ -92,10 +92,11 @@ def _refitted(gap: Gap, axes: Sequence[int], refit: Mapping[str, Interval]) -> s
 def _of_causes(
     conclusion: Conclusion, gap: Gap, causes: Sequence[Cause], own: Sequence[Effect]
 ) -> str:
-    steps = [c for c in causes if c.effect == STEPS[0]]
     missing = named(causes, own, len(gap.before_per_axis))
-    felt = any(c.gap_reduction.high > 0 for c in steps)
-    if causes and len(steps) == len(causes) and not felt:
+    # What logs show by themselves, and torques predicted from the motion do not feel.
+    felt = [c for c in causes if c.gap_reduction.low < 0 or c.gap_reduction.high > 0]
+    steps = [c for c in felt if c.effect == STEPS[0]]
+    if causes and not felt:
         return (
             f"The simulator lacks {missing}, which a torque predicted from the measured motion does not feel: "
             f"re-fitted, it leaves {percent(gap.refitted)} of the {torque_of(gap.compared)}, sensor noise "
@@ -107,14 +108,14 @@ def _of_causes(
             f"{gap_of(gap.compared)} of {percent(gap.refitted)} of the {torque_of(gap.compared)} stands "
             f"(noise and steps: {percent(gap.floor)})."
         )
-    others = [c for c in causes if c not in steps]
+    others = [c for c in felt if c not in steps]
     added = "it" if len(others) == 1 else "them"
-    if steps:
+    if len(others) < len(causes):
         added = named(others, own, len(gap.before_per_axis))
     shrinks = (
         f"adding {added} shrinks the {gap_of(gap.compared)} on held-out data from {percent(gap.before)} to "
         f"{percent(gap.after)} of the {torque_of(gap.compared)} "
-        f"(noise{' and steps' if felt else ''} alone: {percent(gap.floor)})."
+        f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
     )
     if conclusion.verdict == "undecidable":
         rivals = listed([placed(label) for label in conclusion.equivalent[0]])

@@ -21,6 +21,7 @@ from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
 from axisight.gap.noise import Floor
+from axisight.gap.own_controller import other_controllers_of_targets
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.settings import Settings
 from axisight.gap.standstill import alike, certainty, dry_friction_nm, open_torque_nm, standing
@@ -79,6 +80,7 @@ class InverseView(View):
         super().__init__(
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
+        self.unfelt = other_controllers_of_targets(robot, logs)
 
     def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
         """Return how far every sample of the estimation logs can be predicted, zero where it does not count."""

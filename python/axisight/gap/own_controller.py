@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+import tomlkit
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.effects.stated import CLOCK, FEEDFORWARD, OTHER_GAINS, SPEED_FILTER
 from axisight.errors import InputError
-from axisight.gap.feedback import as_taken, before, free_of_limits, gain_shares
+from axisight.gap.feedback import as_taken, free_of_limits, gain_shares, told_of
 from axisight.gap.own_clock import drifting_clock
 from axisight.gap.result import Interval
 from axisight.gap.shown import ShownCause
@@ -46,26 +47,34 @@ _FILTERS = (0.0, float(np.sqrt(0.5)), 1.0)
 _SAME = 0.008
 _FORMULA = 0.004
 _OF_A_LAG = 0.1
+# By how much a sample time may be off and still be that of the controller.
+_SAME_CLOCK = 1e-3
 
 
 class _Piece:
     """Torque of an axis in one log, and what the gains of the file make of references and positions."""
 
     def __init__(self, robot: Robot, log: Log, axis: int) -> None:
-        reference, time = log.velocity_ref_rad_s, log.sample_time_s
-        assert reference is not None  # closed loop only
+        time = log.sample_time_s
         self._robot, self._axis, self._time = robot, axis, time
         self._band_hz = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
-        self._reference = reference[:, axis]
+        self._reference, wanted, self._moved = told_of(robot, log, axis)
         position, speed = (x[:, axis] for x in as_taken(log))
-        self._speed = speed
-        self._angle = before(self._reference) * time - position
+        if _is_continuous(robot) and log.velocity_rad_s is not None:
+            speed = log.velocity_rad_s[:, axis]
+        self._position, self._speed = position, speed
+        self._angle = wanted - position
         torque = np.ascontiguousarray(log.torque_nm[:, axis])
         period = int(1.0 / (self._band_hz * time))
         self._kept = free_of_limits(torque, period)
         # What the controller took as the first speed no log knows.
         self._kept[: _BEGUN * period] = False
         self.torque = self._seen(torque)
+
+    @property
+    def gains(self) -> tuple[str, str]:
+        """What the two gains are of."""
+        return ("position", "speed") if self._robot.told_positions else ("proportional", "integral")
 
     def shares(self, lag_s: float = 0.0, late: int = 0, damping: float = 0.0) -> Array:
         """Return what the proportional and the integral gain ask for (n, 2) [Nm].
@@ -77,15 +86,14 @@ class _Piece:
         error, angle = self._reference - speed, self._angle
         if late:
             error = self._reference - _later(speed, late)
-            position = before(self._reference) * self._time - angle
-            angle = angle + position - _later(position, late)
+            angle = angle + self._position - _later(self._position, late)
         both = gain_shares(self._robot, error, angle, self._axis)
         return np.column_stack([self._seen(x) for x in both])
 
     def forward(self) -> Array:
         """Return the rate of the reference and the reference (n, 2) [rad/s^2, rad/s]."""
-        rate = np.diff(self._reference, prepend=self._reference[:1]) / self._time
-        return np.column_stack([self._seen(rate), self._seen(self._reference)])
+        rate = np.diff(self._moved, prepend=self._moved[:1]) / self._time
+        return np.column_stack([self._seen(rate), self._seen(self._moved)])
 
     def _seen(self, x: Array) -> Array:
         """Return a torque below the band, where no limit cuts it, without its mean."""
@@ -128,6 +136,41 @@ class _Law:
         return float(self.left.sum())
 
 
+def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
+    """Return the same of a ``pd_position`` whose logs have torques and targets; nothing where these do not tell.
+
+    Its law is algebra of samples where logs have those of the controller, and of measured speeds where it is
+    continuous. Gains so far from the stated ones that no effect has them are none.
+    """
+    if robot.controller_kind != "pd_position" or {"kp", "kd"} & robot.tolerances.keys():
+        return ()
+    stated = tomlkit.parse(robot.toml).unwrap()["controller"]
+    if any(stated.get(name) for name in ("gravity_compensation", "computed_torque")):
+        return ()
+    if not all(_tells(robot, log) for log in logs):
+        return ()
+    found = other_controllers(robot, logs)
+    try:
+        check_gains(found)
+    except InputError:
+        return ()
+    return found
+
+
+def _tells(robot: Robot, log: Log) -> bool:
+    if not log.has_torque or (log.position_ref_rad is None and log.velocity_ref_rad_s is None):
+        return False
+    if _is_continuous(robot):
+        return log.velocity_rad_s is not None and bool(np.isfinite(log.velocity_rad_s).all())
+    return abs(log.sample_time_s / robot.sample_time_s - 1) < _SAME_CLOCK
+
+
+def _is_continuous(robot: Robot) -> bool:
+    """Whether a law acts between its samples too."""
+    stated = tomlkit.parse(robot.toml).unwrap().get("controller", {})
+    return bool(stated.get("continuous")) or robot.stepped is not None
+
+
 def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
     """Return what is different about the controller, axis by axis, where logs show it."""
     controllers = (OTHER_GAINS[0], SPEED_FILTER[0], FEEDFORWARD[0])
@@ -156,7 +199,7 @@ def _clock(
     off: Sequence[int],
 ) -> ShownCause | None:
     """Return what a clock of its own explains on all axes whose commands are off."""
-    if not off or any(e.name == CLOCK[0] for e in robot.effects):
+    if not off or robot.told_positions or any(e.name == CLOCK[0] for e in robot.effects):
         return None
 
     def missed(log: Log, axis: int) -> float:
@@ -267,9 +310,10 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
             name: Interval(float(f - 1), float(f - 1 - s), float(f - 1 + s))
             for name, f, s in zip(OTHER_GAINS[1], law.factors, spread, strict=True)
         }
+        first, second = pieces[0].gains
         says = (
-            f"Axis {axis + 1}: the logged torque is {law.factors[0]:.4g} times the proportional and "
-            f"{law.factors[1]:.4g} times the integral share of the stated controller, "
+            f"Axis {axis + 1}: the logged torque is {law.factors[0]:.4g} times the {first} and "
+            f"{law.factors[1]:.4g} times the {second} share of the stated controller, "
             f"which misses {100 * explained:.4g} % less so."
         )
         out.append(ShownCause(OTHER_GAINS[0], axis + 1, values, samples, explained, says))

@@ -65,6 +65,7 @@ from axisight.gap.told import with_constants_told
 from axisight.gap.tolerances import loaded
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.trials import Progress
+from axisight.gap.unfelt import with_controllers_shown
 from axisight.gap.verdict import Conclusion, conclude
 from axisight.gap.view import View
 from axisight.gap.where import (
@@ -496,7 +497,8 @@ def _assemble(
         reach.judged,
         lambda errors: stage(held_logs, errors, settings.block_s, measured),
     )
-    causes = _causes(conclusion, [*reach.reductions, *of_steps])
+    conclusion, unfelt = with_controllers_shown(conclusion, view)
+    causes = _causes(conclusion, [*reach.reductions, *of_steps, *unfelt])
     maps = (bands, regimes, settings.significance)
     places = findings(*maps) if conclusion.verdict != "none" else ()
     excess = np.array([axis.excess for axis in conclusion.axes])

@@ -11,11 +11,14 @@ from collections.abc import Sequence
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
 from axisight.gap.named import NamedCause
+from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
 
 # The gains agree to this share, and the torque constant with their inverse to that.
 _SAME_GAINS = 0.008
 _INVERSE = 0.02
+# Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
+_EDGE = 5.0
 # Gains alone agree to this share of theirs: of two that were set, one in fifty would.
 _ALONE = 0.02
 
@@ -26,18 +29,24 @@ def with_torque_sensors(
     """Return causes and effects with one in the place of each such pair."""
     kept, acting = list(causes), list(effects)
     for gains in [c for c in causes if c.effect == OTHER_GAINS[0]]:
-        constant = next(
-            (c for c in kept if c.effect == TORQUE_CONSTANT[0] and c.axis == gains.axis), None
-        )
-        if constant is None or not _agree(gains, constant):
+        found = sensor_of(gains, kept)
+        if found is None:
             continue
-        one = _sensor(gains, constant)
-        gone = {(gains.effect, gains.axis), (constant.effect, constant.axis)}
+        one = found[1]
+        gone = {(gains.effect, gains.axis), (TORQUE_CONSTANT[0], gains.axis)}
         kept = [one, *(c for c in kept if (c.effect, c.axis) not in gone)]
         value = {TORQUE_SENSOR[1]: one.parameters[TORQUE_SENSOR[1]].value}
         acting = [e for e in acting if (e.name, e.axis) not in gone]
         acting = [Effect(TORQUE_SENSOR[0], gains.axis, value), *acting]
     return tuple(kept), tuple(acting)
+
+
+def sensor_of(gains: NamedCause, causes: Sequence[NamedCause]) -> tuple[int, NamedCause] | None:
+    """Return which of ``causes`` is the torque constant that makes gains those of a torque sensor, and that."""
+    for place, cause in enumerate(causes):
+        if (cause.effect, cause.axis) == (TORQUE_CONSTANT[0], gains.axis) and _agree(gains, cause):
+            return place, _sensor(gains, cause)
+    return None
 
 
 def share_reported(cause: ShownCause) -> float | None:
@@ -46,6 +55,11 @@ def share_reported(cause: ShownCause) -> float | None:
         return None
     proportional, integral = (cause.values[name].value for name in OTHER_GAINS[1])
     return proportional if abs(proportional - integral) < _SAME_GAINS else None
+
+
+def unseen_constant(settings: Settings) -> float:
+    """Return up to which share a torque constant may not show."""
+    return _EDGE * (settings.tolerances or {}).get("motor_inertia", 0.0)
 
 
 def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str], ...]:

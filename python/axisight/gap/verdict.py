@@ -19,7 +19,7 @@ from axisight.gap.score import held_out_loss
 from axisight.gap.settings import Settings
 from axisight.gap.shown import ShownCause
 from axisight.gap.state import Search
-from axisight.gap.torque_sensor import either, with_torque_sensors
+from axisight.gap.torque_sensor import either, unseen_constant, with_torque_sensors
 from axisight.gap.twins import about_twins, less_their_twins, open_twins, with_twins
 
 Array = NDArray[np.float64]
@@ -48,6 +48,25 @@ class Conclusion:
         """Return the same with further checks."""
         return replace(self, checks=(*self.checks, *more))
 
+    def with_causes_behind(self, more: Sequence[NamedCause]) -> Conclusion:
+        """Return the same with further causes behind its own: *explained* by them instead of *none*."""
+        place = {c.axis: len(self.causes) + k for k, c in enumerate(more)}
+        axes = tuple(
+            replace(
+                a,
+                verdict="explained" if a.verdict == "none" else a.verdict,
+                causes=(*a.causes, place[a.axis]),
+            )
+            if a.axis in place
+            else a
+            for a in self.axes
+        )
+        out = replace(self, causes=(*self.causes, *more), axes=axes)
+        if self.verdict != "none":
+            return out
+        sure = max(c.probability for c in more)
+        return replace(out, verdict="explained", p_none=0.0, p_unknown=1.0 - sure)
+
     def without_causes(self, verdict: VerdictKind) -> Conclusion:
         """Return the same with another verdict, for which its causes are candidates among others."""
         return replace(
@@ -66,8 +85,6 @@ class Conclusion:
         return tuple(dict.fromkeys(x for x in rivals if x not in causes))
 
 
-# Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
-_EDGE = 5.0
 # Candidates that a verdict lists.
 _ALTERNATIVES = 5
 # What the controller's own law shows could still be something else that looks alike: a limit of the
@@ -110,11 +127,10 @@ def conclude(
     believed = verdict in ("explained", "undecidable") or found.by_axis
     searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
     causes, effects = with_torque_sensors(
-        (*map(_shown, shown), *searched) if believed else (),
+        (*map(named_shown, shown), *searched) if believed else (),
         (*(x.effect for x in shown), *found.model.effects) if believed else (),
     )
-    unseen = _EDGE * (settings.tolerances or {}).get("motor_inertia", 0.0)
-    gains = either(causes, unseen)
+    gains = either(causes, unseen_constant(settings))
     if gains and verdict == "explained":
         verdict = "undecidable"
     causes = tuple(_or_another(c) if c.label in {one for one, _ in gains} else c for c in causes)
@@ -162,7 +178,8 @@ def _or_another(cause: NamedCause) -> NamedCause:
     return replace(cause, probability=0.5 * cause.probability)
 
 
-def _shown(cause: ShownCause) -> NamedCause:
+def named_shown(cause: ShownCause) -> NamedCause:
+    """Return a cause that logs show by themselves as one of a verdict."""
     info = effect_info(cause.name)
     units = {p.name: p.unit for p in info.parameters}
     return NamedCause(info.name, cause.axis, _SHOWN, dict(cause.values), units, info.family, _SHOWN)

@@ -53,6 +53,8 @@ class View(ABC):
     """Of the low-pass on both sides; None where there is none."""
     shown: tuple[ShownCause, ...] = ()
     """Causes that the logs show by themselves."""
+    unfelt: tuple[ShownCause, ...] = ()
+    """The same that the torques that are compared do not feel."""
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs settle by themselves: no candidates."""
 
