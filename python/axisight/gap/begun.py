@@ -19,6 +19,7 @@ from axisight.gap.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.in_motion import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.noise import position_noise_std
+from axisight.gap.speed_loop import with_integral
 from axisight.gap.used import REST_S, stands
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -126,7 +127,8 @@ def _run_up(robot: Robot, log: Log, despite: Collection[str]) -> Log:
     for fault in flagged(check_log_alone(log), despite):
         if fault.severity == "refuse":
             raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
-    return run_up_to(robot, (robot, robot.with_controller_speed(TRACKING_SPEED)), log)
+    kept = with_integral(robot).with_controller_speed(TRACKING_SPEED)
+    return run_up_to(robot, (robot, kept), log)
 
 
 def _taken(given: Begun, parts: Sequence[Log]) -> Begun:

@@ -28,6 +28,7 @@ from axisight.gap.own_effects import with_values
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.settings import Settings
 from axisight.gap.simulated import noise_torques, simulated_run, simulated_torques
+from axisight.gap.speed_loop import with_integral
 from axisight.gap.standstill import certainty, open_errors, sure_friction_nm
 from axisight.gap.state import Search
 from axisight.gap.torques import AS_GIVEN, Variant
@@ -66,7 +67,7 @@ class ClosedLoopView(View):
     fitter: ClosedLoopFitter
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
-        slow = robot.with_controller_speed(TRACKING_SPEED)
+        slow = with_integral(robot).with_controller_speed(TRACKING_SPEED)
         # What keeps a simulator on a log acts on its motors at once.
         self.tracking = slow.with_effects([e for e in robot.effects if not is_lag(e)])
         limits = torque_limits(robot, logs)

@@ -11,12 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import tomlkit
+from numpy.typing import NDArray
 
 from axisight.effects.stated import OTHER_GAINS
-from axisight.gap.feedback import before
+from axisight.gap.feedback import before, inertia_of_motors
 from axisight.gap.own_controller import other_controllers
 from axisight.logs import Log
 from axisight.robot import Robot
+
+Array = NDArray[np.float64]
 
 # What such a law may have that no speed loop has.
 _MORE = ("gravity_compensation", "computed_torque", "continuous")
@@ -36,10 +39,10 @@ def as_speed_loop(robot: Robot, logs: Sequence[Log]) -> Robot:
     if not all(log.has_torque for log in logs):
         return robot
     if all(log.velocity_ref_rad_s is None and log.position_ref_rad is None for log in logs):
-        return _speed_loop(robot)
+        return _as_one(robot)
     if not all(map(_told_by_speeds, logs)):
         return robot
-    loop = _speed_loop(robot)
+    loop = _as_one(robot)
     shown = other_controllers(loop, logs)
     return robot if any(cause.name == OTHER_GAINS[0] for cause in shown) else loop
 
@@ -61,10 +64,26 @@ def _told_by_speeds(log: Log) -> bool:
     return bool(np.all(np.ptp(off, axis=0) <= _SAME * np.maximum(np.ptp(target, axis=0), 1.0)))
 
 
-def _speed_loop(robot: Robot) -> Robot:
+def _as_one(robot: Robot) -> Robot:
+    gains = robot.controller_gains
+    return _speed_loop(robot, np.asarray(gains["kd"]), np.asarray(gains["kp"]))
+
+
+def with_integral(robot: Robot) -> Robot:
+    """Return a robot whose ``p_velocity`` has an integral too, as large as leaves the loop of its motors damped.
+
+    Critically, of rigid axes: ``ki = kp^2 / (4 J)``. What keeps a simulator on a log has to keep its angle, too: with
+    none of its own it strays from the waves of a ripple, by what speeds are off.
+    """
+    if robot.controller_kind != "p_velocity":
+        return robot
+    kp = np.asarray(robot.controller_gains["kp"])
+    return _speed_loop(robot, kp, kp**2 / (4 * np.diag(inertia_of_motors(robot))))
+
+
+def _speed_loop(robot: Robot, kp: Array, ki: Array) -> Robot:
     document = tomlkit.parse(robot.toml)
-    gains = {name: list(map(float, each)) for name, each in robot.controller_gains.items()}
-    document["controller"] = {"kind": "pi_velocity", "kp": gains["kd"], "ki": gains["kp"]}
+    document["controller"] = {"kind": "pi_velocity", "kp": kp.tolist(), "ki": ki.tolist()}
     loop = Robot.from_toml(tomlkit.dumps(document))
     loop = loop.with_parameters(robot.parameters()).with_effects(robot.effects)
     return loop.with_torque_constants(robot.torque_constants)
