@@ -17,7 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     twins: &[],
     stands_for: None,
     linear: Linear::No,
-    inverse_dynamics: false,
+    inverse_dynamics: true,
     absorbed_by: &[],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -69,6 +69,10 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 impl<S: Scalar> Kernel<S> for Warmup<S> {
     fn n_internal(&self) -> usize {
         1
+    }
+
+    fn state_at(&self, time: S) -> Option<S> {
+        Some(S::one() - (-(time / self.time_constant)).exp())
     }
 
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {

@@ -102,22 +102,39 @@ impl InverseDynamics {
         let failed = |e: PlantError| ProblemError::Failed(e.to_string());
         let plant = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
         if plant.arm_carries_derivatives() {
-            return Ok(predicted(
-                &plant,
-                record,
-                seeds.len(),
-                &mut Arm::new(&plant),
-            ));
+            return Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plant)));
         }
         let (overrides, settings) =
             seeded::<f64>(&self.parameters, &self.effects, theta, &[], f64::seeded);
         let plain = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
-        Ok(predicted(
-            &plant,
-            record,
-            seeds.len(),
-            &mut Arm::new(&plain),
-        ))
+        Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plain)))
+    }
+
+    /// Torque of `plant` along a record, `[quantity][axis][sample]`, value first.
+    fn predicted<S: Scalar, T: Scalar>(
+        &self,
+        plant: &Plant<S>,
+        record: &MotionRecord,
+        n_seeds: usize,
+        arm: &mut Arm<'_, T>,
+    ) -> Vec<Vec<Vec<f64>>> {
+        let n_axes = plant.axes.len();
+        let n_samples = record.position.len() / n_axes;
+        let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; n_seeds + 1];
+        for k in 0..n_samples {
+            let forces = arm.forces(record, k);
+            let time = S::constant(k as f64 * self.robot.sample_time);
+            for (i, axis) in plant.axes.iter().enumerate() {
+                let turned = reaction(plant, forces, i) + coupled(plant, record, k, i);
+                let force = lifted(&forces[axis.joint]);
+                let command = drive(axis, record, (k * n_axes + i, time), force, turned);
+                out[0][i].push(command.lane(0));
+                for (seed, series) in out[1..].iter_mut().enumerate() {
+                    series[i].push(command.partial(seed, 0));
+                }
+            }
+        }
+        out
     }
 
     /// Whitened residual and derivative series of one record, axes in a row.
@@ -208,31 +225,6 @@ impl<'a, S: Scalar> Arm<'a, S> {
     }
 }
 
-/// Torque of `plant` along a record, `[quantity][axis][sample]`, value first.
-fn predicted<S: Scalar, T: Scalar>(
-    plant: &Plant<S>,
-    record: &MotionRecord,
-    n_seeds: usize,
-    arm: &mut Arm<'_, T>,
-) -> Vec<Vec<Vec<f64>>> {
-    let n_axes = plant.axes.len();
-    let n_samples = record.position.len() / n_axes;
-    let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; n_seeds + 1];
-    for k in 0..n_samples {
-        let forces = arm.forces(record, k);
-        for (i, axis) in plant.axes.iter().enumerate() {
-            let turned = reaction(plant, forces, i) + coupled(plant, record, k, i);
-            let force = lifted(&forces[axis.joint]);
-            let command = drive(axis, record, k * n_axes + i, force, turned);
-            out[0][i].push(command.lane(0));
-            for (seed, series) in out[1..].iter_mut().enumerate() {
-                series[i].push(command.partial(seed, 0));
-            }
-        }
-    }
-    out
-}
-
 /// Torque that a motor gives to gears it turns along [Nm].
 fn reaction<S: Scalar, T: Scalar>(plant: &Plant<S>, forces: &[T], motor: usize) -> S {
     let mut torque = S::zero();
@@ -276,9 +268,15 @@ fn lifted<T: Scalar, S: Scalar>(x: &T) -> S {
     })
 }
 
-/// Torque commanded in entry `i` of a record, where the arm asks for `force` on the joint and other
-/// axes for `turned` on the motor.
-fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S, turned: S) -> S {
+/// Torque commanded in an entry of a record, by place and time, where the arm asks for `force` on the joint and
+/// other axes for `turned` on the motor.
+fn drive<S: Scalar>(
+    axis: &Axis<S>,
+    record: &MotionRecord,
+    (i, time): (usize, S),
+    force: S,
+    turned: S,
+) -> S {
     let at = |x: &[f64]| S::constant(x[i]);
     let (angle, speed) = (at(&record.position), at(&record.velocity));
     let joint_force = force - axis.joint_torque_of(angle * axis.ratio, speed * axis.ratio);
@@ -294,7 +292,9 @@ fn drive<S: Scalar>(axis: &Axis<S>, record: &MotionRecord, i: usize, force: S, t
         + axis.viscous_friction * speed
         + turned;
     for kernel in &axis.kernels {
-        torque -= kernel.motor_torque(&motor);
+        let state = kernel.state_at(time);
+        let internal = state.as_slice();
+        torque -= kernel.motor_torque(&Motor { internal, ..motor });
     }
     let kernels = axis.kernels.iter().rev();
     kernels.fold(torque, |t, k| k.drive_inverse(t))

@@ -179,6 +179,11 @@ pub trait Kernel<S: Scalar>: Send + Sync {
         0
     }
 
+    /// The state of an effect whose one state moves with the time since the log began alone; `None` of all others.
+    fn state_at(&self, _time: S) -> Option<S> {
+        None
+    }
+
     /// Change masses, stiffness or gravity before the run.
     fn prepare(&self, _plant: &mut PlantParameters<'_, S>) {}
     /// Springs below the first joint, ground to arm.
