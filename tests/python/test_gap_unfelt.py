@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from axisight import Diagnosis, Effect, Log, Robot, diagnose
-from axisight.gap.own_controller import other_controllers_of_targets
+from axisight.gap.speed_loop import other_controllers_of_targets
 from gap_data import HELD, PLAN, bare_axis, logs_of, scattered
 from test_gap_speed_loop import positions
 

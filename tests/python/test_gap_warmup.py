@@ -21,19 +21,19 @@ WARMUP = Effect(
 )
 
 
-def friction_of(speed: np.ndarray, later_s: float = 0.0) -> np.ndarray:
-    """What such friction is along a speed (n, 6), so long after the machine was cold."""
-    time = np.arange(len(speed)) / RATE_HZ + later_s
+def friction_of(speed: np.ndarray) -> np.ndarray:
+    """What such friction is along a speed (n, 6)."""
+    time = np.arange(len(speed)) / RATE_HZ
     out = np.zeros_like(speed)
     out[:, AXIS - 1] = (COLD + FALLS * (1 - np.exp(-time / TIME_S))) * speed[:, AXIS - 1]
     return out
 
 
-def warming(run: int, later_s: float = 0.0) -> Log:
+def warming(run: int) -> Log:
     """A log without any other friction."""
     log = log_of(ROBOT, run, seconds=40.0, coulomb=np.zeros(6), viscous=np.zeros(6))
     speed = exact_motion(run, 40.0)[1]
-    return replace(log, torque_nm=log.torque_nm + friction_of(speed, later_s))
+    return replace(log, torque_nm=log.torque_nm + friction_of(speed))
 
 
 def test_a_predicted_torque_has_the_friction_of_its_time():
@@ -53,10 +53,3 @@ def test_warming_up_is_named_by_the_motion_alone():
     for name, value in (WARMUP.parameters or {}).items():
         assert found[name].value == pytest.approx(value, rel=0.1)
         assert found[name].low <= value <= found[name].high
-
-
-def test_logs_that_begin_at_different_warmth_have_the_same_cause():
-    """One course of time is not quite that of another log: sizes are looser, the cause is not."""
-    logs = [warming(0), warming(1), warming(2, later_s=20.0)]
-    said = diagnose(robot=ROBOT, estimation=logs, validation=[warming(5, later_s=8.0)])
-    assert [c.label for c in said.causes] == [WARMUP.label]

@@ -103,6 +103,9 @@ BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
 In torque that is predicted from motion it slips all the time, and is dry friction.
 """
 
+WARMING = "friction_warmup"
+"""What viscous friction is that changes while a machine warms up."""
+
 VISCOUS_FRICTION = "viscous_friction"
 """What friction in proportion to speed is, beyond the simulator's."""
 

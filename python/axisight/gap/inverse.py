@@ -21,9 +21,9 @@ from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
 from axisight.gap.noise import Floor
-from axisight.gap.own_controller import other_controllers_of_targets
 from axisight.gap.rigid_torque import predicted_torque
 from axisight.gap.settings import Settings
+from axisight.gap.speed_loop import other_controllers_of_targets
 from axisight.gap.standstill import alike, certainty, dry_friction_nm, open_torque_nm, standing
 from axisight.gap.torques import AS_GIVEN, Variant
 from axisight.gap.view import View

@@ -47,8 +47,6 @@ _FILTERS = (0.0, float(np.sqrt(0.5)), 1.0)
 _SAME = 0.008
 _FORMULA = 0.004
 _OF_A_LAG = 0.1
-# By how much a sample time may be off and still be that of the controller.
-_SAME_CLOCK = 1e-3
 
 
 class _Piece:
@@ -60,7 +58,7 @@ class _Piece:
         self._band_hz = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
         self._reference, wanted, self._moved = told_of(robot, log, axis)
         position, speed = (x[:, axis] for x in as_taken(log))
-        if _is_continuous(robot) and log.velocity_rad_s is not None:
+        if is_continuous(robot) and log.velocity_rad_s is not None:
             speed = log.velocity_rad_s[:, axis]
         self._position, self._speed = position, speed
         self._angle = wanted - position
@@ -136,36 +134,7 @@ class _Law:
         return float(self.left.sum())
 
 
-def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
-    """Return the same of a ``pd_position`` whose logs have torques and targets; nothing where these do not tell.
-
-    Its law is algebra of samples where logs have those of the controller, and of measured speeds where it is
-    continuous. Gains so far from the stated ones that no effect has them are none.
-    """
-    if robot.controller_kind != "pd_position" or {"kp", "kd"} & robot.tolerances.keys():
-        return ()
-    stated = tomlkit.parse(robot.toml).unwrap()["controller"]
-    if any(stated.get(name) for name in ("gravity_compensation", "computed_torque")):
-        return ()
-    if not all(_tells(robot, log) for log in logs):
-        return ()
-    found = other_controllers(robot, logs)
-    try:
-        check_gains(found)
-    except InputError:
-        return ()
-    return found
-
-
-def _tells(robot: Robot, log: Log) -> bool:
-    if not log.has_torque or (log.position_ref_rad is None and log.velocity_ref_rad_s is None):
-        return False
-    if _is_continuous(robot):
-        return log.velocity_rad_s is not None and bool(np.isfinite(log.velocity_rad_s).all())
-    return abs(log.sample_time_s / robot.sample_time_s - 1) < _SAME_CLOCK
-
-
-def _is_continuous(robot: Robot) -> bool:
+def is_continuous(robot: Robot) -> bool:
     """Whether a law acts between its samples too."""
     stated = tomlkit.parse(robot.toml).unwrap().get("controller", {})
     return bool(stated.get("continuous")) or robot.stepped is not None

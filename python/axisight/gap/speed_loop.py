@@ -14,15 +14,20 @@ import tomlkit
 from numpy.typing import NDArray
 
 from axisight.effects.stated import OTHER_GAINS
+from axisight.errors import InputError
 from axisight.gap.feedback import before, inertia_of_motors
-from axisight.gap.own_controller import other_controllers
+from axisight.gap.own_controller import check_gains, is_continuous, other_controllers
+from axisight.gap.shown import ShownCause
 from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
 # What such a law may have that no speed loop has.
-_MORE = ("gravity_compensation", "computed_torque", "continuous")
+_OF_THE_ROBOT = ("gravity_compensation", "computed_torque")
+_MORE = (*_OF_THE_ROBOT, "continuous")
+# By how much a sample time may be off and still be that of the controller.
+_SAME_CLOCK = 1e-3
 # Of a motor's travel: targets that stray further from the sum of their rates are others.
 _SAME = 1e-6
 
@@ -67,6 +72,35 @@ def _told_by_speeds(log: Log) -> bool:
 def _as_one(robot: Robot) -> Robot:
     gains = robot.controller_gains
     return _speed_loop(robot, np.asarray(gains["kd"]), np.asarray(gains["kp"]))
+
+
+def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[ShownCause, ...]:
+    """Return what is different about the controller of a ``pd_position``, where logs have torques and targets.
+
+    Nothing where these do not tell. Its law is algebra of samples where logs have those of the controller, and
+    of measured speeds where it is continuous. Gains so far from the stated ones that no effect has them are none.
+    """
+    if robot.controller_kind != "pd_position" or {"kp", "kd"} & robot.tolerances.keys():
+        return ()
+    stated = tomlkit.parse(robot.toml).unwrap()["controller"]
+    if any(stated.get(name) for name in _OF_THE_ROBOT):
+        return ()
+    if not all(_tells(robot, log) for log in logs):
+        return ()
+    found = other_controllers(robot, logs)
+    try:
+        check_gains(found)
+    except InputError:
+        return ()
+    return found
+
+
+def _tells(robot: Robot, log: Log) -> bool:
+    if not log.has_torque or (log.position_ref_rad is None and log.velocity_ref_rad_s is None):
+        return False
+    if is_continuous(robot):
+        return log.velocity_rad_s is not None and bool(np.isfinite(log.velocity_rad_s).all())
+    return abs(log.sample_time_s / robot.sample_time_s - 1) < _SAME_CLOCK
 
 
 def with_integral(robot: Robot) -> Robot:

@@ -17,7 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     twins: &["sensor_delay"],
     stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: false,
+    inverse_dynamics: true,
     absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[ParameterInfo {

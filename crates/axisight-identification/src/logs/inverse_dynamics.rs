@@ -1,10 +1,11 @@
 //! Inverse-dynamics error: torque predicted from a measured motion.
 //!
 //! Gears count as rigid (`q = r phi`) and elastic joints as standing still, so
-//! the prediction holds below the first resonance; effects of the transmission,
-//! the sensor and of timing have no place in it.
+//! the prediction holds below the first resonance; effects of the transmission
+//! and the sensor have no place in it.
 
 use super::gram::{Block, blocks};
+use super::lateness::commanded;
 use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
 };
@@ -133,6 +134,13 @@ impl InverseDynamics {
                     series[i].push(command.partial(seed, 0));
                 }
             }
+        }
+        for (i, axis) in plant.axes.iter().enumerate() {
+            let own = out.iter_mut().map(|x| std::mem::take(&mut x[i])).collect();
+            let late = commanded(&axis.kernels, self.robot.sample_time, own);
+            out.iter_mut()
+                .zip(late)
+                .for_each(|(x, series)| x[i] = series);
         }
         out
     }

@@ -4,6 +4,7 @@ mod courses;
 mod fit;
 mod gram;
 mod inverse_dynamics;
+mod lateness;
 mod linearize;
 mod loss;
 mod packing;
