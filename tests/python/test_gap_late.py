@@ -22,12 +22,11 @@ def bare(run: int) -> Log:
     return log_of(ROBOT, run, seconds=40.0, coulomb=np.zeros(6), viscous=np.zeros(6))
 
 
-def commanded_early(run: int, samples: int) -> Log:
+def commanded_early(run: int, samples: float) -> Log:
     """A log whose second axis got its torque so late: what was logged came before."""
     log = bare(run)
-    torque = log.torque_nm.copy()
-    torque[:, 1] = np.roll(torque[:, 1], -samples)
-    torque[-samples:, 1] = torque[-samples - 1, 1]
+    torque, place = log.torque_nm.copy(), np.arange(log.n_samples)
+    torque[:, 1] = np.interp(place + samples, place, torque[:, 1])
     return replace(log, torque_nm=torque)
 
 
@@ -71,6 +70,13 @@ def test_a_delay_is_named_and_no_friction():
     assert found.value == pytest.approx(0.02, rel=0.05)
     timing = {"input_delay@2", "current_loop@2", "actuator_bandwidth@2"}
     assert {x for group in said.equivalent for x in group} <= timing
+
+
+def test_what_a_drive_holds_for_a_sample_is_no_delay():
+    """A command that holds until the next one acts half a sample late."""
+    logs = [commanded_early(k, 0.5) for k in (0, 1, 2, 5)]
+    said = diagnose(robot=ROBOT, estimation=logs[:3], validation=logs[3:])
+    assert said.causes == ()
 
 
 def test_beside_another_cause_nothing_is_looked_for_that_is_late():

@@ -18,6 +18,7 @@ from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
 from axisight.gap.deflected import deflection_torque
 from axisight.gap.inverse_noise import InverseNoise
+from axisight.gap.lags import is_lag
 from axisight.gap.model import ModelFitter
 from axisight.gap.motion import Motion, has_velocity
 from axisight.gap.noise import Floor
@@ -255,6 +256,10 @@ class InverseDynamicsFitter(ModelFitter):
         step = self.weighting.decimation
         kept = (factor[: len(factor) // step * step : step] for *_, factor in self.records)
         return np.concatenate([row for log in kept for row in log.T**2])
+
+    def tolerated(self, effect: Effect) -> float:
+        """Return the same; of what is late a sample, for which a drive holds what it commands."""
+        return self.robot.sample_time_s if is_lag(effect) else super().tolerated(effect)
 
     def takes_part(self, name: str) -> bool:
         """Springs and their damping do not show in a rigid prediction."""

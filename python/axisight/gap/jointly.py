@@ -18,6 +18,7 @@ from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.gap.decide import Ranked, Standing, Trial, clearly_worse, stand, trial
 from axisight.gap.evidence import Evidence, FreeEffect
+from axisight.gap.lags import is_lag
 from axisight.gap.layout import Layout
 from axisight.gap.model import ModelFitter
 from axisight.gap.settings import Settings
@@ -100,7 +101,10 @@ class Pairs:
         return Pair(axis, both, gain, (one, other)) if one and other else None
 
     def _hints(self, t: Trial, axis: int, left: float) -> bool:
-        """Whether a candidate of ``axis`` explains some of what is ``left`` there."""
+        """Whether a candidate of ``axis`` explains some of what is ``left`` there, and is no ordinary hold."""
+        effect = t.evidence.effects[-1]
+        if is_lag(effect) and self.fitter.within_tolerance(effect):
+            return False
         fall = float((self.current - t.held_out)[self.layout.axis == axis].sum())
         own = t.candidate.effect.axis == axis + 1
         return own and fall > _HINT * self.settings.smallest_score * left
