@@ -94,7 +94,7 @@ def _of_causes(
 ) -> str:
     missing = named(causes, own, len(gap.before_per_axis))
     # What logs show by themselves, and torques predicted from the motion do not feel.
-    felt = [c for c in causes if c.gap_reduction.low < 0 or c.gap_reduction.high > 0]
+    felt = [c for c in causes if not c.gap_reduction.low == c.gap_reduction.high == 0.0]
     steps = [c for c in felt if c.effect == STEPS[0]]
     if causes and not felt:
         return (
