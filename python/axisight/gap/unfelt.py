@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from axisight.effects.stated import OTHER_GAINS
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Interval
 from axisight.gap.torque_sensor import sensor_of, share_reported, unseen_constant
@@ -34,7 +33,7 @@ def with_controllers_shown(conclusion: Conclusion, view: View) -> tuple[Conclusi
         sensor = None if share is None else sensor_of(gains, conclusion.causes)
         if sensor is not None:
             conclusion = _with_sensor(conclusion, *sensor).with_checks([cause.says])
-        elif share is not None and cause.name == OTHER_GAINS[0] and abs(share) < unseen:
+        elif share is not None and abs(share) < unseen:
             conclusion = conclusion.with_checks([cause.says])
         else:
             conclusion = conclusion.with_causes_behind([gains])
