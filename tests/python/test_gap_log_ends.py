@@ -45,11 +45,11 @@ def test_an_end_in_motion_counts_for_nothing_until_it_is_forgotten(logs):
     counts = Filtering(CUTOFF_HZ).counted(log)
     period = round(1 / (CUTOFF_HZ * log.sample_time_s))
     assert not counts[: int(1.5 * period)].any() and not counts[-int(1.5 * period) :].any()
-    assert (counts[3 * period : -3 * period] == 1).all()
+    assert (counts[2 * period : -2 * period] == 1).all()
     assert ((counts >= 0) & (counts <= 1)).all()
     # Of a short log not more than a fifth is lost at either end.
     short = Filtering(CUTOFF_HZ).counted(part(logs[0], 1000, 3000))
-    assert (short[400 + 400 : -800] == 1).all()
+    assert (short[540:-540] == 1).all()
 
 
 def test_what_counts_of_a_part_is_what_the_whole_log_has_there(logs):

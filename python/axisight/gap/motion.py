@@ -29,6 +29,8 @@ _ORDER = 8
 # to a hundredth, and the largest share of the log at either end.
 _FORGETS = 1.5
 _AT_MOST = 0.2
+# Of that, over which what is next to it counts in part.
+_FADES = 1 / 3
 # A log is at rest at an end where no axis moves by this share of the most that it does in a quarter of a period.
 _RESTS = 0.02
 
@@ -70,7 +72,8 @@ class Filtering:
         """
         n, cutoff = log.n_samples, self.cutoff_hz * log.sample_time_s
         away = min(round(_FORGETS / cutoff), int(_AT_MOST * n))
-        ramp = np.sin(0.5 * np.pi * np.clip(np.arange(n) / max(1, away) - 1.0, 0.0, 1.0)) ** 2
+        beyond = (np.arange(n) / max(1, away) - 1.0) / _FADES
+        ramp = np.sin(0.5 * np.pi * np.clip(beyond, 0.0, 1.0)) ** 2
         out = np.ones(n)
         for end, moves in zip(
             (slice(None), slice(None, None, -1)), _moves(log, cutoff), strict=True
