@@ -180,6 +180,24 @@ def test_a_temperature_of_one_engine_is_judged_on_another():
     assert "temperature" in render_score("cases", summary(cases))
 
 
+def test_priors_by_family_of_one_engine_are_judged_on_another():
+    """Play is named too surely and a load not surely enough: one temperature mends neither."""
+    play = judged(("backlash@1",), ("backlash@1",), "explained", 9.0)
+    wrong = judged(("payload",), ("backlash@1",), "explained", 9.0)
+    load = judged(("payload",), ("payload",), "explained", 9.0)
+    each = [play] * 60 + [wrong] * 60 + [load] * 120
+    cases = [replace(j, setting=s) for s in (play.setting, OTHER) for j in each]
+    found = carried_over(cases)
+    assert found is not None
+    priors, other = found["priors"], found["judged_on"]["pinocchio"]
+    assert priors["transmission"] < -1 < 1 < priors["load"]
+    # Half of the play is right: its log-odds are near zero after both.
+    hot = np.log(9) / found["temperature"]
+    assert hot + priors["transmission"] == pytest.approx(0.0, abs=0.1)
+    assert other["log_loss_priors"] < 0.7 * other["log_loss_scaled"]
+    assert "with priors by family too" in markdown(summary(cases))
+
+
 def test_without_another_engine_or_with_few_causes_none_is_fitted():
     assert carried_over(CASES) is None
     assert carried_over([CASES[0]] * 30) is None

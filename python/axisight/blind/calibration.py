@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.blind.score import Judged
+from axisight.effects import effect_info
 
 Array = NDArray[np.float64]
 
@@ -22,6 +23,8 @@ _SUREST = 1e-3
 _COLDEST, _HOTTEST = 0.2, 5.0
 # Causes, below which nothing is fitted.
 _FEW = 20
+# What a family's prior may be off by, in log-odds: its standard deviation, and the largest looked at.
+_PRIOR, _LARGEST = 1.0, 5.0
 
 
 def calibration_bins(judged: Sequence[Judged]) -> list[dict[str, float]]:
@@ -35,12 +38,14 @@ def calibration_error(judged: Sequence[Judged]) -> float:
 
 
 def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
-    """Return a temperature fitted on one engine, and what it does to probabilities on the others.
+    """Return a temperature and priors by family fitted on one engine, and what they do on the others.
 
-    Log-odds are divided by it (Guo et al. 2017); one that is above 1 says that causes were named too
-    surely. Losses are mean logarithmic ones [nat]. None where an engine has too few causes.
+    Log-odds are divided by the temperature (Guo et al. 2017); one that is above 1 says that causes were named
+    too surely. A prior is what log-odds of a family's causes are off by after that, normal with a standard
+    deviation of 1. Losses are mean logarithmic ones [nat]. None where an engine has too few causes.
     """
-    own, right = _said([j for j in judged if j.setting["engine"] == _FITTED_ON])
+    fitted_on = [j for j in judged if j.setting["engine"] == _FITTED_ON]
+    own, right = _said(fitted_on)
     others = sorted({j.setting["engine"] for j in judged} - {_FITTED_ON})
     if len(own) < _FEW or not others:
         return None
@@ -50,23 +55,46 @@ def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
         method="bounded",
     )
     temperature = float(np.exp(found.x))
+    families = _families(fitted_on)
+    scaled = _scaled(own, temperature)
+    priors = {
+        family: _prior(scaled[families == family], right[families == family])
+        for family in np.unique(families).tolist()
+    }
     return {
         "fitted_on": _FITTED_ON,
         "causes": len(own),
         "temperature": temperature,
-        "judged_on": {name: _judged_with(judged, name, temperature) for name in others},
+        "priors": priors,
+        "judged_on": {name: _judged_with(judged, name, temperature, priors) for name in others},
     }
 
 
-def _judged_with(judged: Sequence[Judged], engine: str, temperature: float) -> dict[str, float]:
-    said, right = _said([j for j in judged if j.setting["engine"] == engine])
+def _prior(said: Array, right: Array) -> float:
+    """Return what log-odds of causes are off by."""
+
+    def loss(prior: float) -> float:
+        return len(said) * _log_loss(_moved(said, prior), right) + 0.5 * (prior / _PRIOR) ** 2
+
+    found = scipy.optimize.minimize_scalar(loss, bounds=(-_LARGEST, _LARGEST), method="bounded")
+    return float(found.x)
+
+
+def _judged_with(
+    judged: Sequence[Judged], engine: str, temperature: float, priors: Mapping[str, float]
+) -> dict[str, float]:
+    others = [j for j in judged if j.setting["engine"] == engine]
+    said, right = _said(others)
     scaled = _scaled(said, temperature)
+    moved = _moved(scaled, np.array([priors.get(f, 0.0) for f in _families(others)]))
     return {
         "causes": len(said),
         "error": _error(said, right),
         "error_scaled": _error(scaled, right),
         "log_loss": _log_loss(said, right),
         "log_loss_scaled": _log_loss(scaled, right),
+        "error_priors": _error(moved, right),
+        "log_loss_priors": _log_loss(moved, right),
     }
 
 
@@ -79,6 +107,12 @@ def _said(judged: Sequence[Judged]) -> tuple[Array, Array]:
     ]
     said, right = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
     return said, right
+
+
+def _families(judged: Sequence[Judged]) -> NDArray[np.str_]:
+    """Return the family of every cause named, as `_said` has them."""
+    effects = [label.split("@")[0] for j in judged for label in j.named]
+    return np.array([effect_info(name).family for name in effects], dtype=np.str_)
 
 
 def _bins(said: Array, right: Array) -> list[dict[str, float]]:
@@ -104,6 +138,11 @@ def _error(said: Array, right: Array) -> float:
 def _scaled(said: Array, temperature: float) -> Array:
     sure = np.clip(said, _SUREST, 1 - _SUREST)
     return np.asarray(scipy.special.expit(scipy.special.logit(sure) / temperature))
+
+
+def _moved(said: Array, prior: Array | float) -> Array:
+    sure = np.clip(said, _SUREST, 1 - _SUREST)
+    return np.asarray(scipy.special.expit(scipy.special.logit(sure) + prior))
 
 
 def _log_loss(said: Array, right: Array) -> float:

@@ -72,6 +72,9 @@ def _carried_over(found: dict[str, Any] | None) -> list[dict[str, str]]:
     for engine, x in found["judged_on"].items():
         rows[f"calibration error on {engine}"] = _digits(x["error"])
         rows[f"calibration error on {engine}, with that temperature"] = _digits(x["error_scaled"])
+        rows[f"calibration error on {engine}, with priors by family too"] = _digits(
+            x["error_priors"]
+        )
     return [{"name": name, "value": value} for name, value in rows.items()]
 
 

@@ -71,9 +71,12 @@ def _carried_over(found: Mapping[str, Any] | None) -> list[list[str]]:
     own, hot = found["fitted_on"], found["temperature"]
     rows = [[f"temperature that fits {own} ({found['causes']} causes)", f"{hot:.2f}"]]
     for engine, x in found["judged_on"].items():
-        errors = f"{x['error']:.3f}, with it {x['error_scaled']:.3f}"
-        losses = f"log-loss {x['log_loss']:.3f}, with it {x['log_loss_scaled']:.3f}"
-        rows.append([f"calibration error on {engine}", f"{errors}; {losses}"])
+        errors, losses = (
+            f"{x[name]:.3f}, with it {x[f'{name}_scaled']:.3f}, "
+            f"with priors by family too {x[f'{name}_priors']:.3f}"
+            for name in ("error", "log_loss")
+        )
+        rows.append([f"calibration error on {engine}", f"{errors}; log-loss {losses}"])
     return rows
 
 
