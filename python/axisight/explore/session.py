@@ -152,17 +152,17 @@ class Session:
         item = self.logs[log]
         known = np.isfinite(residual).all(axis=1)
         broken = None if known.all() else float(item.time_s[int(np.argmin(known))])
-        gap = self._gap([item], [residual], [measured])
+        counted = self.view.counted(item) * residual
+        gap = self._gap([item], [counted], [measured])
         variance = np.maximum(np.var(item.torque_nm, axis=0), 1e-300)
-        bands = self._by_band(residual, variance, item.sample_time_s)
+        bands = self._by_band(counted, variance, item.sample_time_s)
         return Seen(measured, simulated, residual, position, gap, bands, broken)
 
     def held_gap(self, version: Version = AS_GIVEN) -> Array:
         """Return the gap per axis over all validation logs (n_axes,) [1]."""
-        measured = self._held_measured()
         torques = self.view.torques(version.variant(), self._held)
-        errors = [t - u for t, u in zip(torques, measured, strict=True)]
-        return self._gap(self._held, errors, measured)
+        errors = self.view.errors(torques, self._held)
+        return self._gap(self._held, errors, self._held_measured())
 
     @cached_property
     def held_floor(self) -> Array:

@@ -102,12 +102,17 @@ class InverseView(View):
         return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
 
     def measured(self, log: Log) -> Array:
-        """Return the low-passed torque, where it is compared."""
-        return self._compared(log, log.torque_nm)
+        """Return the low-passed torque."""
+        return self._low_passed(log.torque_nm)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return the predicted torque of every log, low-passed as the measured one, where it is compared."""
-        return [self._compared(log, self._predicted(variant, log)) for log in logs]
+        """Return the predicted torque of every log, low-passed as the measured one."""
+        return [self._low_passed(self._predicted(variant, log)) for log in logs]
+
+    def counted(self, log: Log) -> Array:
+        """Return what the error of every sample counts for (n, 1), of mean square one: of ends in motion nothing."""
+        counts = self.filtering.counted(log)[:, None]
+        return np.asarray(counts / np.sqrt(np.mean(counts**2)))
 
     def _predicted(self, variant: Variant, log: Log) -> Array:
         at = self.filtering(log)
@@ -128,9 +133,8 @@ class InverseView(View):
         torques = [self.torques(AS_GIVEN, each) for each in (logs, others)]
         return np.maximum(_relative(speeds, theirs), _relative(*torques))
 
-    def _compared(self, log: Log, torque_nm: Array) -> Array:
-        low = self.filtering.compared(torque_nm, self._sample_time_s)
-        return self.filtering.counted(log)[:, None] * low
+    def _low_passed(self, torque_nm: Array) -> Array:
+        return self.filtering.compared(torque_nm, self._sample_time_s)
 
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
@@ -138,7 +142,7 @@ class InverseView(View):
         """Return the error that noise of position and torque causes, for every log."""
         del variant
         return [
-            self.filtering.counted(log)[:, None] * self.noise.error(log, run)
+            self.counted(log) * self.noise.error(log, run)
             for run, log in enumerate(logs, start=first_run)
         ]
 

@@ -170,7 +170,9 @@ def reproduction(
     off by the root of the share by which these lie apart.
     """
     real = [view.measured(log) for log in logs]
-    size = _rms(off.torques_nm)
+    counts = [view.counted(log) for log in logs]
+    seen = [c * x for c, x in zip(counts, off.torques_nm, strict=True)]
+    size = _rms(seen)
     theirs = list(off.theirs_nm)
     taken_off = True
     if view.mode == "inverse_dynamics":
@@ -181,7 +183,7 @@ def reproduction(
         theirs = theirs if taken_off else model
     about_mean = [their - their.mean(axis=0) for their in off.theirs_nm]
     noises = view.noises(logs, 0)
-    items = [ErrorLog(*each) for each in zip(logs, off.torques_nm, noises, strict=True)]
+    items = [ErrorLog(*each) for each in zip(logs, seen, noises, strict=True)]
     bands = band_map(items, settings.block_s)
     regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
     return Reproduction(

@@ -341,17 +341,13 @@ def _inputs(
     return name, source, fit_logs, held_logs
 
 
-def _errors(torques: Sequence[Array], measured: Sequence[Array]) -> list[Array]:
-    return [torque - u for torque, u in zip(torques, measured, strict=True)]
-
-
 def _error_logs(view: View, found: Search) -> list[ErrorLog]:
     """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
     with ThreadPoolExecutor(view.settings.threads) as pool:
         noise = pool.submit(view.noises, view.logs, 0)
         refit = view.torques(Variant(found.baseline.robot_values), view.logs)
         noises = noise.result()
-    errors = _errors(refit, [view.measured(log) for log in view.logs])
+    errors = view.errors(refit, view.logs)
     return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
 
 
@@ -395,8 +391,8 @@ def _reach(
     def measure(errors: Sequence[Array]) -> Stage:
         return stage(logs, errors, settings.block_s, measured)
 
-    given = measure(_errors(before, measured))
-    refitted, *stages = [measure(_errors(torques, measured)) for torques in steps]
+    given = measure(view.errors(before, logs))
+    refitted, *stages = [measure(view.errors(torques, logs)) for torques in steps]
     floor = measure(noise)
     after = stages[-1] if stages else refitted
     # The first cause is credited from the simulator as given: that is what the user had.
@@ -405,7 +401,7 @@ def _reach(
         gap_reduction(a, b, given, floor, draws=settings.bootstrap, seed=settings.seed)
         for a, b in zip(earlier, stages, strict=False)
     ]
-    remaining = zip(logs, _errors(steps[-1], measured), noise, strict=True)
+    remaining = zip(logs, view.errors(steps[-1], logs), noise, strict=True)
     reached = Stages(
         given,
         refitted,

@@ -132,6 +132,17 @@ class View(ABC):
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
+    def counted(self, log: Log) -> Array:
+        """Return what the error of every sample of a log counts for (n, 1), of mean square one."""
+        return np.ones((log.n_samples, 1))
+
+    def errors(self, torques: Sequence[Array], logs: Sequence[Log]) -> list[Array]:
+        """Return the errors of predicted torques on logs, each (n, n_axes) [Nm], as far as they count."""
+        return [
+            self.counted(log) * (torque - self.measured(log))
+            for torque, log in zip(torques, logs, strict=True)
+        ]
+
     def taken_off(self, log: Log, off_nm: Array) -> Array:
         """Return what the torque of a log is off the model's, as it is taken off others (n, n_axes) [Nm].
 
