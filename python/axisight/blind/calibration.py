@@ -56,9 +56,8 @@ def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
     )
     temperature = float(np.exp(found.x))
     families = _families(fitted_on)
-    scaled = _scaled(own, temperature)
     priors = {
-        family: _prior(scaled[families == family], right[families == family])
+        family: _prior(own[families == family], right[families == family], temperature)
         for family in np.unique(families).tolist()
     }
     return {
@@ -70,11 +69,14 @@ def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
     }
 
 
-def _prior(said: Array, right: Array) -> float:
-    """Return what log-odds of causes are off by."""
+def _prior(said: Array, right: Array, temperature: float) -> float:
+    """Return what log-odds of causes are off by after a temperature."""
 
     def loss(prior: float) -> float:
-        return len(said) * _log_loss(_moved(said, prior), right) + 0.5 * (prior / _PRIOR) ** 2
+        return (
+            len(said) * _log_loss(_scaled(said, temperature, prior), right)
+            + 0.5 * (prior / _PRIOR) ** 2
+        )
 
     found = scipy.optimize.minimize_scalar(loss, bounds=(-_LARGEST, _LARGEST), method="bounded")
     return float(found.x)
@@ -86,7 +88,8 @@ def _judged_with(
     others = [j for j in judged if j.setting["engine"] == engine]
     said, right = _said(others)
     scaled = _scaled(said, temperature)
-    moved = _moved(scaled, np.array([priors.get(f, 0.0) for f in _families(others)]))
+    own = np.array([priors.get(family, 0.0) for family in _families(others)])
+    moved = _scaled(said, temperature, own)
     return {
         "causes": len(said),
         "error": _error(said, right),
@@ -135,14 +138,9 @@ def _error(said: Array, right: Array) -> float:
     return sum(off) / len(said) if len(said) else float("nan")
 
 
-def _scaled(said: Array, temperature: float) -> Array:
+def _scaled(said: Array, temperature: float, prior: Array | float = 0.0) -> Array:
     sure = np.clip(said, _SUREST, 1 - _SUREST)
-    return np.asarray(scipy.special.expit(scipy.special.logit(sure) / temperature))
-
-
-def _moved(said: Array, prior: Array | float) -> Array:
-    sure = np.clip(said, _SUREST, 1 - _SUREST)
-    return np.asarray(scipy.special.expit(scipy.special.logit(sure) + prior))
+    return np.asarray(scipy.special.expit(scipy.special.logit(sure) / temperature + prior))
 
 
 def _log_loss(said: Array, right: Array) -> float:

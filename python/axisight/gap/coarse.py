@@ -23,6 +23,7 @@ from axisight.gap.howfar import Stage, Stages, gap_reduction
 from axisight.gap.named import NamedCause
 from axisight.gap.result import Interval
 from axisight.gap.settings import Settings
+from axisight.gap.unfelt import NO_SHARE, SAYS
 from axisight.gap.verdict import Conclusion
 from axisight.gap.view import View
 from axisight.logs import Log
@@ -62,10 +63,10 @@ def with_coarse_encoders(
         }
     else:
         other = steps > _OTHER_SENSOR * np.sqrt(12.0) * view.robot.position_noise_std
-        shares = {i: Interval(0.0, 0.0, 0.0) for i in np.flatnonzero(other).tolist()}
+        shares = dict.fromkeys(np.flatnonzero(other).tolist(), NO_SHARE)
     if not shares:
         return conclusion, []
-    does = _RAISES if view.feels_steps else _MAKES_NONE
+    does = _RAISES if view.feels_steps else SAYS
     named = conclusion.with_causes_behind([_named(i, float(steps[i])) for i in shares])
     checks = [_says(i, float(steps[i]), does) for i in shares]
     return named.with_checks(checks), list(shares.values())
@@ -90,10 +91,6 @@ def _named(axis: int, step: float) -> NamedCause:
 
 _RAISES = (
     "What they do to the torque no two runs repeat: the floor has it, and no simulator removes it."
-)
-_MAKES_NONE = (
-    "A torque predicted from the measured motion does not feel them: they make none of this gap, but the "
-    "simulator's own loop would run without them."
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import ClassVar
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects
+from axisight.effects.stated import VISCOUS_FRICTION, WARMING
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.cutoff import chosen_filtering, rigid_below_hz
 from axisight.gap.deflected import deflection_torque
+from axisight.gap.evidence import Evidence, FreeEffect
 from axisight.gap.inverse_noise import InverseNoise
 from axisight.gap.lags import is_lag
 from axisight.gap.model import ModelFitter
@@ -101,6 +103,12 @@ class InverseView(View):
         bent = deflection_torque(robot, at, log.sample_time_s)
         return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
 
+    def candidates(
+        self, model: Evidence, *, axes: Collection[int] | None = None
+    ) -> list[FreeEffect]:
+        """Return the candidates of `View`, each in its turn."""
+        return [f for f in super().candidates(model, axes=axes) if _in_its_turn(f.effect, model)]
+
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque."""
         return self._low_passed(log.torque_nm)
@@ -181,6 +189,18 @@ class InverseView(View):
         if self.noise.repeated:
             out.append("The floor is what repeats of one motion differ by.")
         return tuple(out)
+
+
+def _in_its_turn(effect: Effect, model: Evidence) -> bool:
+    """Whether an effect is looked for beside the causes of a model by inverse dynamics.
+
+    What no formula has of a real machine passes for something late beside a cause, and, where friction
+    is missing at all, for one that changes with time: that is asked where plain friction is a cause.
+    """
+    beside = {f.effect.name for f in model.free if f.effect.axis == effect.axis}
+    if effect.name == WARMING:
+        return VISCOUS_FRICTION in beside
+    return not (is_lag(effect) and beside)
 
 
 def _relative(these: Sequence[Array], others: Sequence[Array]) -> Array:

@@ -173,13 +173,17 @@ def reproduction(
     counts = [view.counted(log) for log in logs]
     seen = [c * x for c, x in zip(counts, off.torques_nm, strict=True)]
     size = _rms(seen)
+
+    def gap_to(others: Sequence[Array]) -> Array:
+        return _rms([c * (a - b) for c, a, b in zip(counts, real, others, strict=True)])
+
     theirs = list(off.theirs_nm)
     taken_off = True
     if view.mode == "inverse_dynamics":
         model = view.torques(AS_GIVEN, logs)
         theirs = [a + b for a, b in zip(model, off.torques_nm, strict=True)]
         wrong = size * np.sqrt(view.apart(logs, simulated))
-        taken_off = bool(np.all(wrong <= _HARMLESS * _rms(_less_each(real, theirs))))
+        taken_off = bool(np.all(wrong <= _HARMLESS * gap_to(theirs)))
         theirs = theirs if taken_off else model
     about_mean = [their - their.mean(axis=0) for their in off.theirs_nm]
     noises = view.noises(logs, 0)
@@ -188,14 +192,10 @@ def reproduction(
     regimes = regime_maps(items, settings.bandwidth_hz, settings.block_s)
     return Reproduction(
         size / np.maximum(_rms(about_mean), 1e-300),
-        size / np.maximum(_rms(_less_each(real, theirs)), 1e-300),
+        size / np.maximum(gap_to(theirs), 1e-300),
         taken_off,
         findings(bands, regimes, settings.significance),
     )
-
-
-def _less_each(these: Sequence[Array], others: Sequence[Array]) -> list[Array]:
-    return [a - b for a, b in zip(these, others, strict=True)]
 
 
 def _rms(parts: Sequence[Array]) -> Array:

@@ -14,10 +14,13 @@ from axisight.gap.torque_sensor import sensor_of, share_reported, unseen_constan
 from axisight.gap.verdict import Conclusion, named_shown
 from axisight.gap.view import View
 
-_SAYS = (
+SAYS = (
     "A torque predicted from the measured motion does not feel it: it makes none of this gap, but the "
     "simulator's own loop would run without it."
 )
+"""What is to be said of a cause that the gap does not feel."""
+NO_SHARE = Interval(0.0, 0.0, 0.0)
+"""Its `gap_reduction`."""
 
 
 def with_controllers_shown(conclusion: Conclusion, view: View) -> tuple[Conclusion, list[Interval]]:
@@ -37,8 +40,8 @@ def with_controllers_shown(conclusion: Conclusion, view: View) -> tuple[Conclusi
             conclusion = conclusion.with_checks([cause.says])
         else:
             conclusion = conclusion.with_causes_behind([gains])
-            conclusion = conclusion.with_checks([f"{cause.says} {_SAYS}"])
-            shares.append(Interval(0.0, 0.0, 0.0))
+            conclusion = conclusion.with_checks([f"{cause.says} {SAYS}"])
+            shares.append(NO_SHARE)
     return conclusion, shares
 
 

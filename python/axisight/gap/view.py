@@ -10,13 +10,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
-from axisight.effects.stated import VISCOUS_FRICTION, WARMING
 from axisight.gap.candidates import all_candidates, situation
 from axisight.gap.compared import Compared
 from axisight.gap.currents import unknown_axes
 from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.lags import is_lag
 from axisight.gap.layout import layout_of
 from axisight.gap.model import ModelFitter
 from axisight.gap.noise import Floor
@@ -102,8 +99,6 @@ class View(ABC):
             threads=self.settings.threads,
         )
         none = self.not_offered | absorbed(self.robot, self.fitter.own)
-        if self.mode == "inverse_dynamics":
-            found = [f for f in found if _in_its_turn(f.effect, model)]
         return [f for f in found if f.effect.label not in none]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
@@ -200,15 +195,3 @@ class View(ABC):
         """
         del found, logs
         return 0.0
-
-
-def _in_its_turn(effect: Effect, model: Evidence) -> bool:
-    """Whether an effect is looked for beside the causes of a model by inverse dynamics.
-
-    What no formula has of a real machine passes for something late beside a cause, and, where friction
-    is missing at all, for one that changes with time: that is asked where plain friction is a cause.
-    """
-    beside = {f.effect.name for f in model.free if f.effect.axis == effect.axis}
-    if effect.name == WARMING:
-        return VISCOUS_FRICTION in beside
-    return not (is_lag(effect) and beside)
