@@ -96,7 +96,7 @@ wheel-smoke: $(WHEELS)/.built
 
 fuzz: $(STAMPS)/test-tools
 	AXISIGHT_FUZZ=$(FUZZ) $(CARGO) test --release --locked -p axisight-tests --test damaged_robots
-	AXISIGHT_FUZZ=$(FUZZ) $(BIN)/python -m pytest -q tests/python/test_fuzz_readers.py tests/python/test_fuzz_documents.py
+	AXISIGHT_FUZZ=$(FUZZ) $(BIN)/python -m pytest -q tests/python/fuzz/test_fuzz_readers.py tests/python/fuzz/test_fuzz_documents.py
 
 crash: $(STAMPS)/test-tools
 	$(BIN)/python tests/python/crash_trial.py $(KILLS)
@@ -107,8 +107,8 @@ lock: $(STAMPS)/test-tools $(STAMPS)/docs-tools
 
 # Lowest versions of what pyproject.toml asks for, in an environment of their own.
 LOWEST := $(VENV)/lowest
-LOWEST_TESTS := test_cli test_logs_reading test_logs_errors test_montecarlo_store test_store_foreign \
-	test_excitation_limits test_report test_damaged_results
+LOWEST_TESTS := cli/test_cli logs/test_logs_reading logs/test_logs_errors montecarlo/test_montecarlo_store \
+	storage/test_store_foreign excitation/test_excitation_limits report/test_report storage/test_damaged_results
 lowest: $(STAMPS)/installed
 	$(INSTALL) 'uv>=0.4'
 	rm -rf $(LOWEST)

@@ -24,9 +24,9 @@ from real_arms import MACHINES, Machine
 
 from axisight import Diagnosis, Robot, Settings, diagnose
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
-from axisight.gap.motion import motion
-from axisight.gap.rigid_torque import predicted_torque
-from axisight.gap.torques import AS_GIVEN
+from axisight.gap.facts.simulator_variant import AS_GIVEN
+from axisight.gap.signals.motion import motion
+from axisight.gap.simulator.rigid_torque import predicted_torque
 
 # Below this share of the torque's standard deviation on its axis an effect is not worth finding.
 SMALLEST_SHARE = 0.05

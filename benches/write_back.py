@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from printed import table
 
 from axisight import Diagnosis, Effect, Log, diagnose, load_robot
-from axisight.gap.motion import Filtering
+from axisight.gap.signals.motion import Filtering
 from axisight.logs import lowpass
 from axisight.mujoco import apply
 from axisight.write_back import Written, write_model

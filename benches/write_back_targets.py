@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from printed import table
 
 from axisight import Diagnosis, Log, Settings, diagnose
-from axisight.gap.settings import DEFAULT_TOLERANCES
+from axisight.gap.facts.settings import DEFAULT_TOLERANCES
 from axisight.logs import lowpass
 from axisight.write_back import Written, write_model
 from servo_arm import MACHINES, NOMINAL, RATE_HZ, ServoArm, moved, simulator

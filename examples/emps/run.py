@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import axisight
-from axisight.gap.inverse import predicted_torque
-from axisight.gap.motion import motion
-from axisight.gap.torques import AS_GIVEN, Variant
+from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant
+from axisight.gap.signals.motion import motion
+from axisight.gap.views.inverse_dynamics import predicted_torque
 
 HERE = Path(__file__).resolve().parent
 # Janot, Gautier, Brunot (2019): least squares on the inverse dynamics of the first run.

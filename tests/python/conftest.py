@@ -1,6 +1,7 @@
 """Fixtures that find the shared data and practice cases, or say plainly what is absent."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,10 @@ settings.register_profile("axisight", deadline=None, derandomize=True)
 settings.load_profile("axisight")
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
+
+# Tests of one room use helpers of another: every folder can be imported from.
+_HERE = Path(__file__).parent
+sys.path.extend(sorted({str(test.parent) for test in _HERE.rglob("test_*.py")} - {str(_HERE)}))
 
 
 def _data_folder() -> Path | None:

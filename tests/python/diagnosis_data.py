@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from axisight import Settings, load_robot
-from axisight.gap.result import (
+from axisight.gap.facts.result import (
     AxisVerdict,
     Candidate,
     Cause,

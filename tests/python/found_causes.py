@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from axisight.gap.result import Cause, Interval
+from axisight.gap.facts.result import Cause, Interval
 
 
 def several(effect: str, axis: int | None, **values: float) -> Cause:

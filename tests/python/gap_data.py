@@ -7,7 +7,7 @@ import numpy as np
 
 from axisight import Effect, Log, Robot, load_robot, simulate
 from axisight.blind.case_files import CaseFolder
-from axisight.gap.evidence import Evidence
+from axisight.gap.fit.fitted_model import FittedModel
 
 PLAN = {"multisine": ("multisine", 1), "second": ("multisine", 2), "moves": ("moves", 0)}
 HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
@@ -91,7 +91,7 @@ def scattered(robot: Robot, seed: int) -> Robot:
     return robot.with_parameters(values)
 
 
-def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 20) -> Evidence:
+def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 20) -> FittedModel:
     """Evidence of an ordinary least-squares fit of y on x, cut into blocks."""
     theta = np.linalg.lstsq(x, y, rcond=None)[0]
     residual = x @ theta - y
@@ -101,7 +101,7 @@ def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 
     loss = np.array([(residual[s : s + block] ** 2).sum() for s in starts])
     p = x.shape[1]
     names = tuple((None, f"p{i}") for i in range(p))
-    return Evidence(
+    return FittedModel(
         effects=(),
         free=(),
         robot_values={},

@@ -69,6 +69,35 @@ def test_modules_and_rooms_have_no_circles(modules: dict[str, Path]) -> None:
     TopologicalSorter(rooms).prepare()
 
 
+# Files of a folder beyond which nobody keeps in mind what is where; modules that the pipeline may name.
+MOST_FILES = 15
+MOST_IMPORTS = 20
+
+
+def test_rooms_of_the_diagnosis_use_one_another_one_way(modules: dict[str, Path]) -> None:
+    def inner(module: str) -> str:
+        folder = modules[module].name == "__init__.py"
+        return module if folder else module.rpartition(".")[0]
+
+    rooms: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        # A folder's own file hands on what stands in it; the pipeline stands on all of them.
+        if module.startswith("axisight.gap.") and path.name != "__init__.py":
+            used = {inner(m) for m in imports(path, modules) if m.startswith("axisight.gap.")}
+            rooms.setdefault(inner(module), set()).update(used - {inner(module)})
+    TopologicalSorter(rooms).prepare()
+
+
+def test_rooms_of_the_diagnosis_are_small_and_say_what_they_are(modules: dict[str, Path]) -> None:
+    gap = modules["axisight.gap"].parent
+    for folder in (gap, *(p for p in gap.rglob("*") if p.is_dir() and p.name != "__pycache__")):
+        files = list(folder.glob("*.py"))
+        assert len(files) <= MOST_FILES, folder
+        said = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8")))
+        assert said and "\n" not in said and said.endswith("."), f"{folder}: one sentence"
+    assert len(imports(gap / "pipeline.py", modules)) <= MOST_IMPORTS
+
+
 def test_package_stands_without_the_study(modules: dict[str, Path]) -> None:
     users = {m for m, p in modules.items() if "axisight_thesis" in imports(p, modules)}
     assert {m for m in users if not m.startswith("axisight_thesis")} == {"axisight.cli.reproduce"}

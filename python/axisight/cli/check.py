@@ -15,9 +15,9 @@ from axisight.cli.screen import OUT
 from axisight.cli.suggest import suggestion
 from axisight.errors import InputError, LogError
 from axisight.gap import Finding
-from axisight.gap.beside import look_beside
-from axisight.gap.faults import refused
-from axisight.gap.inputs import read_beside
+from axisight.gap.facts.faults import refused
+from axisight.gap.intake.inputs import read_beside
+from axisight.gap.intake.preview import look_beside
 from axisight.logs import LogReport, check_log, render
 from axisight.logs.untrusted import check_log_inside
 

@@ -38,12 +38,12 @@ from axisight.cli.show import show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Settings, diagnose
-from axisight.gap.inputs import read_inputs
-from axisight.gap.own_effects import gain_names, gain_quantities
-from axisight.gap.result import VerdictKind
-from axisight.gap.settings import DEFAULT_TOLERANCES
-from axisight.gap.tolerances import with_tolerances
-from axisight.gap.used import Used
+from axisight.gap.facts.result import VerdictKind
+from axisight.gap.facts.settings import DEFAULT_TOLERANCES
+from axisight.gap.intake.inputs import read_inputs
+from axisight.gap.prepare.used_part import Used
+from axisight.gap.simulator.own_parameters import gain_names, gain_quantities
+from axisight.gap.simulator.tolerances import with_tolerances
 from axisight.robot import Robot
 
 EXIT_CODES: dict[VerdictKind, int] = {

@@ -32,10 +32,10 @@ from axisight.cli.common import (
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import MissingExtraError
-from axisight.gap.inputs import read_inputs
-from axisight.gap.settings import Settings
-from axisight.gap.tolerances import with_tolerances
-from axisight.gap.used import Used
+from axisight.gap.facts.settings import Settings
+from axisight.gap.intake.inputs import read_inputs
+from axisight.gap.prepare.used_part import Used
+from axisight.gap.simulator.tolerances import with_tolerances
 
 
 def explore_command(

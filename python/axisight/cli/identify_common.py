@@ -12,8 +12,8 @@ import typer
 from axisight.cli.common import numbers, say
 from axisight.errors import InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
-from axisight.gap.faults import refused
-from axisight.gap.used import WHOLE, Used
+from axisight.gap.facts.faults import refused
+from axisight.gap.prepare.used_part import WHOLE, Used
 from axisight.logs import Log, check_log, read_log
 from axisight.logs.map_files import column_file
 from axisight.logs.sources import files_of

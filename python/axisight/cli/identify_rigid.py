@@ -28,7 +28,7 @@ from axisight.cli.identify_common import (
 from axisight.cli.screen import OUT
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
-from axisight.gap.used import Used
+from axisight.gap.prepare.used_part import Used
 
 if TYPE_CHECKING:
     from axisight.rigid_body import DriveTerms, LogIdentification

@@ -12,8 +12,9 @@ from axisight.cli.common import say, write_text
 from axisight.cli.model_options import ModelOptions
 from axisight.cli.screen import is_output
 from axisight.gap import Diagnosis
-from axisight.gap.headline import clear_changes, listed
-from axisight.gap.inputs import Inputs
+from axisight.gap.facts.wording import listed
+from axisight.gap.intake.inputs import Inputs
+from axisight.gap.verdict.headline import clear_changes
 from axisight.write_back import Written
 from axisight.write_back.refitted import refitted_gains
 

@@ -17,8 +17,8 @@ from axisight.cli.outcomes import (
 )
 from axisight.cli.screen import is_output
 from axisight.gap import Diagnosis
-from axisight.gap.inputs import Inputs
-from axisight.gap.separate.experiment import experiment_files
+from axisight.gap.facts.experiment import experiment_files
+from axisight.gap.intake.inputs import Inputs
 from axisight.storage import check_targets
 
 # How files end that an output may replace unasked: what the command makes anew.

@@ -9,11 +9,17 @@ from rich.table import Table
 from axisight.cli.common import say
 from axisight.cli.screen import OUT
 from axisight.gap import Diagnosis, Gap, Interval, Where
-from axisight.gap.axis_words import own_name
-from axisight.gap.compared import FROM_POSITIONS, MOTION_HEAD, motion_words, torque_of
-from axisight.gap.headline import in_order, percent
-from axisight.gap.own_simulator import said
-from axisight.gap.result import MotionErrors
+from axisight.gap.facts.axis_names import own_name
+from axisight.gap.facts.compared_quantity import (
+    FROM_POSITIONS,
+    MOTION_HEAD,
+    motion_words,
+    torque_of,
+)
+from axisight.gap.facts.result import MotionErrors
+from axisight.gap.facts.wording import percent
+from axisight.gap.intake.user_simulator import said
+from axisight.gap.verdict.headline import in_order
 from axisight.report.limits import limit_table
 
 _RANKED = 8

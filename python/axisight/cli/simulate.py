@@ -18,8 +18,8 @@ from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.excitation.files import holds_references, read_references
-from axisight.gap.inputs import read_beside
-from axisight.gap.used import Used
+from axisight.gap.intake.inputs import read_beside
+from axisight.gap.prepare.used_part import Used
 from axisight.logs import Log
 from axisight.logs.sources import files_of
 from axisight.robot import Robot

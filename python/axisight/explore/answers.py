@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from axisight.errors import AxisightError
 from axisight.explore.regard import Against, in_bins, order_spectrum, quantity, responses
 from axisight.explore.session import AS_GIVEN, Seen, Session, Version
-from axisight.gap.own_effects import with_values
+from axisight.gap.simulator.own_parameters import with_values
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]

@@ -14,8 +14,8 @@ from axisight.explore.said import read_said
 from axisight.explore.server import Served, serve
 from axisight.explore.session import Session
 from axisight.explore.state import State
-from axisight.gap.inputs import Inputs
-from axisight.gap.settings import Settings
+from axisight.gap.facts.settings import Settings
+from axisight.gap.intake.inputs import Inputs
 
 
 def prepared(

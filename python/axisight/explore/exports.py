@@ -11,7 +11,7 @@ import matplotlib.figure
 
 from axisight import palette
 from axisight.explore.session import Seen, Session, Version
-from axisight.gap.own_effects import split
+from axisight.gap.simulator.own_parameters import split
 from axisight.report.curves import thin
 from axisight.robot_file import Provenance, identified
 from axisight.robot_file.document import render

@@ -22,7 +22,7 @@ from axisight.explore.exports import figure_png, robot_text, verdict_text
 from axisight.explore.plots import Orders, Regard, Responses, time_figures
 from axisight.explore.regard import AGAINST
 from axisight.explore.state import PINS, State
-from axisight.gap.compared import torque_of
+from axisight.gap.facts.compared_quantity import torque_of
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
-from axisight.gap.orders import HIGHEST_ORDER, Turning
+from axisight.gap.hypotheses.ripple_orders import HIGHEST_ORDER, Turning
 from axisight.logs import Log, lowpass
 from axisight.robot import Robot
 

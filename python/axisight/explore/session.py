@@ -15,14 +15,14 @@ from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.explore.choices import in_bounds
 from axisight.explore.measured import measured_gains
-from axisight.gap.currents import unknown_axes
-from axisight.gap.howfar import stage
-from axisight.gap.own_effects import nominal_values, with_values
-from axisight.gap.pipeline import behind_gate
-from axisight.gap.settings import Settings
-from axisight.gap.torques import Variant, combine
-from axisight.gap.view import View
-from axisight.gap.where import BAND_EDGES_HZ
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import Variant, combine
+from axisight.gap.intake.prepared_logs import behind_gate
+from axisight.gap.measure.gap_figures import stage
+from axisight.gap.measure.where import BAND_EDGES_HZ
+from axisight.gap.prepare.currents import unknown_axes
+from axisight.gap.simulator.own_parameters import nominal_values, with_values
+from axisight.gap.views.view import View
 from axisight.logs import Log
 from axisight.robot import Robot
 

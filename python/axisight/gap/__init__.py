@@ -1,9 +1,7 @@
 """Diagnosis of the gap between a simulator and measured logs: where, which, how far."""
 
-from axisight.gap.faults import Finding, RefusedInputError
-from axisight.gap.gate import check_fit_inputs, check_inputs
-from axisight.gap.pipeline import diagnose
-from axisight.gap.result import (
+from axisight.gap.facts.faults import Finding, RefusedInputError
+from axisight.gap.facts.result import (
     AxisVerdict,
     Candidate,
     Cause,
@@ -16,11 +14,14 @@ from axisight.gap.result import (
     Remainder,
     Where,
 )
-from axisight.gap.schema import verdict_schema
+from axisight.gap.facts.schema import verdict_schema
+from axisight.gap.facts.settings import DEFAULT_TOLERANCES, Settings
+from axisight.gap.gate import check_fit_inputs, check_inputs
+from axisight.gap.pipeline import diagnose
 from axisight.gap.separate.waves import ExperimentLimits
-from axisight.gap.settings import Settings
 
 __all__ = [
+    "DEFAULT_TOLERANCES",
     "AxisVerdict",
     "Candidate",
     "Cause",

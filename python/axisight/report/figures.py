@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.result import Diagnosis, Overlay
+from axisight.gap.facts.result import Diagnosis, Overlay
 from axisight.report.curves import path, thin
 from axisight.report.scale import Scale
 from axisight.report.wording import (

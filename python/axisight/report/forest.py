@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
 from axisight.errors import InputError
-from axisight.gap.result import Cause, Diagnosis, Interval
+from axisight.gap.facts.result import Cause, Diagnosis, Interval
 from axisight.palette import AFTER
 from axisight.report.wording import title_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from axisight.gap.result import DetectionLimit
+from axisight.gap.facts.result import DetectionLimit
 from axisight.report.wording import NO_VALUE, number, plain_name
 
 # How places read where no size would show, by what hides it.

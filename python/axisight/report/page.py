@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from axisight.effects import effect_table
-from axisight.gap.axis_words import axis_label
-from axisight.gap.compared import MOTION_HEAD, motion_words, torque_of
-from axisight.gap.headline import in_order, within_tolerances
-from axisight.gap.result import (
+from axisight.gap.facts.axis_names import axis_label
+from axisight.gap.facts.compared_quantity import MOTION_HEAD, motion_words, torque_of
+from axisight.gap.facts.result import (
     Candidate,
     Cause,
     Diagnosis,
@@ -23,6 +22,7 @@ from axisight.gap.result import (
     VerdictKind,
     Where,
 )
+from axisight.gap.verdict.headline import in_order, within_tolerances
 from axisight.report.colors import shade
 from axisight.report.figures import TOP, overlays_by_log, ranking_bars
 from axisight.report.limits import limit_table

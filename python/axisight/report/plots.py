@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from axisight.errors import InputError
-from axisight.gap.result import Diagnosis, Overlay
+from axisight.gap.facts.result import Diagnosis, Overlay
 from axisight.logs import Log
 from axisight.palette import AFTER, BEFORE, MEASURED, cell_colors
 from axisight.report.wording import GapMap, gap_maps, ranked, share_limit, title_of

@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import title
-from axisight.gap.beyond import LARGEST
-from axisight.gap.result import Candidate, Cause, Diagnosis, Interval, Where
+from axisight.gap.facts.result import Candidate, Cause, Diagnosis, Interval, Where
+from axisight.gap.facts.wording import LARGEST
 
 Floats = NDArray[np.float64]
 

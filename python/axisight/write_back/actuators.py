@@ -16,7 +16,7 @@ from axisight.write_back.servos import SERVO, SERVO_EFFECTS, Servo, delayed, is_
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 # What makes a <general> what a <motor> is, with a gain.
 _MOTOR = {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}

@@ -24,7 +24,7 @@ from axisight.write_back.placed import Placed, said
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 Array = NDArray[np.float64]
 

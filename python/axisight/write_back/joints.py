@@ -20,7 +20,7 @@ from axisight.write_back.placed import Placed, said
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 JOINT_NUMBERS = {
     "robot": {DRY_FRICTION[0]: "friction", VISCOUS_FRICTION: "damping"},

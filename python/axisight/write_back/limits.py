@@ -13,7 +13,7 @@ from axisight.robot_import.bodies import Drive
 from axisight.write_back.xml_edits import Numbers
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 LIMIT_EFFECTS = frozenset((TORQUE_LIMIT[0], TORQUE_CONSTANT[0]))
 """Causes that change what a limit of force has to be."""

@@ -20,7 +20,7 @@ from axisight.robot_import.chain import Chain, ChainJoint
 from axisight.write_back.placed import Placed
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 Array = NDArray[np.float64]
 

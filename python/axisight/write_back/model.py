@@ -30,7 +30,7 @@ from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause, Interval
+    from axisight.gap.facts.result import Cause, Interval
 
 _KINDS = (".urdf", ".xml", ".mjcf")
 # Why the drive of a joint takes nothing, or no gains.

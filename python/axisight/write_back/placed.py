@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from axisight.effects import effect_info
-from axisight.gap.headline import listed
+from axisight.gap.facts.wording import listed
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 
 class Labelled(Protocol):

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from axisight.gap.own_effects import gain_names
+from axisight.gap.simulator.own_parameters import gain_names
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Interval
+    from axisight.gap.facts.result import Interval
 
 # Of a normal distribution, what an interval of 95 % is to either side.
 _DEVIATIONS = 1.96

@@ -15,7 +15,7 @@ from axisight.write_back.refitted import Refitted, factors
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
-    from axisight.gap.result import Cause
+    from axisight.gap.facts.result import Cause
 
 SERVO = "position"
 """Tag of the usual such actuator."""

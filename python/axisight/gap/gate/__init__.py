@@ -1,6 +1,6 @@
 """The gate before a diagnosis: simulator and logs are looked at before anything is fitted to them."""
 
-from axisight.gap.faults import MEANINGS, Finding, RefusedInputError
+from axisight.gap.facts.faults import MEANINGS, Finding, RefusedInputError
 from axisight.gap.gate.inspect import (
     check_by_targets,
     check_fit_inputs,

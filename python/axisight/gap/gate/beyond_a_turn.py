@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.faults import Finding
+from axisight.gap.facts.faults import Finding
 from axisight.logs import Log
 from axisight.logs.guessing.evidence import LARGEST_JOINT_DEG, LARGEST_JOINT_RAD
 from axisight.robot import Robot

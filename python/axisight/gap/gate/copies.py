@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.faults import Finding, GateSeverity
+from axisight.gap.facts.faults import Finding, GateSeverity
 from axisight.logs import Log
 
 Hashes = NDArray[np.uint64]

@@ -6,19 +6,19 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from axisight.fitting.simulation_error import is_closed_loop
-from axisight.gap.faults import Finding, RefusedInputError, check_names, flagged, refused
+from axisight.gap.controller.clock_drift import with_drift
+from axisight.gap.controller.other_controllers import clock_drift
+from axisight.gap.facts.faults import Finding, RefusedInputError, check_names, flagged, refused
 from axisight.gap.gate.beyond_a_turn import check_turns
-from axisight.gap.gate.closed_loop import check_closed_loop
+from axisight.gap.gate.by_controller.closed_loop import check_closed_loop
+from axisight.gap.gate.by_controller.follows_target import check_follows_target
+from axisight.gap.gate.by_dynamics.inverse_checks import check_inverse
+from axisight.gap.gate.by_dynamics.turned_axes import check_turned_axes
 from axisight.gap.gate.copies import check_copies
-from axisight.gap.gate.follows_target import check_follows_target
-from axisight.gap.gate.inverse_checks import check_inverse
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.gate.machine import check_machine
 from axisight.gap.gate.noise_level import check_noise
 from axisight.gap.gate.start import check_start
-from axisight.gap.gate.turned_axes import check_turned_axes
-from axisight.gap.own_clock import with_drift
-from axisight.gap.own_controller import clock_drift
 from axisight.logs import Log
 from axisight.robot import Robot
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.faults import Finding, GateSeverity
+from axisight.gap.facts.faults import Finding, GateSeverity
 from axisight.logs import Finding as LogFinding
 from axisight.logs import Log
 from axisight.logs.checking import look_at_signals

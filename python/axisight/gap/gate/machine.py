@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from axisight.gap.faults import Finding
+from axisight.gap.facts.faults import Finding
 from axisight.logs import Log
 from axisight.logs.grid import RATE_TOLERANCE
 from axisight.robot import Robot

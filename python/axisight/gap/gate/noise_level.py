@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from axisight.gap.faults import Finding
-from axisight.gap.noise import position_noise_std
+from axisight.gap.facts.faults import Finding
+from axisight.gap.signals.noise import position_noise_std
 from axisight.logs import Log
 from axisight.logs.quality import quantization
 from axisight.robot import Robot

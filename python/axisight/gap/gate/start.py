@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from axisight.gap.faults import Finding
-from axisight.gap.poses import OFFSET_RAD
+from axisight.gap.facts.faults import Finding
+from axisight.gap.simulator.start_poses import OFFSET_RAD
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate

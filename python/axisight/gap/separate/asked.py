@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.gap.axis_words import placed
-from axisight.gap.closed_loop import ClosedLoopView
-from axisight.gap.result import Diagnosis
+from axisight.gap.facts.axis_names import placed
+from axisight.gap.facts.experiment import Experiment
+from axisight.gap.facts.result import Diagnosis
+from axisight.gap.search.state import SearchState
 from axisight.gap.separate.design import designed
-from axisight.gap.separate.experiment import Experiment
 from axisight.gap.separate.question import Question
 from axisight.gap.separate.rivals import rivals_of
 from axisight.gap.separate.sought import sought
 from axisight.gap.separate.waves import ExperimentLimits, seen_range
-from axisight.gap.state import Search
-from axisight.gap.view import View
+from axisight.gap.views.closed_loop import ClosedLoopView
+from axisight.gap.views.view import View
 from axisight.robot import Robot
 
 
@@ -36,7 +36,7 @@ class Asked:
         if isinstance(view, ClosedLoopView):
             seen_range(view.logs, self.within)
 
-    def added(self, out: Diagnosis, view: View, found: Search, *, keep: bool) -> Diagnosis:
+    def added(self, out: Diagnosis, view: View, found: SearchState, *, keep: bool) -> Diagnosis:
         """Return a diagnosis with the experiment, and what to do next; with ``keep``, after what is advised."""
         experiment = self._design(view, found)
         if experiment is None:
@@ -46,7 +46,7 @@ class Asked:
         made = None if isinstance(experiment, str) else experiment
         return replace(out, experiment=made, next_experiment=advice)
 
-    def _design(self, view: View, found: Search) -> Experiment | str | None:
+    def _design(self, view: View, found: SearchState) -> Experiment | str | None:
         """Return the experiment; None where nothing is open, and why there is none where one is to show something.
 
         By inverse dynamics there is no loop to simulate, and no experiment.

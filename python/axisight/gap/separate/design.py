@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.excitation import References
-from axisight.gap.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
-from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.own_effects import with_values
-from axisight.gap.separate.experiment import Experiment, Plan
+from axisight.gap.facts.experiment import Experiment, Plan
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.separate.question import Question, Seen, Turn
 from axisight.gap.separate.waves import Motion, Range, motions, standard
+from axisight.gap.simulator.own_parameters import with_values
+from axisight.gap.views.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
 from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
@@ -77,7 +77,9 @@ def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int)
     return next(tried, most)
 
 
-def _runs(view: ClosedLoopView, machine: Evidence, tried: Sequence[Motion], most: Array) -> _Runs:
+def _runs(
+    view: ClosedLoopView, machine: FittedModel, tried: Sequence[Motion], most: Array
+) -> _Runs:
     robot = with_values(view.robot, machine.robot_values)
     out = simulate_batch(
         robot,
@@ -128,7 +130,7 @@ def _seen(
 
 
 def _left(
-    fitter: ClosedLoopFitter, model: Evidence, free: Sequence[FreeEffect], n_axes: int
+    fitter: ClosedLoopFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
 ) -> tuple[Array, float]:
     """Return what a model with the effects ``free`` leaves of each run, mean squares (n_runs, n_axes).
 

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.separate.experiment import Experiment, Plan
+from axisight.gap.facts.experiment import Experiment, Plan
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 
 Array = NDArray[np.float64]
 
@@ -23,10 +23,10 @@ class Turn:
     explained that is asked about.
     """
 
-    machine: Evidence
-    other: Evidence
-    free: tuple[FreeEffect, ...]
-    neither: tuple[FreeEffect, ...]
+    machine: FittedModel
+    other: FittedModel
+    free: tuple[Hypothesis, ...]
+    neither: tuple[Hypothesis, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.decide import log_ratio
-from axisight.gap.evidence import Evidence
-from axisight.gap.separate.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
+from axisight.gap.facts.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.ranking.posterior import log_ratio
+from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
-from axisight.gap.settings import Settings
-from axisight.gap.state import Search
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Rivals:
     """
 
     labels: tuple[str, str]
-    models: tuple[Evidence, Evidence]
+    models: tuple[FittedModel, FittedModel]
     samples: Array
     to_explain: Array
     least: float
@@ -75,11 +75,11 @@ class Rivals:
         return SeparatingExperiment(plan, self.labels, worth)
 
 
-def _turn(machine: Evidence, other: Evidence) -> Turn:
+def _turn(machine: FittedModel, other: FittedModel) -> Turn:
     return Turn(machine, other, other.free, other.free[:-1])
 
 
-def rivals_of(found: Search, settings: Settings) -> Rivals | None:
+def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
     """Return the two causes of a search that are most nearly as likely; None where all is clear.
 
     Of every cause, the likeliest rival that is no cause itself, at least one in twenty.
@@ -97,7 +97,7 @@ def rivals_of(found: Search, settings: Settings) -> Rivals | None:
     samples = found.layout.samples()
     return Rivals(
         (first.label, other.label),
-        (first.evidence, other.evidence),
+        (first.fitted, other.fitted),
         samples,
         np.maximum(found.to_explain(), 0.0) / samples,
         settings.smallest_gain,

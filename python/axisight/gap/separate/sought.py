@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.gap.decide import numbers
-from axisight.gap.detection import loss_that_shows
-from axisight.gap.evidence import Evidence, FreeEffect
-from axisight.gap.separate.experiment import NAMED, Plan, ShowingExperiment
+from axisight.gap.facts.experiment import NAMED, Plan, ShowingExperiment
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.measure.detection_limits import loss_that_shows
+from axisight.gap.ranking.posterior import numbers
+from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
-from axisight.gap.settings import Settings
-from axisight.gap.state import Search
-from axisight.gap.view import View
+from axisight.gap.views.view import View
 
 Array = NDArray[np.float64]
 
@@ -36,10 +36,10 @@ class Sought:
 
     asked: Effect
     effect: Effect
-    without: Evidence
-    plainer: tuple[FreeEffect, ...]
+    without: FittedModel
+    plainer: tuple[Hypothesis, ...]
     cost: float
-    found: Search
+    found: SearchState
     settings: Settings
 
     @property
@@ -75,7 +75,7 @@ class Sought:
         return ShowingExperiment(plan, self.asked, worth)
 
 
-def sought(found: Search, view: View, effect: Effect) -> Sought | str:
+def sought(found: SearchState, view: View, effect: Effect) -> Sought | str:
     """Return the question whether a machine has an effect; why there is none, in words, otherwise.
 
     What shapes the effect and is not given is as it is in a candidate of a diagnosis.
@@ -95,7 +95,7 @@ def sought(found: Search, view: View, effect: Effect) -> Sought | str:
     bare = replace(
         full, parameters={k: v for k, v in (full.parameters or {}).items() if k not in amplitudes}
     )
-    plainer = (FreeEffect(bare, shared),) if shared else ()
+    plainer = (Hypothesis(bare, shared),) if shared else ()
     return Sought(effect, full, found.model, plainer, numbers(option), found, view.settings)
 
 

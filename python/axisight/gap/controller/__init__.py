@@ -1,0 +1,1 @@
+"""The controller as algebra of references and measured positions, and what logs show of it."""

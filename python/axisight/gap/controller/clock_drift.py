@@ -1,0 +1,91 @@
+"""A machine whose clock is not that of its references, as logs show by themselves.
+
+The command follows from references and measured positions by the stated controller, once the references
+are taken from where the machine's clock had them: a little later, the longer the log runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.effects.stated import CLOCK
+from axisight.gap.facts.algebraic_cause import AlgebraicCause
+from axisight.gap.facts.result import Interval
+from axisight.logs import Log
+
+Array = NDArray[np.float64]
+
+Missed = Callable[[Log, int], float]
+"""Squares of what the stated controller misses of the torque of a log on an axis (from 0)."""
+
+# Two runs of a clock are told apart by references that are so far apart at the end of a log [s].
+_APART_S = 1e-3
+# Share of what the stated controller misses that another clock may leave, in every log.
+_LEFT = 0.02
+# An interval is at least so wide: what a reference is between its samples nobody knows.
+_OF_THE_RATE = 0.01
+
+
+def with_drift(log: Log, rate: float) -> Log:
+    """Return a log with the references that a clock meets which is fast by ``rate`` [1]."""
+    reference = log.velocity_ref_rad_s
+    assert reference is not None  # closed loop only
+    at = np.arange(log.n_samples)
+    met = [np.interp((1 + rate) * at, at, column) for column in reference.T]
+    return replace(log, velocity_ref_rad_s=np.column_stack(met))
+
+
+def drifting_clock(
+    logs: Sequence[Log], stated: Array, shows: Array, missed: Missed
+) -> AlgebraicCause | None:
+    """Return the drift of the machine's clock, if that is what its controller misses.
+
+    ``stated``: squares (n_axes, n_logs) that the controller of the robot file misses of the torque;
+    ``shows``: where that is anything. The drift has to give nearly all of it, on every axis of every log.
+    """
+    places = np.argwhere(shows)
+    axis, log = max(places.tolist(), key=lambda at: float(stated[at[0], at[1]]))
+    start = _nearest(logs[log], lambda x: missed(x, axis))
+
+    def left(rate: float) -> Array:
+        drifting = {i: with_drift(logs[i], rate) for i in {int(i) for _, i in places}}
+        return np.array([missed(drifting[i], a) for a, i in places.tolist()])
+
+    reach = _APART_S / _duration(logs[log])
+    found = scipy.optimize.minimize_scalar(
+        lambda rate: float(left(rate).sum()),
+        bounds=(start - reach, start + reach),
+        method="bounded",
+    )
+    rate = float(found.x)
+    before = stated[tuple(places.T)]
+    after = left(rate)
+    if np.any(after > _LEFT * before):
+        return None
+    explained = float(1.0 - after.sum() / before.sum())
+    doubt = _OF_THE_RATE * abs(rate)
+    says = (
+        f"With a clock that is {1e6 * rate:.4g} ppm fast against that of the references the stated "
+        f"controller misses {100 * explained:.4g} % less of the logged torque."
+    )
+    samples = sum(logs[i].n_samples for _, i in places.tolist())
+    value = {CLOCK[1]: Interval(rate, rate - doubt, rate + doubt)}
+    return AlgebraicCause(CLOCK[0], None, value, samples, explained, says)
+
+
+def _nearest(log: Log, missed: Callable[[Log], float]) -> float:
+    """Return the drift on a grid that misses least of one log."""
+    (info,) = effect_info(CLOCK[0]).parameters
+    count = int((info.upper - info.lower) * _duration(log) / _APART_S) | 1
+    rates = np.linspace(info.lower, info.upper, count)
+    return float(rates[np.argmin([missed(with_drift(log, float(rate))) for rate in rates])])
+
+
+def _duration(log: Log) -> float:
+    return log.n_samples * log.sample_time_s

@@ -1,0 +1,66 @@
+"""How fast a loop forgets where it began: the slowest mode of a robot and its sampled controller."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.gap.controller.feedback import inertia_of_motors
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+FORGOTTEN = 0.01
+"""Share of what differs at the beginning that may be left where a comparison begins.
+
+That of the errors of formulas in the torque (`Settings.model_error`).
+"""
+# Of the loop, in which a state is left within a sample.
+_AT_ONCE = 1e-12
+
+
+def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
+    """Return the rate [1/s] with which the slowest mode of the loop decays, at rest at a pose (n_axes,) [rad].
+
+    Not above zero where the loop does not settle. Linear, without delays and limits. The plant is
+    propagated exactly from sample to sample (zero-order hold; Astrom and Wittenmark, *Computer-Controlled
+    Systems*, 1997, ch. 2); a law of targets, which may hold between samples, is taken as continuous.
+    """
+    plant = robot.linearize(joint_angle_rad.tolist())
+    gains = robot.controller_gains
+    if "kd" in gains:
+        return float(-scipy.linalg.eigvals(_continuous(robot, *plant)).real.max())
+    sizes = np.abs(scipy.linalg.eigvals(_sampled(robot, *plant)))
+    return float(-np.log(max(float(sizes.max()), _AT_ONCE)) / robot.sample_time_s)
+
+
+def _continuous(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
+    """Return the rates of a plant whose motors are told their torque by position and speed."""
+    gains = robot.controller_gains
+    command = np.diag(gains["kp"]) @ outputs + np.diag(gains["kd"]) @ outputs @ states
+    if robot.computed_torque:
+        command = inertia_of_motors(robot) @ command
+    return np.asarray(states - inputs @ command)
+
+
+def _sampled(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
+    """Return the transition of plant, last measured angles and sums of the controller over a sample."""
+    n, m = inputs.shape
+    time = robot.sample_time_s
+    both = np.block([[states, inputs], [np.zeros((m, n + m))]])
+    exact = scipy.linalg.expm(both * time)
+    gains = {k: np.diag(np.broadcast_to(v, m)) for k, v in robot.controller_gains.items()}
+    one, none = np.eye(m), np.zeros((m, m))
+    speed = np.hstack([-outputs, one, none]) / time
+    angle = np.hstack([-outputs, none, none])
+    sums = np.hstack([np.zeros((m, n + m)), one])
+    kp, ki = gains["kp"], gains.get("ki", none)
+    if "kv" in gains:
+        error = speed + gains["kv"] @ angle
+        # What is summed up for nothing is never forgotten, nor does it matter.
+        command, summed = kp @ error + ki @ sums, (ki > 0) @ (sums + time * error)
+    else:
+        command, summed = kp @ speed + ki @ angle, none @ angle
+    plant = np.hstack([exact[:n, :n], np.zeros((n, 2 * m))]) + exact[:n, n:] @ command
+    return np.vstack([plant, -angle, summed])

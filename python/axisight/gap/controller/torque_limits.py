@@ -1,0 +1,123 @@
+"""Torque limits that a log shows by itself: flat tops where the controller asks for more.
+
+Many drives report the torque after their own limit. The machine got what the log says, so a
+simulator that is kept on the log has no error there; driven by the references, it has. But the
+command before the limit is algebra of references and measured positions, whatever the machine:
+where it lies beyond a flat top of the logged torque, and equals the torque elsewhere, the drive has
+cut it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect
+from axisight.effects.stated import TORQUE_LIMIT
+from axisight.gap.controller.feedback import as_taken, before, feedback
+from axisight.gap.facts.algebraic_cause import AlgebraicCause
+from axisight.gap.facts.result import Interval
+from axisight.logs import Log
+from axisight.logs.frozen import runs
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# A flat top has this many equal samples in a row, and all tops together this many.
+_IN_A_ROW = 3
+_IN_ALL = 20
+# One limit for all logs: levels agree so well.
+_SAME_LEVEL = 1e-3
+# Share of the samples at a top where the command must lie beyond it, and share of the torque's
+# variance elsewhere that the command must give; what is left beyond is another controller.
+_BEYOND = 0.95
+_LAW_HOLDS = 0.99
+
+
+def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause, ...]:
+    """Return the limits that logs with velocity references show, axis by axis."""
+    commands = [_command(robot, log) for log in logs]
+    found = (_limit(i, logs, commands) for i in range(robot.n_axes))
+    return tuple(x for x in found if x is not None)
+
+
+def missing(limits: Sequence[AlgebraicCause], robot: Robot) -> tuple[AlgebraicCause, ...]:
+    """Return the limits that a simulator does not have."""
+    own = {e.axis: e.values()[0] for e in robot.effects if e.name == TORQUE_LIMIT[0]}
+
+    def differs(found: AlgebraicCause) -> bool:
+        level = found.values[TORQUE_LIMIT[1]].value
+        return bool(abs(own.get(found.axis, np.inf) / level - 1) > _SAME_LEVEL)
+
+    return tuple(x for x in limits if differs(x))
+
+
+def reported(torque: Array, limits: Sequence[AlgebraicCause], effects: Iterable[Effect]) -> Array:
+    """Return commanded torques (n, n_axes) [Nm] as drives that show ``limits`` report them.
+
+    Cut at the limits among ``effects``, those of the simulator.
+    """
+    out = torque.copy()
+    after = {x.axis for x in limits}
+    for effect in effects:
+        if effect.name == TORQUE_LIMIT[0] and effect.axis is not None and effect.axis in after:
+            limit, i = effect.values()[0], effect.axis - 1
+            out[:, i] = np.clip(out[:, i], -limit, limit)
+    return out
+
+
+def _command(robot: Robot, log: Log) -> Array:
+    """Return what the controller commands before any limit, but for a constant, (n, n_axes) [Nm]."""
+    reference, time = log.velocity_ref_rad_s, log.sample_time_s
+    assert reference is not None  # closed loop only
+    position, speed = as_taken(log)
+    return feedback(robot, reference - speed, before(reference) * time - position)
+
+
+def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> AlgebraicCause | None:
+    torques = [log.torque_nm[:, axis] for log in logs]
+    highest = max(float(np.abs(u).max()) for u in torques)
+    tops = [_flat(np.abs(u), highest) for u in torques]
+    at_top = np.concatenate(tops)
+    if at_top.sum() < _IN_ALL or at_top.all():
+        return None
+    measured = np.concatenate(torques)
+    # What the controller starts from is constant along a log.
+    asked = np.concatenate(
+        [
+            c[:, axis] + np.median((u - c[:, axis])[~top]) if not top.all() else u
+            for u, c, top in zip(torques, commands, tops, strict=True)
+        ]
+    )
+    off = measured - asked
+    power = float(np.var(measured[~at_top]))
+    if not power > 0 or float(np.mean(off[~at_top] ** 2)) > (1 - _LAW_HOLDS) * power:
+        return None
+    beyond = -np.sign(measured) * off
+    scatter = 3.0 * float(np.std(off[~at_top]))
+    if float(np.mean(beyond[at_top] > -scatter)) < _BEYOND or np.median(beyond[at_top]) < scatter:
+        return None
+    cut = np.clip(asked, -highest, highest)
+    explained = 1.0 - float(np.sum((measured - cut) ** 2) / np.sum(off**2))
+    levels = np.abs(measured[at_top])
+    low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975])
+    interval = Interval(float(middle), float(low), float(high))
+    says = (
+        f"Axis {axis + 1}: {100 * at_top.mean():.3g} % of the logged torque stands at "
+        f"{interval.value:.4g} Nm where the controller's law asks for more; cut there, the law gives "
+        f"{100 * explained:.4g} % of what it misses otherwise."
+    )
+    name, parameter = TORQUE_LIMIT
+    samples = int(at_top.sum())
+    return AlgebraicCause(name, axis + 1, {parameter: interval}, samples, explained, says)
+
+
+def _flat(size: Array, level: float) -> NDArray[np.bool_]:
+    """Mark the samples (n,) of runs at a level."""
+    flat = np.zeros(len(size), dtype=bool)
+    for a, b in runs(size >= (1 - _SAME_LEVEL) * level):
+        if b - a >= _IN_A_ROW:
+            flat[a:b] = True
+    return flat

@@ -1,0 +1,165 @@
+"""A designed experiment: what to run, why, and how much sooner it decides."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from axisight.effects import Effect
+from axisight.excitation import References, write_references
+from axisight.gap.facts.axis_names import placed
+from axisight.storage import write_whole
+
+# Log-likelihood ratio at which the wrong rival is less likely than one in twenty.
+ENOUGH = float(np.log(19.0))
+# Size, relative to the smallest that would show, at which an effect is named too: nine times of ten.
+NAMED = 2.0
+# How many times longer is as long, and how many are for ever.
+_AS_WELL, _NEVER = 1.5, 90.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion, and how often to run it.
+
+    ``motion``: what moves, in words; ``axes`` (from 1) that move; ``references``: one period of it,
+    motor side; ``repeats``: how often to run it; ``times_shorter``: a standard multisine on all axes
+    would have to be so many times as long for as much, or infinitely.
+    """
+
+    motion: str
+    axes: tuple[int, ...]
+    references: References
+    repeats: int
+    times_shorter: float
+
+    def __str__(self) -> str:
+        """What moves, where and how long."""
+        moved = ", ".join(str(a) for a in self.axes)
+        where = f"axis {moved} alone" if len(self.axes) == 1 else f"axes {moved}"
+        often = "" if self.repeats == 1 else f", {self.repeats} times"
+        return f"{self.motion}, {where}, {self.references.period_s:g} s{often}"
+
+    def beside_a_multisine(self) -> str:
+        """Return how a multisine compares, in a sentence."""
+        if self.times_shorter > _NEVER:
+            return "A multisine on all axes would not show it."
+        if self.times_shorter < _AS_WELL:
+            return "A multisine on all axes does as well."
+        return f"A multisine on all axes would have to be {self.times_shorter:.2g} times as long."
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment(ABC):
+    """References that answer a question: `SeparatingExperiment` or `ShowingExperiment`."""
+
+    plan: Plan
+
+    @property
+    def references(self) -> References:
+        """One period of the motion, (1, n_samples, n_axes) [rad/s], motor side."""
+        return self.plan.references
+
+    @property
+    def repeats(self) -> int:
+        """How often to run it."""
+        return self.plan.repeats
+
+    @property
+    @abstractmethod
+    def decides(self) -> bool:
+        """Whether it answers the question."""
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """What to do and what it tells, in a sentence or two."""
+
+    def write(self, folder: Path | str) -> list[Path]:
+        """Write ``references.parquet`` and ``experiment.txt`` into a folder; return their paths.
+
+        Raises InputError where they cannot be written.
+        """
+        samples, text = experiment_files(folder)
+        write_references(self.references, samples)
+        write_whole(text, f"{self}\n")
+        return [samples, text]
+
+
+@dataclass(frozen=True, eq=False)
+class SeparatingExperiment(Experiment):
+    """References that tell two rivals apart.
+
+    ``rivals``: labels ``effect@axis``; ``log_ratio``: log-likelihood ratio of the true rival to the other
+    to expect, whichever is true.
+    """
+
+    rivals: tuple[str, str]
+    log_ratio: float
+
+    @property
+    def decides(self) -> bool:
+        """Whether the wrong rival would be seen to be wrong."""
+        return self.log_ratio >= ENOUGH
+
+    def __str__(self) -> str:
+        """What to do and what it tells, in a sentence or two."""
+        one, other = (placed(label) for label in self.rivals)
+        if not self.decides:
+            return (
+                f"No motion within the limits of speed, travel and torque tells {one} from {other}: "
+                f"the best of those tried ({_begun_small(self.plan)}) makes the true one "
+                f"{np.exp(self.log_ratio):.2g} times as likely."
+            )
+        return (
+            f"{self.plan}, tells {one} from {other}: the true one is then at least "
+            f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely. {self.plan.beside_a_multisine()}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ShowingExperiment(Experiment):
+    """References that show an amplitude of an effect, if the machine has it.
+
+    ``effect``: as it was asked for; ``share``: its size relative to the smallest that would show with 95 % power.
+    """
+
+    effect: Effect
+    share: float
+
+    @property
+    def decides(self) -> bool:
+        """Whether the size asked for would show."""
+        return self.share >= 1.0
+
+    def __str__(self) -> str:
+        """What to do and what it tells, in a sentence or two."""
+        sizes = ", ".join(f"{k} = {v:.4g}" for k, v in (self.effect.parameters or {}).items())
+        what = f"{placed(self.effect.label)} ({sizes})"
+        if not self.decides:
+            larger = (
+                f"would have to be {1 / self.share:.2g} times as large"
+                if self.share
+                else "never shows"
+            )
+            return (
+                f"No motion within the limits of speed, travel and torque shows {what}: with the "
+                f"best of those tried ({_begun_small(self.plan)}) it {larger}."
+            )
+        named = "" if self.share >= NAMED else ": it may be seen and not named"
+        return (
+            f"{self.plan}, shows {what} if it is there; the least that would show, nineteen times of "
+            f"twenty, is {100 / self.share:.0f} % of it{named}. {self.plan.beside_a_multisine()}"
+        )
+
+
+def experiment_files(folder: Path | str) -> tuple[Path, Path]:
+    """Return what `Experiment.write` writes into a folder: the references, and what they are for."""
+    return Path(folder) / "references.parquet", Path(folder) / "experiment.txt"
+
+
+def _begun_small(plan: Plan) -> str:
+    words = str(plan)
+    return words[0].lower() + words[1:]

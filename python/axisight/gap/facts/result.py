@@ -1,0 +1,539 @@
+"""What a diagnosis says: data only, so that a figure or a page can be made again."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from axisight.display import html
+from axisight.effects import Effect
+from axisight.gap.facts.axis_names import axis_label, verdict_word
+from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
+from axisight.gap.facts.experiment import Experiment
+from axisight.gap.facts.faults import Finding
+from axisight.storage import write_whole
+
+VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
+Mode = Literal["closed_loop", "inverse_dynamics"]
+Hidden = Literal["tolerances", "motion"]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """Torque error of the whole arm as identification papers give it: sqrt(sum e^2 / sum u^2) [1].
+
+    Sums over all samples, axes and validation logs; e is simulated minus measured torque, u the
+    measured torque itself, not about its mean. Heavy axes weigh more than in `Gap`. ``before``,
+    ``refitted``, ``after`` and ``floor`` as there.
+    """
+
+    before: float
+    refitted: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class AxisStages:
+    """Errors of the simulator at each stage, by axis (n_axes,); ``before`` to ``floor`` as in `Gap`."""
+
+    before: Array
+    refitted: Array
+    after: Array
+    floor: Array
+
+
+@dataclass(frozen=True)
+class MotionErrors:
+    """Errors of position and velocity on the validation logs where positions are compared, rms over time and logs.
+
+    Motor side, ``position_rad`` without its mean along a log [rad], ``velocity_rad_s`` [rad/s] (m and m/s of an
+    axis that slides without a gear), both below the frequency up to which positions are compared.
+    ``velocity_from``: ``"logged"``, or ``"positions"`` where a log has no velocity, or one that is not that of
+    its position.
+    """
+
+    position_rad: AxisStages
+    velocity_rad_s: AxisStages
+    velocity_from: VelocityFrom
+
+    def rows(self) -> list[tuple[float, ...]]:
+        """Return of each axis position before, after and noise alone, then velocity; as `MOTION_HEAD` says."""
+        stages = [
+            getattr(of, stage)
+            for of in (self.position_rad, self.velocity_rad_s)
+            for stage in ("before", "after", "floor")
+        ]
+        return [tuple(map(float, row)) for row in zip(*stages, strict=True)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what stands in the verdict."""
+        of = {"position_rad": self.position_rad, "velocity_rad_s": self.velocity_rad_s}
+        told = {k: {s: getattr(v, s).tolist() for s in _STAGES} for k, v in of.items()}
+        return {**told, "velocity_from": self.velocity_from}
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Relative torque error on the validation logs, rms over axes and logs [1].
+
+    ``before``: the simulator as given; ``refitted``: its own parameters fitted
+    within their tolerances, no effect added; ``after``: with the causes added;
+    ``floor``: what a perfect model would still leave (sensor noise). The
+    ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where axes that turn
+    and axes that slide cannot be summed. Where ``compared`` is ``"positions"``, torques are what the stated gains
+    command along those of machine and simulator, and ``motion`` has the errors of positions and velocities
+    themselves; None of torques.
+    """
+
+    before: float
+    refitted: float
+    after: float
+    floor: float
+    before_per_axis: Array
+    refitted_per_axis: Array
+    after_per_axis: Array
+    floor_per_axis: Array
+    pooled: Pooled | None = None
+    compared: Compared = "torques"
+    motion: MotionErrors | None = None
+
+
+@dataclass(frozen=True)
+class Where:
+    """One place where the gap lies. ``share`` of the squared gap above the floor [1]."""
+
+    axis: int
+    share: float
+    band_hz: tuple[float, float] | None
+    regime: str | None
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What stands above the floor on the validation logs with the causes in.
+
+    ``gap``: sqrt(after^2 - floor^2) [1], zero where noise is all there is; ``per_axis``: the same by
+    axis, (n_axes,). ``where``: the places that stand out of the floor, shares of the squared
+    remainder; none where no axis stands out. ``varies_with``: the variable that it follows at the
+    first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``), if any.
+    """
+
+    gap: float
+    per_axis: Array
+    where: tuple[Where, ...] = ()
+    varies_with: str | None = None
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """How far the model reproduces the user's own simulator along the same references.
+
+    ``per_axis`` (n_axes,): rms of the difference of torques over the rms of the user's about its mean
+    [1]; ``of_gap`` (n_axes,): the same over the rms of the error of the user's simulator, of the model
+    where nothing was ``taken_off``: whether the differences were taken off the logs, so that the gap is
+    that of the user's simulator; not by inverse dynamics along motions that are too far apart. ``where``
+    they lie, of what exceeds the noise of the logs.
+    """
+
+    per_axis: Array
+    of_gap: Array
+    taken_off: bool
+    where: tuple[Where, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what stands in the verdict."""
+        return {
+            "per_axis": self.per_axis.tolist(),
+            "of_gap": self.of_gap.tolist(),
+            "taken_off": self.taken_off,
+        }
+
+
+def label(effect: str, axis: int | None, axes: tuple[int, int] | None = None) -> str:
+    """Return ``effect@axis`` or ``effect@5,6``; the effect alone when it belongs to the whole arm."""
+    if axes is not None:
+        return f"{effect}@{axes[0]},{axes[1]}"
+    return effect if axis is None else f"{effect}@{axis}"
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm.
+
+    ``axes``: both of an effect between two, of which ``axis`` is the first; None of others, as in
+    `Candidate` and `DetectionLimit`. ``rivals``: labels of what the data cannot tell from it, of
+    `Diagnosis.equivalent`.
+    """
+
+    effect: str
+    axis: int | None
+    probability: float
+    parameters: dict[str, Interval]
+    units: dict[str, str]
+    gap_reduction: Interval
+    family: str = ""
+    family_probability: float = 1.0
+    axes: tuple[int, int] | None = None
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return label(self.effect, self.axis, self.axes)
+
+    def as_effect(self) -> Effect:
+        """Return the effect with the values that were found."""
+        values = {name: p.value for name, p in self.parameters.items()}
+        return Effect(self.effect, None if self.axes else self.axis, values, self.axes)
+
+
+@dataclass(frozen=True)
+class AxisVerdict:
+    """What the estimation logs say of one axis (from 1).
+
+    ``excess``: mean square of the weighted residual of the re-fitted simulator above the floor,
+    in units of noise plus model error; ``explained``: share of it that the causes remove;
+    ``causes``: which of the diagnosis's causes act on the axis.
+    """
+
+    axis: int
+    verdict: VerdictKind
+    excess: float
+    explained: float
+    causes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect on one axis as it was ranked, held out.
+
+    ``score``: share of the explainable squared error on held-out estimation
+    data that the candidate removes [1]; ``significance``: how many standard
+    errors (block jackknife) that is from zero.
+    """
+
+    effect: str
+    axis: int | None
+    probability: float
+    score: float
+    significance: float
+    status: str
+    axes: tuple[int, int] | None = None
+
+    @property
+    def label(self) -> str:
+        """``effect@axis``, or the effect alone when it belongs to the whole arm."""
+        return label(self.effect, self.axis, self.axes)
+
+
+@dataclass(frozen=True)
+class DetectionLimit:
+    """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
+
+    ``parameter`` is the first amplitude that no plainer law has; ``others`` are what the other parameters
+    are then. ``value`` in ``unit``, None where no size that the effect may have would show: for what is
+    in ``hidden``, the ``"tolerances"`` of the simulator's own parameters, which with a plainer law make up for it,
+    or the ``"motion"``, which hardly brings it out. ``axis`` from 1, None for the arm.
+    """
+
+    effect: str
+    axis: int | None
+    parameter: str
+    value: float | None
+    unit: str
+    axes: tuple[int, int] | None = None
+    others: Mapping[str, float] = field(default_factory=dict)
+    hidden: Hidden | None = None
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Measured and simulated torque on one axis of one held-out log, for plotting.
+
+    Arrays have shape (n,); torque in Nm (N on a prismatic axis).
+    """
+
+    log: str
+    axis: int
+    time_s: Array
+    measured_nm: Array
+    before_nm: Array
+    after_nm: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found.
+
+    ``band_map``: dims (axis, band), ``regime_maps[name]``: dims (axis, bin);
+    each a Dataset with ``share`` (of that axis's squared baseline error above
+    the floor), ``excess`` (ratio of the squared error to the floor) and
+    ``significance`` (in standard errors). Band and bin coordinates are labels.
+    ``detection_limits``: what these logs would have shown of each effect that is no cause.
+    ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
+    the names of `Settings`.
+    ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
+    parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
+    causes apart that stay open, or shows an effect, where it was asked for. ``simulator``: how far the
+    model reproduces the user's own, where its logs were given.
+    ``signals``: where they were asked for, of each log, estimation logs first, a Dataset with the dims (time_s,
+    axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
+    simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
+    ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
+    less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
+    ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
+    """
+
+    name: str
+    mode: Mode
+    verdict: VerdictKind
+    headline: str
+    gap: Gap
+    where: tuple[Where, ...]
+    causes: tuple[Cause, ...]
+    alternatives: tuple[Candidate, ...]
+    equivalent: tuple[tuple[str, ...], ...]
+    next_experiment: str | None
+    ranking: tuple[Candidate, ...]
+    band_map: xr.Dataset
+    regime_maps: dict[str, xr.Dataset]
+    overlays: tuple[Overlay, ...]
+    refit: dict[str, Interval]
+    checks: tuple[str, ...]
+    axes: tuple[AxisVerdict, ...] = ()
+    p_none: float = 0.0
+    p_unknown: float = 0.0
+    remainder: Remainder | None = None
+    detection_limits: tuple[DetectionLimit, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+    experiment: Experiment | None = None
+    simulator: Reproduction | None = None
+    signals: tuple[xr.Dataset, ...] = ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Name of the joint that each axis drives, where the provenance has them."""
+        return tuple(self.provenance.get("axis_names", ()))
+
+    def axis_rows(self) -> list[tuple[int, str, tuple[float, ...]]]:
+        """Return of each axis its number (from 1), verdict in words, and gap: before, re-fitted, after, floor [1].
+
+        The verdict is empty where the logs did not get that far, and ``at the floor`` where causes of
+        others act on an axis on which there was nothing to explain.
+        """
+        gap, verdicts = self.gap, {a.axis: a.verdict for a in self.axes}
+        stages = (
+            gap.before_per_axis,
+            gap.refitted_per_axis,
+            gap.after_per_axis,
+            gap.floor_per_axis,
+        )
+        out = []
+        for i, row in enumerate(zip(*(x.tolist() for x in stages), strict=True), start=1):
+            before, refitted, _, floor = row
+            word = verdict_word(verdicts.get(i, ""), before, refitted, floor)
+            out.append((i, word, row))
+        return out
+
+    def _repr_html_(self) -> str:
+        """Verdict, causes with values, and the gap by axis, for notebooks."""
+        causes = [row for cause in self.causes for row in _rows(cause)]
+        gap, joints = self.gap, self.joints
+        rows = [
+            (axis_label(i, joints), verdict, *map(_percent, row))
+            for i, verdict, row in self.axis_rows()
+        ]
+        whole = (gap.before, gap.refitted, gap.after, gap.floor)
+        rows.append(("all", self.verdict, *map(_percent, whole)))
+        moved = [] if gap.motion is None else gap.motion.rows()
+        then = [] if self.next_experiment is None else [f"next experiment: {self.next_experiment}"]
+        return html.page(
+            f"{self.name}: {self.verdict}",
+            html.lines([self.headline]),
+            html.table(("cause and its values", "value", "95 % interval", "probability"), causes),
+            html.table(("axis", "verdict", "gap before", "re-fitted", "after", "noise"), rows),
+            html.table(
+                ("axis", *MOTION_HEAD),
+                ((str(i), *map(html.number, row)) for i, row in enumerate(moved, start=1)),
+                "" if gap.motion is None else motion_words(gap.motion.velocity_from),
+            ),
+            html.lines([*(f"finding: {finding}" for finding in self.findings), *then]),
+        )
+
+    def to_verdict(self) -> dict[str, Any]:
+        """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.
+
+        Numbers that are not finite, as the gap of a simulation that broke off, become None.
+        """
+        out = {
+            "schema": "axisight.verdict/1",
+            "name": self.name,
+            "mode": self.mode,
+            "verdict": self.verdict,
+            "headline": self.headline,
+            "gap": _gap(self.gap),
+            "where": [_where(w) for w in self.where],
+            "causes": [_cause(c) for c in self.causes],
+            "alternatives": [
+                {"effect": c.effect, **_place(c), "probability": c.probability}
+                for c in self.alternatives
+            ],
+            "equivalent": [list(group) for group in self.equivalent],
+            "next_experiment": self.next_experiment,
+            "p_none": self.p_none,
+            "p_unknown": self.p_unknown,
+            "axes": [_axis(a, self.gap) for a in self.axes],
+            "remainder": None if self.remainder is None else _remainder(self.remainder),
+            "detection_limits": [_limit(limit) for limit in self.detection_limits],
+            "refit": {name: _interval(change) for name, change in self.refit.items()},
+            "ranking": [_ranked(c) for c in self.ranking],
+            "simulator": None if self.simulator is None else self.simulator.to_dict(),
+            "checks": list(self.checks),
+            "findings": [f.to_dict() for f in self.findings],
+            "settings": self.settings,
+            "provenance": self.provenance,
+        }
+        finite: dict[str, Any] = _finite(out)
+        return finite
+
+    def to_json(self) -> str:
+        """Return the verdict as the text of its JSON file."""
+        return json.dumps(self.to_verdict(), indent=2, allow_nan=False) + "\n"
+
+    def save_verdict(self, path: Path | str) -> None:
+        """Write the verdict as JSON; the file appears whole or not at all."""
+        write_whole(Path(path), self.to_json())
+
+
+def _rows(cause: Cause) -> list[tuple[str, ...]]:
+    """Return a row for a cause, and one for each of its values."""
+    values = [
+        (
+            f"  {name}",
+            f"{html.number(p.value)} {unit}",
+            f"{html.number(p.low)} to {html.number(p.high)}",
+            "",
+        )
+        for name, p in cause.parameters.items()
+        for unit in (cause.units.get(name, "1"),)
+    ]
+    return [(cause.label, "", "", f"{cause.probability:.3f}"), *values]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %" if math.isfinite(share) else "-"
+
+
+def _finite(value: Any) -> Any:
+    """Return a document with None in place of numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+_STAGES = ("before", "after", "floor", "refitted")
+
+
+def _gap(gap: Gap) -> dict[str, Any]:
+    return {
+        **{stage: getattr(gap, stage) for stage in _STAGES},
+        "pooled": None if gap.pooled is None else asdict(gap.pooled),
+        "per_axis": {stage: getattr(gap, f"{stage}_per_axis").tolist() for stage in _STAGES},
+        "compared": gap.compared,
+        "motion": None if gap.motion is None else gap.motion.to_dict(),
+    }
+
+
+def _where(where: Where) -> dict[str, Any]:
+    return {
+        "axis": where.axis,
+        "share": where.share,
+        "band_hz": None if where.band_hz is None else list(where.band_hz),
+        "regime": where.regime,
+        "evidence": where.evidence,
+    }
+
+
+def _axis(axis: AxisVerdict, gap: Gap) -> dict[str, Any]:
+    mine = {stage: float(getattr(gap, f"{stage}_per_axis")[axis.axis - 1]) for stage in _STAGES}
+    return {
+        "axis": axis.axis,
+        "verdict": axis.verdict,
+        "gap": mine,
+        "excess": axis.excess,
+        "explained": axis.explained,
+        "causes": list(axis.causes),
+    }
+
+
+def _remainder(remainder: Remainder) -> dict[str, Any]:
+    return {
+        "gap": remainder.gap,
+        "per_axis": remainder.per_axis.tolist(),
+        "where": [_where(w) for w in remainder.where],
+        "varies_with": remainder.varies_with,
+    }
+
+
+def _place(item: Cause | Candidate | DetectionLimit) -> dict[str, Any]:
+    """Return ``axis``, and ``axes`` beside it where there are two."""
+    return {"axis": item.axis} | ({} if item.axes is None else {"axes": list(item.axes)})
+
+
+def _limit(limit: DetectionLimit) -> dict[str, Any]:
+    rest = {name: getattr(limit, name) for name in ("parameter", "value", "unit", "hidden")}
+    return {"effect": limit.effect, **_place(limit), **rest, "others": dict(limit.others)}
+
+
+def _interval(interval: Interval) -> dict[str, Any]:
+    return {"value": interval.value, "ci95": [interval.low, interval.high]}
+
+
+def _ranked(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "effect": candidate.effect,
+        **_place(candidate),
+        "probability": candidate.probability,
+        "score": candidate.score,
+        "significance": candidate.significance,
+        "status": candidate.status,
+    }
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.effect,
+        **_place(cause),
+        "probability": cause.probability,
+        "family": cause.family,
+        "family_probability": cause.family_probability,
+        "parameters": {
+            name: {**_interval(p), "unit": cause.units.get(name, "1")}
+            for name, p in cause.parameters.items()
+        },
+        "gap_reduction": _interval(cause.gap_reduction),
+    }

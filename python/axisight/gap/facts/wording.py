@@ -1,0 +1,21 @@
+"""Shares and lists in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+LARGEST = 10.0
+"""Share of the torque beyond which a gap is none: no effect that a simulator lacks does that."""
+
+
+def listed(items: Sequence[str], last: str = "and") -> str:
+    """Return items in a row: "a, b and c", with another ``last`` word between the last two."""
+    return f" {last} ".join([", ".join(items[:-1]), items[-1]]) if len(items) > 1 else items[0]
+
+
+def percent(x: float) -> str:
+    """Return a share in per cent, three digits; what is no share any more is not told as one."""
+    if not math.isfinite(x):
+        return "no share"
+    return f"{100 * x:.3g} %" if x <= LARGEST else f"more than {100 * LARGEST:,.0f} %"

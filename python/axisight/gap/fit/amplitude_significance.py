@@ -1,0 +1,98 @@
+"""How sure the size of an effect is: what re-fits without each stretch of time make of it.
+
+An effect may show in a few stretches only, as viscous friction does in the fast ones. Its gain is
+then uneven, and no test of the gain can be sure of it; but those stretches may agree on its size.
+The delete-one-group jackknife says how well: it needs no white residuals, and a size that hangs on
+one stretch goes away with it (Efron 1982, *The Jackknife, the Bootstrap and Other Resampling Plans*,
+chapter 3; Hotelling's T^2 for several sizes).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.held_out import step_without
+from axisight.statistics.tails import log_fisher_tail
+
+Array = NDArray[np.float64]
+
+
+def amplitude_significance(fitted: FittedModel, stretch: NDArray[np.int64]) -> float:
+    """Return how sure the amplitudes of the last effect are not the simulator's, as a normal deviate.
+
+    ``stretch`` (n_blocks,): the stretch of time of each block. Zero without an effect, for one
+    whose neutral values are not zero, and where fewer stretches than amplitudes fix them.
+    """
+    columns = _amplitudes(fitted)
+    groups = np.unique(stretch)
+    if not columns or len(groups) < 2:
+        return 0.0
+    moved = np.array([step_without(fitted, stretch == g)[columns] for g in groups])
+    # One that no stretch moves is held next to a bound, as those on one are left out.
+    free = np.any(moved != 0.0, axis=0)
+    if not free.any():
+        return 0.0
+    columns, moved = [i for i, moves in zip(columns, free, strict=True) if moves], moved[:, free]
+    size = np.array([_change(fitted, i) for i in columns])
+    scatter = (len(groups) - 1) / len(groups) * moved.T @ moved
+    freedom = min(_freedom(fitted, stretch, columns), len(groups) - 1)
+    left = freedom - len(columns) + 1
+    # With fewer than two to spare, one stretch may be all there is.
+    if left < 2:
+        return 0.0
+    scale = np.sqrt(np.maximum(np.diag(scatter), 1e-300))
+    # As good as singular where two amplitudes are one: the ridge then takes them as one.
+    normal = scatter / np.outer(scale, scale) + 1e-9 * np.eye(len(columns))
+    square = float((size / scale) @ np.linalg.solve(normal, size / scale))
+    tail = log_fisher_tail(square * left / (freedom * len(columns)), len(columns), left)
+    # Of a single size both signs are in the tail; a normal deviate has one.
+    return max(0.0, float(-scipy.special.ndtri_exp(tail))) if tail > -700 else 37.0
+
+
+def _amplitudes(fitted: FittedModel) -> list[int]:
+    """Return the columns of the last effect's amplitudes, those on a bound left out.
+
+    None where its shape was chosen from among many, as orders are: the best of them has a size in
+    any noise.
+    """
+    last = len(fitted.effects) - 1
+    if last < 0:
+        return []
+    info = effect_info(fitted.effects[last].name)
+    if any(p.role == "shape" and p.name not in fitted.free[last].free for p in info.parameters):
+        return []
+    sizes = {p.name for p in info.parameters if p.role == "amplitude" and p.neutral == 0}
+    return [
+        i
+        for i, (place, name) in enumerate(fitted.parameters)
+        if place == last and name in sizes and (place, name) not in fitted.at_bound
+    ]
+
+
+def _change(fitted: FittedModel, column: int) -> float:
+    """Return by how much an amplitude differs from what the simulator has, mostly nothing."""
+    name = fitted.parameters[column][1]
+    stated = fitted.free[-1].stated.get(name, 0.0)
+    return float((fitted.effects[-1].parameters or {})[name]) - stated
+
+
+def _freedom(fitted: FittedModel, stretch: NDArray[np.int64], columns: list[int]) -> float:
+    """Return degrees of freedom of the scatter: how many stretches share the information.
+
+    Satterthwaite's: the squares that add up to the variance have the shares that white residuals
+    would give them. The least of all amplitudes.
+    """
+    matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
+    size = np.sqrt(np.diag(matrix))
+    # What has no influence has no share either.
+    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 1e-100)
+    normal = matrix * np.outer(scale, scale) + 1e-9 * np.eye(len(matrix))
+    pull = np.linalg.solve(normal, np.diag(scale)[:, columns]) * scale[:, None]
+    by_block = np.einsum("ia,bij,ja->ba", pull, fitted.matrix, pull)
+    shares = np.array([by_block[stretch == g].sum(axis=0) for g in np.unique(stretch)])
+    whole = np.maximum(shares.sum(axis=0), 1e-300)
+    return float((whole**2 / np.maximum((shares**2).sum(axis=0), 1e-300)).min())

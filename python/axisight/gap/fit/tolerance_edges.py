@@ -1,0 +1,54 @@
+"""The simulator's own parameters at the edge of their tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from axisight.gap.facts.faults import Finding
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.simulator.own_parameters import nominal_values
+from axisight.gap.simulator.tolerances import tolerance_of
+
+# A parameter this many of its tolerances off is one machine in four hundred: rather something
+# unmodelled that pulls at it.
+_EDGE = 3.0
+BENT = 0.25
+"""Share of the simulator's own parameters at the edge (one machine in four hundred each): of so many, it
+is bent to something unmodelled."""
+
+
+def parameters_at_edge(
+    fitted: FittedModel, nominal: Mapping[str, float], tolerances: Mapping[str, float]
+) -> tuple[Finding, ...]:
+    """Return a finding for each re-fitted parameter three tolerances off, or at its bound.
+
+    ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity or name.
+    """
+    out = []
+    for name, value in fitted.robot_values.items():
+        if name not in nominal:  # a constant that nobody knows has a finding of its own
+            continue
+        tolerance = tolerance_of(tolerances, name) or 0.0
+        change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
+        bound = (None, name) in fitted.ended_at_bound
+        if bound or abs(change) >= _EDGE * tolerance:
+            message = (
+                f"ended {100 * change:+.3g} % off the simulator's value, "
+                f"{abs(change) / tolerance:.1f} of its tolerance of {100 * tolerance:g} %"
+                f"{', at the bound of the fit' if bound else ''}: the value or the tolerance is "
+                f"wrong, or something that no effect stands for pulls at it."
+            )
+            out.append(Finding("parameter_at_edge", "flag", message, field=name))
+    return tuple(out)
+
+
+def bent(fitter: ModelFitter, model: FittedModel) -> float:
+    """Return the share of the simulator's own parameters that a model takes to the edge [1].
+
+    Nothing where errors add up: there masses that a few seconds hardly tell go to the edge by themselves.
+    """
+    if fitter.adds_up:
+        return 0.0
+    edge = parameters_at_edge(model, nominal_values(fitter.robot), fitter.tolerances)
+    return len(edge) / max(len(model.robot_values), 1)

@@ -1,0 +1,1 @@
+"""Logs against the controller's law: columns, signs, units, clocks."""

@@ -1,0 +1,90 @@
+"""Whether positions follow their references, where the controller's law says nothing.
+
+With a controller that is not the one of the robot file, or a torque that is not the command, what
+remains is that a controlled axis follows its reference: the derivative of its position, low-passed, is
+the reference, in size and sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.faults import Finding
+from axisight.gap.signals.unit_scales import scale_name
+from axisight.logs import Log, differentiate, lowpass
+from axisight.logs.unit_guess import velocity_ratio
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+_BAND_HZ = 20.0
+# An axis at a torque limit for most of a log still correlates with its reference by 0.94.
+_FOLLOWS = 0.9
+_SIZE = (0.5, 2.0)
+# Mean square of what is left of the speed after the reference is taken off, relative to the speed's.
+_ALIKE = 0.15
+_UNLIKE = 0.5
+
+
+def check_follows(robot: Robot, log: Log, axes: Sequence[int]) -> list[Finding]:
+    """Return findings about positions that follow no reference, another's, or a multiple of it.
+
+    ``axes`` (from 0): those to look at.
+    """
+    reference = log.velocity_ref_rad_s
+    if reference is None or not axes:
+        return []
+    left = _left(log, reference)
+    out = []
+    for i in axes:
+        position = np.ascontiguousarray(log.position_rad[:, i])
+        ratio, alike = velocity_ratio(
+            position, np.ascontiguousarray(reference[:, i]), log.sample_time_s
+        )
+        other = int(np.argmin(left[i]))
+        if left[i, i] > _UNLIKE and left[i, other] < _ALIKE and left[other, i] < _ALIKE:
+            out.append(_other(log, i, other))
+        elif abs(alike) >= _FOLLOWS and not _SIZE[0] < ratio < _SIZE[1]:
+            out += _factor(robot, log, i, ratio)
+    return out
+
+
+def _left(log: Log, reference: Array) -> Array:
+    """Return what is left of the speed of axis i without reference j, (n_axes, n_axes), relative."""
+    band = min(_BAND_HZ, 0.2 / log.sample_time_s)
+    speed, _ = differentiate(log.position_rad, log.sample_time_s, band)
+    given = lowpass(reference, log.sample_time_s, band)
+    power = np.maximum((speed**2).mean(axis=0), 1e-300)
+    gaps = ((speed[:, :, None] - given[:, None, :]) ** 2).mean(axis=0)
+    return np.asarray(gaps / power[:, None])
+
+
+def _other(log: Log, i: int, other: int) -> Finding:
+    message = (
+        f"expected a position that follows the reference of axis {i + 1}, got one that follows that of "
+        f"axis {other + 1}, and the other way round: exchange the columns of positions or references"
+    )
+    return Finding("axes_swapped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
+
+
+def _factor(robot: Robot, log: Log, i: int, ratio: float) -> list[Finding]:
+    column = f"position_{i + 1}"
+    if -_SIZE[1] < ratio < -_SIZE[0]:
+        message = (
+            f"expected a position that follows its reference, got one that runs against it (factor "
+            f"{ratio:.4g}): turn position or reference round"
+        )
+        return [Finding("sign_flipped", "refuse", message, log.name, i + 1, column)]
+    gear = float(robot.gear_ratio[i])
+    name = scale_name("velocity_ref", ratio, gear)
+    position = scale_name("position", 1.0 / ratio, gear)
+    if name.endswith("_scaled") and not position.endswith("_scaled"):
+        name = position
+    message = (
+        f"expected a reference equal to the derivative of the position, got one {ratio:.4g} times as "
+        "large: state units and gear in a column map"
+    )
+    return [Finding(name, "refuse", message, log.name, i + 1, column)]

@@ -1,0 +1,86 @@
+"""Whether positions follow their targets, where no torque tells whose they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.faults import Finding
+from axisight.gap.signals.unit_scales import scale_name
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Correlation from which a position is that of a target, and how late it may be [s]: loops may be soft.
+_FOLLOWS = 0.9
+_LATE_S = 0.3
+_SIZE = (0.5, 2.0)
+# Mean square of what is left of a position without a target, both less their means, relative to the position's.
+_ALIKE = 0.15
+_UNLIKE = 0.5
+
+
+def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
+    """Return findings about positions that follow no target but another's, run against it, or a multiple of it."""
+    if log.position_ref_rad is None or log.n_axes != robot.n_axes:
+        return []
+    position, target = log.position_rad, log.position_ref_rad
+    lags = range(min(round(_LATE_S / log.sample_time_s), log.n_samples // 2) + 1)
+    left, ratio = zip(*(_followed(position, target, lag) for lag in lags), strict=True)
+    least = np.min(left, axis=0)
+    # Of each position and its own target, where they are most alike.
+    own = np.array([np.diag(r) for r in ratio])
+    best = np.abs(own).argmax(axis=0)
+    out = []
+    for i in range(log.n_axes):
+        alike, other = own[best[i], i], int(np.argmin(least[i]))
+        size = _size(position[:, i], target[:, i], lags[best[i]])
+        if least[i, i] > _UNLIKE and least[i, other] < _ALIKE and least[other, i] < _ALIKE:
+            out.append(_other(log, i, other))
+        elif alike <= -_FOLLOWS and _SIZE[0] < -size < _SIZE[1]:
+            out.append(_against(log, i))
+        elif alike >= _FOLLOWS and not _SIZE[0] < size < _SIZE[1]:
+            out.append(_factor(robot, log, i, size))
+    return out
+
+
+def _followed(position: Array, target: Array, lag: int) -> tuple[Array, Array]:
+    """Return what is left of position i without target j, ``lag`` samples before, and their correlations."""
+    x, y = position[lag:], target[: len(target) - lag]
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    power, given = (np.maximum((z**2).mean(axis=0), 1e-300) for z in (x, y))
+    both = x.T @ y / len(x)
+    left = (power[:, None] - 2 * both + given[None, :]) / power[:, None]
+    return left, both / np.sqrt(np.outer(power, given))
+
+
+def _size(position: Array, target: Array, lag: int) -> float:
+    """Return how many times as large a position is as its target (n,)."""
+    x, y = position[lag:], target[: len(target) - lag]
+    x, y = x - x.mean(), y - y.mean()
+    return float(x @ y / max(float(y @ y), 1e-300))
+
+
+def _other(log: Log, i: int, other: int) -> Finding:
+    message = (
+        f"expected a position that follows the target of axis {i + 1}, got one that follows that of "
+        f"axis {other + 1}, and the other way round: exchange the columns of positions or targets"
+    )
+    return Finding("axes_swapped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
+
+
+def _against(log: Log, i: int) -> Finding:
+    message = (
+        "expected a position that follows its target, got one that runs against it: turn one round"
+    )
+    return Finding("sign_flipped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
+
+
+def _factor(robot: Robot, log: Log, i: int, ratio: float) -> Finding:
+    name = scale_name("position", ratio, float(robot.gear_ratio[i]))
+    message = (
+        f"expected a position of the size of its target, got one {ratio:.4g} times as large: state units "
+        "and gear of both in a column map"
+    )
+    return Finding(name, "refuse", message, log.name, i + 1, f"position_{i + 1}")

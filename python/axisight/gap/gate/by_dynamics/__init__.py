@@ -1,0 +1,1 @@
+"""Logs against the simulator's inverse dynamics: columns, signs, units, clocks."""

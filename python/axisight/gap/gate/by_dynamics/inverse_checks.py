@@ -1,0 +1,151 @@
+"""Logs without a controller against the simulator's inverse dynamics: columns, signs, units, time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.faults import Finding, GateSeverity, refused
+from axisight.gap.gate.by_dynamics.friction_sign import check_passive
+from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
+from axisight.gap.gate.by_dynamics.torque_fit import TorqueFit, torque_fit
+from axisight.gap.gate.by_dynamics.undone_mistakes import Mistake, gravity_turned, predict, undone
+from axisight.gap.signals.lowpass_cutoff import highest_cutoff_hz
+from axisight.gap.signals.motion import Motion, motion
+from axisight.gap.signals.unit_scales import scale_name
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Motions of arms lie below; what a gate looks for shows there.
+_BAND_HZ = 10.0
+_SAMPLES_PER_BAND = 10
+# With friction and offset granted, simulators of real machines leave a tenth or less of the torque's
+# variance; with a third left on an axis, mistakes are looked for.
+_SUSPICIOUS = 0.3
+# A mistake is named where undoing it takes off half of what was left on all axes, no less than so
+# much of one axis, and explains the axes concerned as simulators do.
+_REMOVED = 0.5
+_LEAST_REMOVED = 0.08
+_EXPLAINED = 0.3
+# A factor of the torque is known where the prediction carries so much of its variance.
+_CARRIES = 0.1
+# A load or gravity that is compensated in the arm changes torques by up to two; more is worth a word.
+# On a wrist a heavy tool changes them by five and more, but not on all axes; by thirty nowhere.
+_SAME = (0.4, 2.5)
+_ALL_AXES = (0.25, 4.0)
+_ONE_AXIS = (1 / 30.0, 30.0)
+_FASTEST_RAD_S = 3000.0
+"""A motor faster than 28 600 rpm is one whose position is in counts."""
+
+
+def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
+    """Return findings about logs whose torques the simulator's inverse dynamics should explain."""
+    motions = [thinned(log) for log in logs]
+    out = []
+    for log, (_, at) in zip(logs, motions, strict=True):
+        out += _one_log(robot, log, at)
+    if any(f.name == "gravity_flipped" for f in out) and not _gravity_off(robot, motions):
+        out = [f for f in out if f.name != "gravity_flipped"]
+    return out if refused(out) else [*out, *check_small_errors(robot, motions)]
+
+
+def thinned(log: Log) -> tuple[float, Motion]:
+    """Return sample time [s] and motion of a log, low-passed at 10 Hz and thinned as that allows."""
+    band = min(_BAND_HZ, highest_cutoff_hz(log.sample_time_s))
+    step = max(1, int(1.0 / (_SAMPLES_PER_BAND * band * log.sample_time_s)))
+    position, speed, acceleration, torque = (x[::step] for x in motion(log, band))
+    return step * log.sample_time_s, (position, speed, acceleration, torque)
+
+
+def _one_log(robot: Robot, log: Log, at: Motion) -> list[Finding]:
+    fast = _too_fast(robot, log, at)
+    if fast:
+        return fast
+    given = torque_fit(at[3], predict(robot, at), at)
+    turned = (given.slope < 0.0) & (given.gain > _CARRIES)
+    if np.any((given.left > _SUSPICIOUS) | turned):
+        found = _most_likely(robot, at, given)
+        if found is not None:
+            return [_named(log, found, given)]
+    return [*check_passive(robot, log, at), *_scales(robot, log, given)]
+
+
+def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
+    out = []
+    for axis, slides in enumerate(robot.axis_is_prismatic):
+        top = float(np.abs(at[1][:, axis]).max())
+        if top > _FASTEST_RAD_S and not slides:
+            message = (
+                f"expected a motor position in rad, got up to {top:.3g} rad/s: encoder counts?"
+            )
+            column = f"position_{axis + 1}"
+            out.append(Finding("position_in_counts", "refuse", message, log.name, axis + 1, column))
+    return out
+
+
+def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
+    # Positions scaled to next to nothing would leave nothing but a prediction times a thousand.
+    sound = (mistake for mistake in undone(robot, at) if _in_scale(mistake.fit))
+    best = min(sound, key=lambda mistake: mistake.fit.total, default=None)
+    if best is None:
+        return None
+    removed = given.total - best.fit.total
+    axes = list(best.axes)
+    explains = float(best.fit.left[axes].max()) < _EXPLAINED
+    enough = removed > max(_REMOVED * given.total, _LEAST_REMOVED)
+    return best if enough and explains else None
+
+
+def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
+    """Whether gravity turned round explains every log that feels it: the logs have it in common."""
+    for _, at in motions:
+        given = torque_fit(at[3], predict(robot, at), at).total
+        removed = given - gravity_turned(robot, at).total
+        if abs(removed) > _LEAST_REMOVED and removed < _REMOVED * given:
+            return False
+    return True
+
+
+def _in_scale(fit: TorqueFit) -> bool:
+    """Whether the torques that a prediction carries are of its size, loads that it lacks granted."""
+    slope = np.abs(fit.slope[fit.gain > _CARRIES])
+    return bool(np.all((slope > _ONE_AXIS[0]) & (slope < _ONE_AXIS[1])))
+
+
+def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
+    axes = ", ".join(str(i + 1) for i in found.axes)
+    message = (
+        f"expected motions that explain the torques, got ones that leave "
+        f"{100 * given.total / len(given.left):.3g} % of their variance; after one change ({found.words}) "
+        f"{100 * found.fit.total / len(given.left):.3g} %"
+    )
+    axis = found.axes[0] + 1 if len(found.axes) < len(given.left) else None
+    whole = found.field == "gravity"
+    field = found.field if axis is None else f"{found.field}_{axes}"
+    return Finding(found.name, "refuse", message, None if whole else log.name, axis, field)
+
+
+def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
+    """Return findings about torques that are a multiple of the predicted ones."""
+    out = []
+    known = (given.gain > _CARRIES) & (given.left < _SUSPICIOUS) & (given.slope > 0.0)
+    slopes = given.slope[known]
+    everywhere = bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
+    for axis in np.flatnonzero(known).tolist():
+        slope = float(given.slope[axis])
+        if _SAME[0] < slope < _SAME[1]:
+            continue
+        name = scale_name("torque", slope, float(robot.gear_ratio[axis]))
+        a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))
+        severity: GateSeverity = "refuse" if everywhere or a_unit else "flag"
+        message = (
+            f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque: state "
+            "unit, scale and side of the gear in a column map, or masses and counterbalance in the robot file"
+        )
+        column = f"torque_cmd_{axis + 1}"
+        out.append(Finding(name, severity, message, log.name, axis + 1, column))
+    return out

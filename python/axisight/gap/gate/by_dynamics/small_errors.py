@@ -1,0 +1,203 @@
+"""Small errors of a log by the simulator's inverse dynamics: clocks apart, encoders off their zero.
+
+All of them act in first order: a late torque is its rate times the delay, an axis that is late changes
+the torques of the others by what its motion does in that time, an encoder off its zero turns gravity.
+One regression has them all, beside a factor of the prediction, friction and an offset on every axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.faults import Finding, GateSeverity
+from axisight.gap.gate.by_dynamics.torque_fit import nuisance
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict
+from axisight.gap.signals.motion import Motion
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Steps of the differences that give the first-order effects: of the size that is looked for.
+_STEP_S = 0.02
+_STEP_RAD = 0.05
+# What is worth a word: above the skew of real recorders (a few ms) and the play of zero marks.
+_LEAST_S = 8e-3
+_LEAST_RAD = 0.03
+# What is larger is not of first order, and something else.
+_MOST_S = 0.2
+_MOST_RAD = 0.6
+# By itself it has to take so much of what is left, and stand out of its scatter between tenths of
+# the log: payloads and friction of another shape take less, or not evenly.
+_REMOVED = 0.05
+_SIGNIFICANT = 6.0
+_PARTS = 10
+# Logs with less than a tenth of the effect of the strongest say nothing; the others agree this well.
+_TELLS = 0.1
+_ALIKE = (0.5, 2.0)
+
+
+def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[Finding]:
+    """Return flags about the time of torques, the time of single axes and their zero.
+
+    ``motions``: sample time [s] and low-passed motion of every log; an error has to be in all of them.
+    """
+    parts = []
+    names: list[tuple[str, int]] = []
+    for sample_time_s, at in motions:
+        base = predict(robot, at)
+        names, effects = _effects(robot, sample_time_s, at, base)
+        parts.append(_projected(at, base, effects))
+    targets = [target for target, _ in parts]
+    limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
+    out = []
+    # The one that takes most first; the others on what it leaves.
+    for _ in range(len(names)):
+        columns = [[part[i] for _, part in parts] for i in range(len(names))]
+        best = _strongest(targets, columns, limits)
+        if best is None or best.share < _REMOVED or best.significance < _SIGNIFICANT:
+            break
+        finding = _finding(names[best.index], best.size, best.share)
+        if finding is None:
+            break
+        out.append(finding)
+        taken = columns[best.index]
+        targets = [t - best.size * c for t, c in zip(targets, taken, strict=True)]
+    return out
+
+
+def _effects(
+    robot: Robot, sample_time_s: float, at: Motion, base: Array
+) -> tuple[list[tuple[str, int]], list[Array]]:
+    """Return what each error adds to the measured torque, per unit, (n, n_axes) each."""
+    position, speed, acceleration, torque = at
+    n = robot.n_axes
+    step = max(1, round(_STEP_S / sample_time_s))
+    seconds = step * sample_time_s
+    names: list[tuple[str, int]] = [("time_shifted", -1)]
+    # Torque read late by s is the torque of s earlier.
+    effects = [-np.gradient(torque, sample_time_s, axis=0)]
+    rate = np.gradient(base, sample_time_s, axis=0)
+    for i in range(n):
+        turn = np.zeros(n)
+        turn[i] = _STEP_RAD * (1.0 / abs(float(robot.gear_ratio[i])))
+        moved = [
+            predict(robot, (position + s * turn, speed, acceleration, torque)) for s in (1.0, -1.0)
+        ]
+        # The encoder shows more than there is: the machine's torque is that of less.
+        names.append(("position_offset", i))
+        effects.append((moved[1] - moved[0]) / (2 * _STEP_RAD))
+        late = [predict(robot, _shifted(at, i, s * step)) for s in (1, -1)]
+        # Its columns are late: the machine was further on. Its own torque is late too, and so are
+        # motion and friction it goes with; only the other axes were further on then.
+        effect = (late[0] - late[1]) / (2 * seconds)
+        effect[:, i] -= rate[:, i]
+        names.append(("axis_delayed", i))
+        effects.append(effect)
+    return names, effects
+
+
+def _shifted(at: Motion, axis: int, samples: int) -> Motion:
+    """Return the motion with one axis read ``samples`` later, held at the ends."""
+    index = np.clip(np.arange(len(at[0])) + samples, 0, len(at[0]) - 1)
+    parts = []
+    for x in at[:3]:
+        moved = x.copy()
+        moved[:, axis] = x[index, axis]
+        parts.append(moved)
+    return parts[0], parts[1], parts[2], at[3]
+
+
+def _projected(at: Motion, base: Array, effects: list[Array]) -> tuple[Array, list[Array]]:
+    """Return torque and effects (n, n_axes) without factor, friction and offset, axes weighted alike."""
+    torque = at[3]
+    target = np.empty_like(torque)
+    columns = [np.empty_like(torque) for _ in effects]
+    for i in range(torque.shape[1]):
+        own = np.column_stack([base[:, i], nuisance(at[1][:, i])])
+        basis, _ = np.linalg.qr(own)
+        scale = max(float(torque[:, i].std()), 1e-300)
+        target[:, i] = (torque[:, i] - basis @ (basis.T @ torque[:, i])) / scale
+        for column, effect in zip(columns, effects, strict=True):
+            column[:, i] = (effect[:, i] - basis @ (basis.T @ effect[:, i])) / scale
+    return target, columns
+
+
+@dataclass(frozen=True)
+class _Strongest:
+    """An error by its number, its size, the share of what is left that it takes, its significance."""
+
+    index: int
+    size: float
+    share: float
+    significance: float
+
+
+def _strongest(
+    targets: list[Array], columns: list[list[Array]], limits: list[float]
+) -> _Strongest | None:
+    """Return what takes most of the targets, within limits and alike in all logs.
+
+    ``targets`` and every one of ``columns`` hold an array per log.
+    """
+    power = sum(float((t**2).sum()) for t in targets)
+    best = None
+    for index, column in enumerate(columns):
+        # Energies of ten parts of every log: the scatter of the estimate between them (the
+        # sandwich of one number) is its error.
+        cells = [
+            [
+                (float((c * t).sum()), float((c * c).sum()))
+                for c, t in zip(_cut(own), _cut(target), strict=True)
+            ]
+            for own, target in zip(column, targets, strict=True)
+        ]
+        sums = np.array(cells).reshape(len(targets), -1, 2)
+        product, energy = sums.sum(axis=(0, 1))
+        if not energy > 0.0:
+            continue
+        size = product / energy
+        if abs(size) > limits[index] or not _alike(sums.sum(axis=1), size):
+            continue
+        scatter = np.sqrt(((sums[..., 0] - size * sums[..., 1]) ** 2).sum()) / energy
+        share = size * product / max(power, 1e-300)
+        if best is None or share > best.share:
+            best = _Strongest(index, float(size), float(share), abs(size) / max(scatter, 1e-300))
+    return best
+
+
+def _cut(x: Array) -> list[Array]:
+    return np.array_split(x, _PARTS)
+
+
+def _alike(per_log: Array, size: float) -> bool:
+    """Whether every log that tells (its product and energy are a row) tells about the same size."""
+    tells = per_log[:, 1] > _TELLS * per_log[:, 1].max()
+    ratio = per_log[tells, 0] / per_log[tells, 1] / (size or 1.0)
+    return bool(np.all((ratio > _ALIKE[0]) & (ratio < _ALIKE[1])))
+
+
+def _finding(name: tuple[str, int], size: float, share: float) -> Finding | None:
+    kind, axis = name
+    severity: GateSeverity = "flag"
+    if kind == "position_offset":
+        if abs(size) < _LEAST_RAD:
+            return None
+        message = (
+            f"expected positions from the robot's zero, got ones that look {size:.3g} rad (joint side) "
+            f"off: it explains {100 * share:.3g} % of what is left; check the zero mark, or the load "
+            "of the robot file"
+        )
+        return Finding(kind, severity, message, None, axis + 1, f"position_{axis + 1}")
+    if abs(size) < _LEAST_S:
+        return None
+    who = "torques" if axis < 0 else f"the columns of axis {axis + 1}"
+    message = (
+        f"expected channels of one clock, got {who} that look {1e3 * size:.3g} ms late against the "
+        f"other channels: it explains {100 * share:.3g} % of what is left; record on one clock"
+    )
+    field = "torque_cmd" if axis < 0 else f"position_{axis + 1}"
+    return Finding(kind, severity, message, None, axis + 1 or None, field)

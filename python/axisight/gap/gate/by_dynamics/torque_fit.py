@@ -1,0 +1,70 @@
+"""How well a predicted torque explains a logged one, friction and offset granted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.signals.motion import Motion
+
+Array = NDArray[np.float64]
+
+# Corner of the sign of the speed, as a share of the largest speed.
+_CORNER = 0.02
+
+
+@dataclass(frozen=True)
+class TorqueFit:
+    """A regression of torques on predicted ones, axis by axis; arrays are (n_axes,).
+
+    ``slope``: factor of the predicted torque; ``left``: share of the variance that is left when the
+    factor has to be positive; ``left_turned``: when it has to be negative; ``gain``: share of the
+    variance that the prediction takes beyond friction and an offset.
+    """
+
+    slope: Array
+    left: Array
+    left_turned: Array
+    gain: Array
+
+    @property
+    def total(self) -> float:
+        """Sum of what is left over axes."""
+        return float(self.left.sum())
+
+
+def nuisance(speed: Array) -> Array:
+    """Return speed, its sign and one, (n, 3): what friction and a torque offset may add."""
+    corner = _CORNER * max(float(np.abs(speed).max()), 1e-12)
+    return np.column_stack([speed, speed / np.hypot(speed, corner), np.ones(len(speed))])
+
+
+def torque_fit(torque: Array, predicted: Array, at: Motion) -> TorqueFit:
+    """Regress every column of ``torque`` (n, n_axes) on that of ``predicted``, speeds from ``at``."""
+    rows = [_one(torque[:, i], predicted[:, i], at[1][:, i]) for i in range(torque.shape[1])]
+    slope, left, turned, gain = (np.array(column) for column in zip(*rows, strict=True))
+    return TorqueFit(slope, left, turned, gain)
+
+
+def one_left(torque: Array, predicted: Array, speed: Array) -> float:
+    """Return the share of the variance of a torque (n,) left by a positive multiple of a prediction."""
+    return _one(torque, predicted, speed)[1]
+
+
+def _one(y: Array, predicted: Array, speed: Array) -> tuple[float, float, float, float]:
+    power = float(((y - y.mean()) ** 2).sum())
+    if not power > 0.0:
+        return 1.0, 0.0, 0.0, 0.0
+    basis, _ = np.linalg.qr(nuisance(speed))
+    y = y - basis @ (basis.T @ y)
+    x = predicted - basis @ (basis.T @ predicted)
+    bare = float(y @ y) / power
+    energy = float(x @ x)
+    if not energy > 1e-12 * float(predicted @ predicted):
+        return 1.0, bare, bare, 0.0
+    slope = float(x @ y) / energy
+    gain = slope**2 * energy / power
+    with_it = bare - gain
+    return slope, with_it if slope > 0 else bare, with_it if slope < 0 else bare, gain

@@ -1,0 +1,1 @@
+"""Effects that may be missing: the candidates, and where the fit of each begins."""

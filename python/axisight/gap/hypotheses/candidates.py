@@ -1,0 +1,181 @@
+"""The candidates of a diagnosis: every effect on every axis, with start values from the data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, EffectInfo, effect_info, effect_table
+from axisight.effects.stated import BEHIND_GEAR, BRISTLES
+from axisight.gap.controller.feedback import inertia_of_motors, rotors
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.hypotheses.ripple_orders import Turning, turning
+from axisight.gap.hypotheses.start_context import Place, Response, StartContext, StartData
+from axisight.gap.hypotheses.start_values import STARTS, TARGET_STARTS
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def situation(
+    logs: Sequence[Log],
+    model: FittedModel,
+    decimation: int,
+    response: Response,
+    enough: Array,
+    before: Sequence[Sequence[Turning]] = (),
+) -> StartData:
+    """Return the residual of a model and how the motors turned, by log and axis.
+
+    ``before``: the same of another model, if there was one: motors turned as they did.
+    """
+
+    def one(i: int, log: Log, axis: int) -> Turning:
+        mine = (model.log == i) & (model.axis == axis)
+        first = int(model.start[mine].min())
+        residual = model.residual[first : first + int(model.size[mine].sum())]
+        if before:
+            return before[i][axis].leaving(residual)
+        position = log.position_rad[:, axis]
+        speed = np.gradient(position, log.sample_time_s)
+        # A short running mean takes the quantization and noise off the speed.
+        speed = np.convolve(speed, np.ones(9) / 9, mode="same")
+        return turning(residual, position, speed, log.sample_time_s, decimation)
+
+    axes = range(logs[0].n_axes)
+    turned = [[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)]
+    return StartData(turned, response, enough)
+
+
+def all_candidates(
+    robot: Robot,
+    logs: Sequence[Log],
+    at: StartData,
+    *,
+    inverse_dynamics: bool = False,
+    by_targets: bool = False,
+    threads: int = 1,
+) -> list[Hypothesis]:
+    """Return one candidate per effect and place that can act on this robot and has a gap.
+
+    What an effect does elsewhere, it does on its own axis too: one without a gap needs none.
+    """
+    trials = [
+        StartContext(info, place, robot, logs, at)
+        for info in effect_table().values()
+        if not inverse_dynamics or _in_torque(info)
+        for place in _places(robot, info)
+        if place is None or any(at.is_left(axis - 1) for axis in np.atleast_1d(place))
+    ]
+    sides = robot.axis_numbers() if inverse_dynamics else one_sided(robot)
+    with ThreadPoolExecutor(threads) as pool:
+        starts = {**STARTS, **TARGET_STARTS} if by_targets else STARTS
+        found = pool.map(lambda t: starts[t.info.name](t), trials)
+        out = [on_the_motor(c) if c.effect.axis in sides else c for c in found if c is not None]
+    own = {effect.label: effect for effect in robot.effects if effect.acts}
+    return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+# Of a rotor's inertia: what a motor feels of its arm, from where it tells on which side friction acts.
+_HEAVY = 0.2
+
+
+def one_sided(robot: Robot) -> list[int]:
+    """Return the axes (from 1) whose logs do not tell friction of the motor from friction behind its gear.
+
+    Gears that are rigid, and arms that are light: they follow their motors, and sharp friction on little
+    inertia is hard to integrate for nothing.
+    """
+    rotor = rotors(robot)
+    felt = np.diag(inertia_of_motors(robot)) - rotor
+    light = felt < _HEAVY * rotor
+    return [
+        axis for axis in robot.axis_numbers() if robot.axis_is_rigid[axis - 1] or light[axis - 1]
+    ]
+
+
+def on_the_motor(candidate: Hypothesis) -> Hypothesis:
+    """Return a candidate without what tells friction of the motor from friction behind an elastic gear."""
+    given = dict(candidate.effect.parameters or {})
+    if BEHIND_GEAR not in given:
+        return candidate
+    effect = replace(candidate.effect, parameters={**given, BEHIND_GEAR: 0.0})
+    free = tuple(name for name in candidate.free if name != BEHIND_GEAR)
+    starts = tuple(start for start in candidate.starts if BEHIND_GEAR not in start)
+    return replace(candidate, effect=effect, free=free, starts=starts)
+
+
+def _in_torque(info: EffectInfo) -> bool:
+    """Whether an effect is looked for in predicted torque.
+
+    Not between axes: of these the turn of an elastic gear is looked for, and gears are rigid there; nor what
+    is another effect there.
+    """
+    return info.inverse_dynamics and info.scope != "axes" and info.name != BRISTLES[0]
+
+
+def _places(robot: Robot, info: EffectInfo) -> list[Place]:
+    """Return the axes on which an effect can act, or neighbours among them; None for the arm."""
+    if info.scope == "arm":
+        return [None]
+    if info.scope == "axes":
+        return [(axis, axis + 1) for axis in robot.axis_numbers()[:-1]]
+    rigid = robot.axis_is_rigid
+    return [
+        axis
+        for axis in robot.axis_numbers()
+        if not (info.acts == "transmission" and rigid[axis - 1])
+        and _has_what_changes(robot, info, axis)
+    ]
+
+
+def _has_what_changes(robot: Robot, info: EffectInfo, axis: int) -> bool:
+    """Whether an axis has the link that an effect acts on, and what it changes by a share or adds."""
+    if info.acts == "arm" and robot.axis_parameter(axis, "mass") is None:
+        return False
+    if info.stands_for is None:
+        return True
+    quantity, change = info.stands_for
+    name = robot.axis_parameter(axis, quantity)
+    there = name is not None and robot.parameters()[name] != 0
+    # What is there is changed by a share of itself, where an effect does that.
+    shares = any(other.stands_for == (quantity, "relative") for other in effect_table().values())
+    return there if change == "relative" else not (there and shares)
+
+
+def _from(own: Effect, candidate: Hypothesis) -> Hypothesis:
+    """Return the candidate that begins where the simulator has the same effect already."""
+    info = effect_info(own.name)
+    values = dict(zip((p.name for p in info.parameters), own.values(), strict=True))
+    stated = dict(values)
+    bounds = {
+        name: (min(low, values[name]), max(high, values[name]))
+        for name, (low, high) in candidate.bounds.items()
+    }
+    free = candidate.free
+    given = candidate.effect.parameters or {}
+    # Of numbered terms those that the search may use.
+    terms = [t for t in info.terms().values() if t[0] in given and len(info.terms()) > 1]
+    if terms:
+        free = _merged_terms(values, given, terms)
+    return replace(
+        candidate, effect=own.with_values(values), bounds=bounds, free=free, stated=stated
+    )
+
+
+def _merged_terms(
+    values: dict[str, float], given: Mapping[str, float], terms: Sequence[tuple[str, str, str]]
+) -> tuple[str, ...]:
+    """Put orders of the data into the terms that the simulator leaves empty; return what is free."""
+    # A place without amplitude is empty, whatever its order.
+    mine = {order: values[order] for order, *waves in terms if any(values[w] for w in waves)}
+    found = (given[order] for order, *_ in terms)
+    new = iter(order for order in found if order and order not in mine.values())
+    for order, *_ in terms:
+        values[order] = mine.get(order) or next(new, 0.0)
+    return tuple(wave for order, *waves in terms if values[order] for wave in waves)

@@ -1,0 +1,1 @@
+"""What a user hands over, turned into logs that can be compared."""

@@ -1,0 +1,182 @@
+"""A simulator and logs behind the gate, as they are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from axisight.errors import CaseError, InputError
+from axisight.gap.controller.speed_loop import as_speed_loop
+from axisight.gap.facts.compared_quantity import Compared
+from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.result import Interval, Reproduction
+from axisight.gap.facts.settings import Settings
+from axisight.gap.gate import pass_gate, pass_gate_by_targets
+from axisight.gap.intake import user_simulator
+from axisight.gap.intake.start_of_logs import from_rest
+from axisight.gap.prepare.currents import Nominal, in_torques
+from axisight.gap.prepare.position_targets import Commanded, with_commands
+from axisight.gap.prepare.reconstructed_references import SAYS, with_references
+from axisight.gap.prepare.stiff_bristles import with_bristles_followed
+from axisight.gap.simulator.own_parameters import constant_name
+from axisight.gap.simulator.start_poses import SAYS as FROM_OWN_POSES
+from axisight.gap.simulator.start_poses import at_their_poses
+from axisight.gap.views.choice import view_of
+from axisight.gap.views.view import View
+from axisight.logs import Case, Log, read_case
+from axisight.robot import Robot
+
+
+def named_inputs(
+    case: Case | Path | str | None,
+    robot: Robot | Path | str | None,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+) -> tuple[str, Robot | Path | str, list[Log], list[Log]]:
+    """Return a name, the simulator (or where it is read from), estimation logs and validation logs.
+
+    Raises InputError without a case and a robot, CaseError without logs of either role.
+    """
+    source: Robot | Path | str | None
+    if case is not None:
+        read = case if isinstance(case, Case) else read_case(Path(case), currents=True)
+        name, source = read.name, robot if robot is not None else read.robot_path
+        fit_logs, held_logs = list(read.estimation), list(read.validation)
+    elif robot is not None:
+        name, source = "logs", robot
+        fit_logs, held_logs = list(estimation), list(validation)
+    else:
+        raise InputError(
+            "diagnose: expected a case, or a robot with estimation and validation logs"
+        )
+    if not fit_logs or not held_logs:
+        raise CaseError(
+            f"{name}: expected at least one estimation and one validation log, "
+            f"got {len(fit_logs)} and {len(held_logs)}"
+        )
+    return name, source, fit_logs, held_logs
+
+
+@dataclass(frozen=True)
+class PreparedLogs:
+    """A simulator and logs that passed the gate, as they are compared.
+
+    ``commanded``: logs without torque with what the controller commands along them, where they have none;
+    ``nominal``: the torque constants by which currents were read whose constant nobody knows;
+    ``recovered``: whether the references are those that the controller must have had; ``simulator``: how
+    far the robot reproduces the user's own simulator, where its logs were given; ``beside``: these logs, from
+    where the others are taken.
+    """
+
+    robot: Robot
+    estimation: list[Log]
+    validation: list[Log]
+    noted: tuple[Finding, ...]
+    commanded: Commanded | None
+    recovered: bool
+    nominal: tuple[Nominal, ...] = ()
+    simulator: Reproduction | None = None
+    beside: tuple[Log, ...] = ()
+
+    def view(self, settings: Settings) -> View:
+        """Return how simulator and logs are compared."""
+        return view_of(self.robot, self.estimation, self.validation, settings, self.commanded)
+
+    def compared(self, settings: Settings) -> tuple[PreparedLogs, View]:
+        """Return how simulator and logs are compared: against the user's own simulator, where it has logs."""
+        view = self.view(settings)
+        if not self.beside:
+            return self, view
+        inputs = self.against(view, self.beside, settings)
+        return inputs, inputs.view(settings)
+
+    def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> PreparedLogs:
+        """Return the same against the user's own simulator, by its logs."""
+        logs, n = [*self.estimation, *self.validation], len(self.estimation)
+        commanded = self.commanded
+        if commanded is None:
+            beside = user_simulator.paired(logs, simulated)
+        else:
+            as_logged = user_simulator.paired(commanded.as_logged(), simulated)
+            beside = commanded.of(as_logged)
+        off = user_simulator.difference(view, beside, settings)
+        found = user_simulator.reproduction(view, logs, beside, off, settings)
+        if found.taken_off:
+            logs = off.taken_from(logs)
+        if commanded is not None:
+            # What the controller commands follows from the positions that are left.
+            commanded = commanded.along(logs)
+            logs = list(commanded.logs)
+        return replace(
+            self,
+            estimation=logs[:n],
+            validation=logs[n:],
+            noted=(*self.noted, *user_simulator.noted(found)),
+            commanded=commanded,
+            simulator=found,
+        )
+
+    def with_effects_of(self, robot: Robot, why: Sequence[Finding]) -> PreparedLogs:
+        """Return the same with a simulator that states its effects otherwise."""
+        commanded = None if self.commanded is None else replace(self.commanded, robot=robot)
+        return replace(self, robot=robot, commanded=commanded, noted=(*self.noted, *why))
+
+    def constants(self, refit: Mapping[str, Interval]) -> list[Finding]:
+        """Return what the re-fit makes of torque constants that nobody knows."""
+        return [n.finding(refit[constant_name(self.robot, n.axis)]) for n in self.nominal]
+
+    def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
+        """Return what is to be known of the logs."""
+        own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
+        said = [
+            "" if self.simulator is None else user_simulator.said(self.simulator, compared),
+            FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
+            SAYS if self.recovered else "",
+        ]
+        return tuple(filter(None, said))
+
+
+def behind_gate(
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    despite: Collection[str],
+    simulated: Sequence[Log] = (),
+) -> PreparedLogs:
+    """Return simulator and logs behind the gate, with commands and references where none were logged.
+
+    ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
+    """
+    robot, slowed = with_bristles_followed(robot)
+    read = in_torques(robot, estimation, validation)
+    if read.nominal and simulated:
+        raise InputError(
+            'simulated: expected logs of torques beside logs of a simulator, got currents of scale = "unknown"'
+        )
+    begun = from_rest(robot, read.estimation, read.validation, simulated, despite)
+    logs, n = [*begun.estimation, *begun.validation], len(estimation)
+    robot = as_speed_loop(robot, logs)
+    found, beside = (*slowed, *begun.findings), begun.simulated
+    commanded = with_commands(robot, logs)
+    if commanded is not None:
+        logged = commanded.as_logged()
+        noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:], despite)
+        robot, logs = commanded.robot, list(commanded.logs)
+        found, beside = (*found, *commanded.findings()), commanded.taken(beside)
+    else:
+        logs = at_their_poses(robot, logs)
+        noted = pass_gate(robot, logs[:n], logs[n:], despite)
+    recovered = with_references(robot, logs)
+    logs = logs if recovered is None else recovered
+    noted = (*found, *noted)
+    return PreparedLogs(
+        robot,
+        logs[:n],
+        logs[n:],
+        noted,
+        commanded,
+        recovered is not None,
+        read.nominal,
+        beside=tuple(beside),
+    )

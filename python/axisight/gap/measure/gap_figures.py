@@ -1,0 +1,148 @@
+"""How far the gap shrinks, on the validation logs only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.compared_quantity import Compared
+from axisight.gap.facts.result import Gap, Interval, Overlay, Pooled
+from axisight.gap.facts.simulator_variant import combine, relative_squares
+from axisight.logs import Log
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Squared relative errors of one simulator, per log as block means (n_blocks, n_axes).
+
+    ``pooled``: sqrt(sum e^2 / sum u^2) over all samples, axes and logs, as in `Pooled` [1].
+    """
+
+    blocks: tuple[Array, ...]
+    pooled: float
+
+    def per_log(self) -> list[Array]:
+        """Return the mean square (n_axes,) of each log."""
+        return [b.mean(axis=0) for b in self.blocks]
+
+    def mean(self) -> float:
+        """Return the mean square over logs and axes."""
+        return float(np.mean(self.per_log()))
+
+    def resampled(self, picks: Sequence[NDArray[np.int64]]) -> Array:
+        """Return the same of resampled blocks (n_draws,), from numbers (n_draws, n_blocks) of each log."""
+        return np.asarray(
+            np.mean(
+                [b.mean(axis=1)[p].mean(axis=1) for b, p in zip(self.blocks, picks, strict=True)],
+                axis=0,
+            )
+        )
+
+
+def stage(
+    logs: Sequence[Log],
+    errors: Sequence[Array],
+    block_s: float,
+    measured: Sequence[Array] | None = None,
+) -> Stage:
+    """Return the stage of a simulator from its torque errors (n, n_axes) [Nm] on each log.
+
+    ``measured``: the torque errors are taken from, (n, n_axes) of each log; default as logged.
+    """
+    blocks = []
+    torques = [log.torque_nm for log in logs] if measured is None else measured
+    for log, error in zip(logs, errors, strict=True):
+        squares = relative_squares(log, error)
+        length = max(1, int(block_s / log.sample_time_s))
+        count = max(1, len(squares) // length)
+        parts = np.array_split(squares, count)
+        blocks.append(np.array([p.mean(axis=0) for p in parts]))
+    torque, left = (sum(float(np.sum(x**2)) for x in of) for of in (torques, errors))
+    return Stage(tuple(blocks), float(np.sqrt(left / max(torque, 1e-300))))
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The simulator as given, re-fitted, with the causes; and what a perfect one would leave.
+
+    ``open``: what it may leave beyond that, where torques cannot be known; None where nothing is open.
+    """
+
+    given: Stage
+    refitted: Stage
+    after: Stage
+    floor: Stage
+    open: Stage | None = None
+    compared: Compared = "torques"
+
+
+def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
+    """Return the gap before, re-fitted and after, and its floor.
+
+    ``one_unit``: whether all axes are driven by torques, or all by forces; what is pooled over
+    both would mean nothing.
+    """
+    every = (stages.given, stages.refitted, stages.after, stages.floor)
+    (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
+        combine(s.per_log()) for s in every
+    )
+    pooled = Pooled(*(s.pooled for s in every)) if one_unit else None
+    return Gap(
+        before,
+        refit,
+        left,
+        noise,
+        before_axes,
+        refit_axes,
+        left_axes,
+        noise_axes,
+        pooled,
+        stages.compared,
+    )
+
+
+def gap_reduction(
+    earlier: Stage, later: Stage, given: Stage, floor: Stage, *, draws: int, seed: int
+) -> Interval:
+    """Return the share of the explainable gap removed from ``earlier`` to ``later``.
+
+    (earlier^2 - later^2) / (given^2 - floor^2), clipped to [0, 1], with a 95 %
+    interval from resampling blocks of the logs with replacement (block
+    bootstrap; Künsch 1989, Annals of Statistics 17(3)).
+    """
+    rng = np.random.default_rng([seed, 0x676170])
+    picks = [rng.integers(0, len(b), (draws, len(b))) for b in given.blocks]
+
+    def ratio(of: Callable[[Stage], Array | float]) -> Array:
+        explainable = np.asarray(of(given) - of(floor))
+        removed = np.asarray(of(earlier) - of(later))
+        share = removed / np.where(explainable > 0, explainable, np.inf)
+        return np.clip(share, 0.0, 1.0)
+
+    low, high = np.quantile(ratio(lambda s: s.resampled(picks)), [0.025, 0.975])
+    value = float(ratio(Stage.mean))
+    return Interval(value, float(min(low, value)), float(max(high, value)))
+
+
+# Points of an overlay; more than a screen can show.
+_OVERLAY_POINTS = 2000
+
+
+def overlays(
+    logs: Sequence[Log], before: Sequence[Array], after: Sequence[Array]
+) -> tuple[Overlay, ...]:
+    """Return measured and simulated torque of every log and axis, thinned for plotting."""
+    out = []
+    for log, b, a in zip(logs, before, after, strict=True):
+        step = max(1, log.n_samples // _OVERLAY_POINTS)
+        time = log.time_s[::step]
+        out += [
+            Overlay(log.name, i + 1, time, log.torque_nm[::step, i], b[::step, i], a[::step, i])
+            for i in range(log.n_axes)
+        ]
+    return tuple(out)

@@ -1,0 +1,112 @@
+"""The state that a simulation is in where a log begins, fitted to what it does next.
+
+A run-up brings a simulation to the position and speed of a log's first motion. What swings there (arms on
+their gears, the loop itself) depends on what drove the machine before. References of the run-up
+are changed so that the simulated torque is that of the log for as long as it remembers: the initial state as
+free numbers, by what can make it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.gap.facts.compared_quantity import Compared
+from axisight.logs import Log
+from axisight.robot import Robot
+from axisight.simulation import simulate_batch
+
+Array = NDArray[np.float64]
+
+# Changes of an axis' reference: differences of neighbouring cubic B-splines, whose knots are so far apart [s],
+# a sample at least, and which end where the log begins. They make modes up to half the rate of the knots, and
+# move no sum.
+_KNOT_S = 0.02
+_SHAPES = 10
+LEAST_SAMPLES = _SHAPES + 4
+"""Samples of a run-up that all changes find room in."""
+# Of the rms of the references, with which each is tried; and of the strongest combination, below which one is
+# left alone.
+_TRIED = 0.05
+_TOLD = 0.01
+_STEPS = 2
+
+
+def with_first_state(
+    robot: Robot,
+    log: Log,
+    references: Array,
+    start_rad: Array,
+    seconds: float,
+    compared: Compared = "torques",
+) -> Array:
+    """Return references (m, n_axes) [rad/s] before a log that leave least of its first ``seconds``.
+
+    Of its torque or, without its mean, its position, as ``compared`` says. Gauss-Newton, by simulations with
+    each change of ``references``, from rest at the joint angles ``start_rad``;
+    unchanged where nothing is gained.
+    """
+    n = round(seconds / log.sample_time_s)
+
+    def missed(tried: Array) -> Array:
+        return _missed(robot, log, tried, start_rad, n, compared)
+
+    moves = _moves(log, len(references))
+    best = references
+    left = missed(best[None])[0]
+    for _ in range(_STEPS):
+        columns = (missed(best + moves) - left).T
+        if not (np.isfinite(columns).all() and np.isfinite(left).all()):
+            break
+        shares = scipy.linalg.lstsq(columns, -left, cond=_TOLD)[0]
+        found = best + np.tensordot(shares, moves, axes=1)
+        after = missed(found[None])[0]
+        if not float(after @ after) < float(left @ left):
+            break
+        best, left = found, after
+    return best
+
+
+def _moves(log: Log, lead: int) -> Array:
+    """Return changes of ``lead`` references before a log (n_axes * n_shapes, lead, n_axes) [rad/s]."""
+    assert log.velocity_ref_rad_s is not None  # closed loop only
+    size = _TRIED * np.sqrt(np.mean(log.velocity_ref_rad_s**2, axis=0))
+    shapes = _shapes(lead, log.sample_time_s)
+    out = np.zeros((log.n_axes, len(shapes), lead, log.n_axes))
+    for axis in range(log.n_axes):
+        out[axis, :, :, axis] = shapes * size[axis]
+    return out.reshape(-1, lead, log.n_axes)
+
+
+def _shapes(lead: int, step_s: float) -> Array:
+    """Return changes (n_shapes, lead) of equal size, up and down, just before a log."""
+    before_s = step_s * (np.arange(lead) - lead)
+    knot_s = max(_KNOT_S, step_s)
+    spline = scipy.interpolate.BSpline.basis_element(np.arange(-2.0, 3.0), extrapolate=False)
+    at = [np.nan_to_num(spline(before_s / knot_s + 2 + i)) for i in range(_SHAPES + 1)]
+    return np.asarray(np.diff(at, axis=0))
+
+
+def _missed(
+    robot: Robot, log: Log, tried: Array, start_rad: Array, n: int, compared: Compared
+) -> Array:
+    """Return what simulations are off the first ``n`` samples of a log, relative to its rms (n_tried, ...).
+
+    ``tried`` (n_tried, lead, n_axes) [rad/s]: references before those of the log.
+    """
+    assert log.velocity_ref_rad_s is not None  # closed loop only
+    lead = tried.shape[1]
+    behind = np.broadcast_to(log.velocity_ref_rad_s[:n], (len(tried), n, log.n_axes))
+    run = simulate_batch(
+        robot, np.concatenate([tried, behind], axis=1), method="rk4", start_rad=start_rad
+    )
+    if compared == "torques":
+        measured, off = log.torque_nm, run["torque_cmd_nm"].values[:, lead:] - log.torque_nm[:n]
+    else:
+        measured, off = (
+            log.position_rad,
+            run["position_rad"].values[:, lead:] - log.position_rad[:n],
+        )
+        off = off - off.mean(axis=1, keepdims=True)
+    return np.asarray((off / np.maximum(measured.std(axis=0), 1e-300)).reshape(len(tried), -1))

@@ -1,0 +1,183 @@
+"""Simulations along a log that begins in motion: run up to it from rest, compared once that is forgotten.
+
+What a log does not hold of its beginning (deflections of gears, what a controller had summed up, where
+lost motion lies) a simulation brings along by itself once it is in that motion: it comes into it
+from rest, smoothly, and the loop forgets what was different about the machine as its slowest mode decays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.gap.controller.feedback import before, feedback
+from axisight.gap.controller.loop_decay import FORGOTTEN, slowest_decay_1_s
+from axisight.gap.facts.compared_quantity import Compared
+from axisight.gap.facts.faults import Finding
+from axisight.gap.prepare.first_state import LEAST_SAMPLES, with_first_state
+from axisight.gap.simulator.start_poses import start_of
+from axisight.logs import Log, RunUp
+from axisight.robot import Robot
+from axisight.simulation import simulate
+
+Array = NDArray[np.float64]
+
+# Seconds in which a simulation comes from rest to the first motion of a log (`LEAST_SAMPLES` at least), and
+# those over which that is estimated, at least so many samples.
+RUN_UP_S = 0.5
+_SEEN_S = 0.02
+_SEEN_SAMPLES = 8
+# Of a log whose samples are so many of the simulation, at least so many of its own.
+_SEEN_STEPS = 4
+# Share of a log that has to be left.
+_LEFT = 0.5
+# Its start depends on the torque that holds the robot there, which depends on it: by a thousandth a step.
+_STEPS = 2
+
+
+class NotRunUpError(InputError):
+    """A log that begins in motion and that no simulation can be run up to; says why."""
+
+
+def run_up_to(
+    robot: Robot, loops: Sequence[Robot], log: Log, *, compared: Compared = "torques", step: int = 1
+) -> Log:
+    """Return a log from where a simulation that is run up to its first motion has forgotten how it began.
+
+    ``loops``: the robot as it is simulated, with one controller or another: all have to forget; what is cut
+    off the log, a whole number of ``step`` samples, is simulated with the run-up. ``compared``: what the state
+    is estimated by. Raises NotRunUpError where too little is left, a loop does not settle or the arm does not.
+    """
+    signals = (log.led(name) for name in ("position_rad", "torque_nm", "velocity_ref_rad_s"))
+    if not all(np.isfinite(signal).all() for signal in signals):
+        raise NotRunUpError(f"{log.name}: signals that are not finite")
+    seen = max(_SEEN_SAMPLES, round(_SEEN_S / log.sample_time_s), _SEEN_STEPS * step)
+    position = _first(log.position_rad, log.sample_time_s, seen, 2)[0]
+    try:
+        pose = start_of(robot, position)
+        burn_s = _burn_in_s(log, min(slowest_decay_1_s(r, pose) for r in loops), step)
+        references = _references(log, seen)
+        start_rad = _start_rad(robot, log, position, references, burn_s)
+        references = with_first_state(robot, log, references, start_rad, burn_s, compared)
+        run_up = _run_up(robot, log, position, references, start_rad)
+    except NotRunUpError:
+        raise
+    except InputError as error:
+        raise NotRunUpError(f"{log.name}: no run-up from rest ({error})") from error
+    return _behind(replace(log, run_up=run_up, start_rad=start_rad), burn_s)
+
+
+def _first(signal: Array, step_s: float, seen: int, order: int) -> Array:
+    """Return the polynomial through the first ``seen`` samples of a signal, (order + 1, n_axes), constant first."""
+    n = min(seen, len(signal))
+    return np.polynomial.polynomial.polyfit(step_s * np.arange(n), signal[:n], order)
+
+
+def _burn_in_s(log: Log, decay_1_s: float, step: int) -> float:
+    """Return after which time [s] of a log a loop has forgotten its beginning, in whole steps of samples."""
+    if not decay_1_s > 0:
+        raise NotRunUpError(f"{log.name}: the loop does not settle where the log begins")
+    seconds = -np.log(FORGOTTEN) / decay_1_s
+    if seconds > (1 - _LEFT) * log.duration_s or log.duration_s - seconds < 1.0:
+        raise NotRunUpError(
+            f"{log.name}: the loop takes {seconds:.3g} s to forget how it began, more than half of "
+            f"{log.duration_s:.3g} s"
+        )
+    whole = step * log.sample_time_s
+    return float(np.ceil(seconds / whole) * whole)
+
+
+def _references(log: Log, seen: int) -> Array:
+    """Return references (m, n_axes) [rad/s] from rest to just before the first of a log: cubic in time."""
+    assert log.velocity_ref_rad_s is not None  # closed loop only
+    time = log.sample_time_s
+    m = max(round(RUN_UP_S / time), LEAST_SAMPLES)
+    s = (np.arange(m) / m)[:, None]
+    first, rate = _first(log.velocity_ref_rad_s, time, seen, 1)
+    return np.asarray(first * s**2 * (3 - 2 * s) - rate * m * time * s**2 * (1 - s))
+
+
+def _start_rad(robot: Robot, log: Log, position: Array, references: Array, burn_s: float) -> Array:
+    """Return the joint angles [rad] from which references end where the controller had summed them up to.
+
+    ``position`` (n_axes,) [rad] of the motors where the log begins.
+    """
+    travel = references.sum(axis=0) * log.sample_time_s
+    start = start_of(robot, position)
+    for _ in range(_STEPS):
+        held = robot.equilibrium(start.tolist())["motor_torque_nm"].values
+        start = start_of(robot, position + _angle_error(robot, log, held, burn_s) - travel)
+    return start
+
+
+def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array:
+    """Return by how much the controller's summed reference is ahead of the motors where a log begins (n_axes,) [rad].
+
+    By its law: what is constant of the torque beyond that which holds the robot, or, of a cascade, what grows
+    with time. Zero where the law does not depend on it. Targets are ahead of positions by what the log says,
+    but for what gravity makes constant of it.
+    """
+    reference, time = log.velocity_ref_rad_s, log.sample_time_s
+    assert reference is not None  # closed loop only
+    gains = robot.controller_gains
+    if robot.told_positions:
+        assert log.position_ref_rad is not None  # a controller of targets
+        ahead = log.position_ref_rad - log.position_rad
+        return np.asarray(ahead[0] - ahead.mean(axis=0))
+    ki = np.asarray(gains.get("ki", np.zeros(log.n_axes)))
+    position = log.position_rad - log.position_rad[0]
+    speed = np.gradient(position, time, axis=0)
+    law = feedback(robot, reference - speed, before(reference) * time - position)
+    missed = log.torque_nm - law
+    if "kv" not in gains:
+        seen = round(burn_s / time)
+        return _over(missed[:seen].mean(axis=0) - held_nm, ki)
+    at = time * np.arange(log.n_samples)
+    offset, slope = np.polynomial.polynomial.polyfit(at, missed, 1)
+    kv, kp = np.asarray(gains["kv"]), np.asarray(gains["kp"])
+    summed = _over(slope, ki * kv)
+    return np.where(ki > 0, summed, _over(offset - held_nm, kp * kv))
+
+
+def _over(x: Array, by: Array) -> Array:
+    """Return a quotient, zero where the divisor is."""
+    return np.asarray(np.where(by > 0, x / np.where(by > 0, by, 1.0), 0.0))
+
+
+def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_rad: Array) -> RunUp:
+    """Return what a simulation does along references, brought smoothly to a log's first position and torque."""
+    run = simulate(robot, references, method="rk4", start_rad=start_rad)
+    moved, torque = run["position_rad"].values, run["torque_cmd_nm"].values
+    if len(moved) < len(references) or not np.isfinite(moved).all():
+        raise NotRunUpError(f"{log.name}: the simulator is unstable where the log begins")
+    made = RunUp(position_rad=moved, torque_nm=torque, velocity_ref_rad_s=references)
+    next_position = 2 * moved[-1] - moved[-2]
+    next_torque = log.torque_nm[:_SEEN_SAMPLES].mean(axis=0)
+    return made.less(next_position - position, torque[-1] - next_torque)
+
+
+def _behind(log: Log, burn_s: float) -> Log:
+    """Return a log with a run-up from ``burn_s`` on, what is before it a part of its run-up."""
+    rest = log.part(burn_s)
+    n = log.lead + log.n_samples - rest.n_samples
+    run_up = RunUp(
+        position_rad=log.led("position_rad")[:n],
+        torque_nm=log.led("torque_nm")[:n],
+        velocity_ref_rad_s=log.led("velocity_ref_rad_s")[:n],
+    )
+    return replace(rest, run_up=run_up, start_rad=log.start_rad)
+
+
+def begins_in_motion(log: Log, start_s: float) -> Finding:
+    """Return what is to be said of a log with a run-up that is compared from ``start_s`` of what was logged."""
+    message = (
+        f"expected a start at rest, where a simulation of the loop begins, got one in motion, and no rest in the "
+        f"first half: simulated from an estimated beginning, run up from rest to the position, speed and "
+        f"reference measured there, and compared from {start_s:.4g} s, where the loop has forgotten all but "
+        f"{100 * FORGOTTEN:g} % of what is wrong of it"
+    )
+    return Finding("begins_in_motion", "flag", message, log.name, None, "position")

@@ -1,0 +1,142 @@
+"""The part of each log that is used: between two times, from first to last motion, or a run a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.gap.signals.noise import position_noise_std
+from axisight.logs import Log
+
+Array = NDArray[np.float64]
+Span = tuple[float, float | None]
+
+# Seconds over which a mean speed is taken; of the largest speed, below which a motor stands; and deviations of
+# the noise of a mean speed.
+REST_S = 0.2
+STANDS = 0.005
+_NOISES = 6.0
+# Rest [s] that is kept before and after a motion, and that between two motions which makes them runs.
+_KEPT_S = 0.2
+_BETWEEN_S = 0.5
+# Shortest part of a log [s].
+_SHORTEST_S = 1.0
+
+
+@dataclass(frozen=True)
+class Used:
+    """What is used of each log: from ``start_s`` to ``stop_s`` [s], None its end.
+
+    ``moving``: of that, from the first to the last motion; ``runs``: each motion between rests of all axes.
+    """
+
+    start_s: float = 0.0
+    stop_s: float | None = None
+    moving: bool = False
+    runs: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether logs stay as they are."""
+        return self == WHOLE
+
+    def of(self, log: Log) -> list[Log]:
+        """Return the runs that are used of a log: one without ``runs``; raises InputError naming the option."""
+        return self.beside(log, log)
+
+    def beside(self, log: Log, other: Log) -> list[Log]:
+        """Return of an ``other`` log what `of` returns of ``log``, by the same times."""
+        if self.whole:
+            return [other]
+        part, out = _part(other, self.start_s, self.stop_s), []
+        moves = self._moves(_part(log, self.start_s, self.stop_s))
+        for k, (start, stop) in enumerate(moves):
+            name = f"{part.name}#{k + 1}" if len(moves) > 1 else part.name
+            out.append(replace(_part(part, start, stop), name=name))
+        return out
+
+    def one_of(self, log: Log) -> Log:
+        """Return the one part of a log that is used, where runs are not asked for."""
+        (one,) = replace(self, runs=False).of(log)
+        return one
+
+    def _moves(self, log: Log) -> Sequence[Span]:
+        if not (self.moving or self.runs):
+            return [(0.0, None)]
+        found = motions(log, _BETWEEN_S if self.runs else log.duration_s)
+        if not found:
+            option = "--cut-at-rests" if self.runs else "--moving"
+            raise InputError(f"{log.source}: {option}: expected an axis that moves, got none")
+        return found
+
+
+WHOLE = Used()
+"""Logs as they are."""
+
+
+def motions(log: Log, between_s: float) -> list[Span]:
+    """Return from where to where [s] a log moves, with a little rest before and after each.
+
+    Rests of all motors and references of up to ``between_s`` do not part it, and none is shorter than a part
+    of a log may be.
+    """
+    at = np.flatnonzero(~stands(log))
+    if not len(at):
+        return []
+    step, end = log.sample_time_s, log.duration_s
+    parts = np.split(at, np.flatnonzero(np.diff(at) * step > between_s) + 1)
+    spans: list[tuple[float, float]] = []
+    for part in parts:
+        first, last = float(part[0] * step), float(part[-1] * step)
+        if spans and spans[-1][1] - spans[-1][0] < _SHORTEST_S:
+            # A short move is no log: it goes with the next one.
+            first = spans.pop()[0] + _KEPT_S
+        spans.append((max(first - _KEPT_S, 0.0), min(last + _KEPT_S, end)))
+    first, last = spans[-1]
+    if last - first < _SHORTEST_S and len(spans) > 1:
+        spans[-2:] = [(spans[-2][0], last)]
+    elif last - first < _SHORTEST_S:
+        # One short move: as much rest around it as a log needs.
+        last = min(first + _SHORTEST_S, end)
+        spans[-1] = (max(min(first, last - _SHORTEST_S), 0.0), last)
+    return [*spans]
+
+
+def stands(log: Log) -> NDArray[np.bool_]:
+    """Return where (n_samples,) all motors of a log stand, and their references."""
+    n = max(4, round(REST_S / log.sample_time_s))
+    speed = _speeds(log, n)
+    noise = position_noise_std([log]) / (log.sample_time_s * n)
+    still = np.all(speed <= STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
+    if log.velocity_ref_rad_s is not None:
+        told = np.abs(log.velocity_ref_rad_s)
+        told = scipy.ndimage.maximum_filter1d(told, n, axis=0, mode="nearest")
+        still &= np.all(told <= STANDS * told.max(axis=0), axis=1)
+    return np.asarray(still)
+
+
+def _speeds(log: Log, n: int) -> Array:
+    """Return the mean speed (n_samples, n_axes) over ``n`` samples around each."""
+    mean = scipy.ndimage.uniform_filter1d(
+        np.gradient(log.position_rad, log.sample_time_s, axis=0), n, axis=0, mode="nearest"
+    )
+    # At the ends, where a window is not full, as at the nearest one that is.
+    half = n // 2
+    mean[:half], mean[-half:] = mean[half], mean[-half - 1]
+    return np.abs(mean)
+
+
+def _part(log: Log, start_s: float, stop_s: float | None) -> Log:
+    """Return what ``--from`` and ``--to`` [s] leave of a log; raises InputError naming them."""
+    if (start_s, stop_s) == (0.0, None):
+        return log
+    try:
+        return log.part(start_s, stop_s)
+    except InputError as error:
+        text = str(error).replace("start_s", "--from").replace("stop_s", "--to")
+        raise InputError(f"{log.source}: {text}") from None

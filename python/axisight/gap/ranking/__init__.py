@@ -1,0 +1,1 @@
+"""Fitted hypotheses held against one another: probabilities, intervals, what cannot be told apart."""

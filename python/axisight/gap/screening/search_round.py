@@ -1,0 +1,585 @@
+"""One round of a search: screen every candidate, fit the promising ones, refine the leaders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.errors import InputError
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.held_out import held_out_loss, linear_gain
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.sensitivity import Sensitivity
+from axisight.gap.fit.tolerance_edges import BENT, bent
+from axisight.gap.ranking.clear_lead import CLOSE, SETTLED, clear
+from axisight.gap.ranking.drive_lags import ended, lags_beside
+from axisight.gap.ranking.posterior import (
+    AxisPosterior,
+    FittedHypothesis,
+    as_good_with_less,
+    falls,
+    of_one_formula,
+    stand,
+    trial,
+)
+from axisight.gap.screening.column_cache import ColumnCache
+from axisight.gap.screening.partial_fit import TrialFit
+from axisight.gap.screening.promise import HOPELESS, best_by_axis, least_of_the_arm, promising
+from axisight.gap.screening.restart_gear_law import begun_on_curves
+from axisight.gap.screening.restart_look_alike import (
+    begun_where_it_ended,
+    ended_at_bound,
+    more_usual,
+)
+from axisight.gap.screening.restart_stiction import begun_sticking
+from axisight.gap.screening.restart_uneven_friction import begun_wider
+from axisight.gap.screening.screening import Screening, ScreeningModel, Start, thinned
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+A = TypeVar("A")
+B = TypeVar("B")
+
+# What is hopeless by what it did to a model before promises this much less again.
+_ROUGHLY = 0.3
+# Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
+# the one found before its shadow on another axis.
+_AS_MUCH = 0.9
+# The same for an effect of the whole arm: of a load one step knows the mass alone, not where it is.
+_HALF_AS_MUCH = 0.5
+# Leaders of an axis that are refined.
+_REFINED = 2
+# So many are refined at once, whatever the number of threads: what they show decides on the next.
+_AT_ONCE = 2
+# The same where the leader bends the simulator.
+_REFINED_BENT = 4
+_FAR = 0.3
+# How often sensitivities are renewed in a fit that is to last.
+_RENEWALS = 1
+# Steps on all data of a fit that was settled on part of them, where it is to be compared only.
+_LOOKS = 2
+# Share of a gain that another candidate may have on the same axis and not count as felt. Nothing gains
+# more than what is left: where one fitted elsewhere explains so much of that, what is tried there waits.
+_FELT = 0.2
+
+
+def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) -> list[Hypothesis]:
+    """Return the candidates that the model neither has nor contains, and that were not refused."""
+    present = {e.label for e in model.effects}
+    contained = {(name, e.axis) for e in model.effects for name in effect_info(e.name).contains}
+    return [
+        o
+        for o in options
+        if o.effect.label not in present | refused
+        and (o.effect.name, o.effect.axis) not in contained
+    ]
+
+
+def settled(
+    fitter: ModelFitter,
+    free: Sequence[Hypothesis],
+    start: FittedModel,
+    *,
+    rough: ModelFitter | None = None,
+    max_iterations: int = 6,
+    worth: float | None = None,
+) -> FittedModel:
+    """Return a fit with sensitivities of its own, as often renewed as it needs.
+
+    ``rough``: the same for part of the data, which brings what bends the simulator most of the way;
+    ``worth``: loss that another step has to bring, where it is not a share of it.
+    """
+    if start.renewed and len(free) == len(start.free):
+        return _renewed(fitter, start, max_iterations)
+    renewals = _RENEWALS
+    if rough is not None:
+        with suppress(InputError):
+            start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
+            free, renewals = start.free, 0
+    found = fitter.fit(free, start, refreshes=renewals, worth=worth)
+    return _renewed(fitter, found, max_iterations)
+
+
+def _renewed(fitter: ModelFitter, found: FittedModel, max_iterations: int) -> FittedModel:
+    """Return a fit, with sensitivities renewed at every step where it has not settled without."""
+    if _has_settled(found):
+        return found
+    return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
+
+
+def _has_settled(found: FittedModel) -> bool:
+    """Whether steps of a fit bring no more."""
+    return found.converged or found.stuck or linear_gain(found) < SETTLED * found.total
+
+
+def _as_much(start: Start) -> float:
+    """Return the share of the best promise from which a candidate is tried at once."""
+    return _HALF_AS_MUCH if start.option.effect.axis is None else _AS_MUCH
+
+
+def _taken_away(found: FittedModel, model: FittedModel, axis: int) -> float:
+    """Return the share of a model's loss on an axis (from 0) that a fit on top of it takes away."""
+    before, after = (float(e.loss[e.axis == axis].sum()) for e in (model, found))
+    return 1.0 - after / max(before, 1e-300)
+
+
+class SearchRound:
+    """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
+
+    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``mends``: whether one only
+    mends a formula of the model; ``offered``: candidates for what is left of a model; ``kept``: what
+    candidates did to models before, and will have done to this; ``sensitivities`` by label, of
+    candidates that were screened.
+    """
+
+    def __init__(
+        self,
+        fitter: ModelFitter,
+        model: FittedModel,
+        floor: Array,
+        layout: Layout,
+        least: Array,
+        settings: Settings,
+        progress: Progress,
+        kept: ColumnCache,
+        mends: Callable[[FittedHypothesis], bool],
+        offered: Callable[[FittedModel], Sequence[Hypothesis]],
+    ) -> None:
+        self.fitter, self.model, self.floor, self.kept = fitter, model, floor, kept
+        self.layout, self.least, self.mends, self.offered = layout, least, mends, offered
+        self.settings, self.progress = settings, progress
+        self.current = held_out_loss(model)
+        self.bench = ScreeningModel(fitter, model)
+        self.screen = Screening(self.bench)
+        self.waiting: list[Start] = []
+        # Labels of candidates that began where a leader ended, and of those refined.
+        self.usual: set[str] = set()
+        self.done: set[str] = set()
+        self.sensitivities: dict[str, Sensitivity] = {}
+
+    @property
+    def rough(self) -> ModelFitter | None:
+        """The fitter for the part of the data that candidates are screened on; None where that is all."""
+        part = self.screen.bench
+        return None if part is self.bench else part.fitter
+
+    @property
+    def skipped(self) -> dict[str, str]:
+        """Candidates that failed, with the reason."""
+        return self.bench.skipped
+
+    def run(self, options: Sequence[Hypothesis], number: int) -> list[FittedHypothesis]:
+        """Screen all candidates by one linear step, fit the promising ones in full."""
+        chosen = promising(self._screened(options, number), self._worth())
+        tryout = TrialFit(self.bench, self.screen)
+        if any(tryout.bends(start) for start in chosen):
+            self.bench.begin_nominal()
+        with self._threads() as pool:
+            found = self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
+            return self._with_usual(pool, found, options)
+
+    def _screened(self, options: Sequence[Hypothesis], number: int) -> list[Start]:
+        screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
+        self.screen = screen
+        if any(option.starts and len(option.free) == 1 for option in options):
+            screen.bench.begin_nominal()
+        rough = self._by_kept(screen, options)
+        label = f"screening candidates, round {number}"
+        todo = screen.groups([o for o in options if o.effect.label not in rough])
+        with self._threads() as pool:
+            screened = self._each(pool, screen.starts, todo, label)
+        self.skipped.update(screen.bench.skipped)
+        starts = [*rough.values(), *(start for group in screened for start in group)]
+        known = (s.sensitivity for s in starts)
+        self.sensitivities = {s.option.effect.label: s for s in known if s is not None}
+        return starts
+
+    def _by_kept(self, screen: Screening, options: Sequence[Hypothesis]) -> dict[str, Start]:
+        """Return the candidates, by label, that what they did to a model before shows to be hopeless."""
+        if not self.kept.logs:
+            return {}
+        kept = screen.from_kept()
+        known = [o for o in options if kept.knows(o)]
+        worth = _ROUGHLY * HOPELESS * self._worth()
+        starts = (start for o in known for start in kept.starts([o]))
+        return {
+            s.option.effect.label: s
+            for s in starts
+            if (s.falls is None and s.gain < worth[(s.option.effect.axis or 1) - 1])
+            or (s.falls is not None and np.all(s.falls < worth))
+        }
+
+    def _with_usual(
+        self,
+        pool: ThreadPoolExecutor,
+        trials: list[FittedHypothesis],
+        options: Sequence[Hypothesis],
+    ) -> list[FittedHypothesis]:
+        """Add what is more usual than the leader of an axis and may have begun too far off."""
+        tried = {t.label for t in trials}
+        begun = [
+            start
+            for standing in self.standings(trials)
+            if standing.best.trial.hypothesis.effect.axis == standing.axis + 1
+            for start in begun_where_it_ended(standing.best.trial, options, tried)
+        ]
+        self.usual |= {start.option.effect.label for start in begun}
+        return [*trials, *self._fitted(pool, begun)]
+
+    def _with_kin(
+        self,
+        pool: ThreadPoolExecutor,
+        trials: list[FittedHypothesis],
+        options: Sequence[Hypothesis],
+    ) -> list[FittedHypothesis]:
+        """Add what is like leaders and has to begin where they ended, or end where they did."""
+        trials = self._with_gears(pool, trials, options)
+        wider = begun_wider(self.standings(trials), trials, self.offered)
+        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
+        sticking = begun_sticking(self.standings(trials), options)
+        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in sticking])
+        return self._with_lags(trials, options)
+
+    def _with_gears(
+        self,
+        pool: ThreadPoolExecutor,
+        trials: list[FittedHypothesis],
+        options: Sequence[Hypothesis],
+    ) -> list[FittedHypothesis]:
+        """Add laws of the gear that another one leads on, begun on its curve; or put them where they fit better.
+
+        One that leads then has a curve of its own.
+        """
+        led: set[str] = set()
+        while begun := begun_on_curves(self.standings(trials), led, options, self.fitter.robot):
+            trials = self._with_better(pool, trials, begun)
+        return trials
+
+    def _with_better(
+        self,
+        pool: ThreadPoolExecutor,
+        trials: Sequence[FittedHypothesis],
+        begun: Sequence[tuple[FittedModel, Hypothesis, Mapping[str, float]]],
+    ) -> list[FittedHypothesis]:
+        """Add what is begun in the place of leaders, or put it where it fits better than it did."""
+        known = {t.label: t for t in trials}
+        for found in pool.map(lambda one: self._in_its_place(*one), begun):
+            if found is not None:
+                before = known.get(found.label)
+                if before is None or found.fitted.total < before.fitted.total:
+                    known[found.label] = found
+        return list(known.values())
+
+    def _with_lags(
+        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
+    ) -> list[FittedHypothesis]:
+        """Put delays and lags of axes that one of them leads on where their fits end."""
+        known = {t.label: t for t in trials}
+        for standing in self.standings(trials):
+            if lags := lags_beside(standing):
+                fits = ended(self.fitter, lags, options)
+                found = (trial(fit.free[-1], fit, self.model) for fit in fits)
+                known |= {t.label: t for t in found}
+        return list(known.values())
+
+    def _in_its_place(
+        self, leader: FittedModel, option: Hypothesis, values: Mapping[str, float]
+    ) -> FittedHypothesis | None:
+        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated.
+
+        ``values``: where the simulator's own parameters begin.
+        """
+        part = self.rough or self.fitter
+        try:
+            free = [*leader.free[:-1], option]
+            found = part.fit(free, leader, robot_values=values, refreshes=_RENEWALS)
+            found = settled(part, found.free, found)
+            if part is not self.fitter:
+                found = self._looked_at(found)
+        except InputError as error:
+            self.skipped.setdefault(option.effect.label, str(error))
+            return None
+        return trial(option, found, self.model)
+
+    def _looked_at(self, begun: FittedModel) -> FittedModel:
+        """Return a fit to part of the data as all of them have it."""
+        found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
+        # What is taken in is fitted on where it has not settled.
+        return replace(found, renewed=found.renewed and _has_settled(found))
+
+    def run_waiting(
+        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis], number: int
+    ) -> list[FittedHypothesis]:
+        """Fit the candidates that were left to the next round too; return all trials."""
+        chosen, self.waiting = self.waiting, []
+        if not chosen:
+            return trials
+        with self._threads() as pool:
+            found = self._with_usual(pool, [*trials, *self._fitted(pool, chosen)], options)
+        self.progress(f"fitting further candidates, round {number}", len(chosen), len(chosen))
+        return found
+
+    @contextmanager
+    def _threads(self) -> Iterator[ThreadPoolExecutor]:
+        """Yield threads; what they do is cancelled where the caller is interrupted."""
+        with ThreadPoolExecutor(self.settings.threads) as pool:
+            try:
+                yield pool
+            except BaseException:
+                self.fitter.cancel.cancel()
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+
+    def _fitted_by_place(
+        self, pool: ThreadPoolExecutor, chosen: Sequence[Start], label: str
+    ) -> list[FittedHypothesis]:
+        """Fit the chosen, place after place, the most promising first.
+
+        Where one found before explains enough of what is left on an axis, what is tried there is bound
+        to feel it and has to wait for the next round: it goes to ``waiting``, unless it promises as
+        much as any of that one's axis.
+        """
+        left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
+        most = best_by_axis(chosen, self.layout.n_axes)
+        found: list[FittedHypothesis] = []
+        done = 0
+        for axis, here in self._turns(chosen):
+            now = here
+            if axis is not None and found:
+                explained = falls(found, self.current, self.layout)[:, axis - 1] / left[axis - 1]
+                felt = found[int(np.argmax(explained))].hypothesis.effect.axis
+                if explained.max() > _FELT:
+                    bar = most.max() if felt is None else most[felt - 1]
+                    now = [s for s in here if s.gain > _as_much(s) * bar]
+                    self.waiting += [s for s in here if s.gain <= _as_much(s) * bar]
+            self.progress(label, done, len(chosen))
+            found += self._fitted(pool, now)
+            done += len(here)
+        self.progress(label, done, len(chosen))
+        return found
+
+    def _turns(self, chosen: Sequence[Start]) -> list[tuple[int | None, list[Start]]]:
+        """Return the axes of the chosen, the most promising first, each with what is tried there.
+
+        An effect of the whole arm is tried at the first axis where it comes near the others.
+        """
+        best = best_by_axis(chosen, self.layout.n_axes)
+        axes = {a for s in chosen if (a := s.option.effect.axis) is not None}
+        places: list[int | None] = [*sorted(axes, key=lambda a: -best[a - 1])]
+        turns: dict[int | None, list[Start]] = {place: [] for place in places or [None]}
+        least = least_of_the_arm(self._worth(), best)
+        for start in chosen:
+            place = start.option.effect.axis
+            if place is None and start.falls is not None:
+                near = start.falls > least
+                place = next((a for a in places if a is not None and near[a - 1]), None)
+            turns[next(iter(turns)) if place is None else place].append(start)
+        return list(turns.items())
+
+    def _fitted(self, pool: ThreadPoolExecutor, starts: Sequence[Start]) -> list[FittedHypothesis]:
+        """Fit candidates, on what the screen has of the data; look at them on all of it."""
+        tryout = TrialFit(self.bench, self.screen)
+        begun = pool.map(tryout.begun, starts)
+        return [t for t in pool.map(tryout.ended, begun) if t is not None]
+
+    def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
+        """Return how the trials stand on each axis that one of them improves."""
+        found = [
+            stand(
+                trials,
+                self.current,
+                self.floor,
+                self.layout,
+                axis,
+                explained_share=self.settings.explained_share,
+            )
+            for axis in range(self.layout.n_axes)
+        ]
+        return [s.usual_first().play_first() for s in found if s is not None]
+
+    def refined(
+        self,
+        trials: list[FittedHypothesis],
+        options: Sequence[Hypothesis],
+        number: int,
+        *,
+        even_felt: bool = False,
+    ) -> list[FittedHypothesis]:
+        """Fit the leaders of each axis again with the simulator's sensitivities renewed.
+
+        A large effect bends the re-fitted simulator, and the sensitivities taken from
+        it; the leaders deserve better before one of them is believed. Other laws of a gear that is one
+        begin where it ended.
+        """
+        label = f"refining the leaders, round {number}"
+        with self._threads() as pool:
+            while todo := self._refined_next(trials, even_felt=even_felt):
+                self.progress(label, len(self.done), len(self.done) + len(todo))
+                self.done.update(t.label for t in todo)
+                leaders = [self._leader_before(t, trials) for t in todo]
+                found = pool.map(self._refined, todo, leaders)
+                better = dict(zip(map(id, todo), found, strict=True))
+                with_them = (better.get(id(t), t) for t in trials)
+                trials = [t for t in with_them if t is not None]
+            trials = self._with_kin(pool, trials, options)
+        self.progress(label, 1, 1)
+        return trials
+
+    def _refined_next(
+        self, trials: Sequence[FittedHypothesis], *, even_felt: bool
+    ) -> list[FittedHypothesis]:
+        """Return the leaders to refine now: where one bends the simulator several, else mostly one.
+
+        A leader with sensitivities of its own may no longer bend it.
+        """
+        crooked = self._crooked(trials)
+        todo = self._worth_refining(trials, crooked, even_felt=even_felt)
+        return todo[: _AT_ONCE if crooked else 1]
+
+    def _leader_before(
+        self, one: FittedHypothesis, trials: Sequence[FittedHypothesis]
+    ) -> FittedHypothesis | None:
+        """Return what leads on the axis of a trial; None for one that leads anywhere, or has no axis."""
+        leaders = {s.axis: s.best.trial for s in self.standings(trials)}
+        if any(leader is one for leader in leaders.values()):
+            return None
+        return leaders.get((one.hypothesis.effect.axis or 0) - 1)
+
+    def _refined(
+        self, one: FittedHypothesis, leader: FittedHypothesis | None
+    ) -> FittedHypothesis | None:
+        """Return a trial with sensitivities of its own; None where it cannot be simulated with them.
+
+        As it was where they leave it far behind its ``leader``.
+        """
+        try:
+            fitted = self._compared(one.fitted, None if leader is None else leader.fitted)
+        except InputError as error:
+            self.skipped[one.label] = str(error)
+            return None
+        return one if fitted is None else trial(one.hypothesis, fitted, self.model)
+
+    def _compared(self, start: FittedModel, leader: FittedModel | None) -> FittedModel | None:
+        """Return a fit good enough to be compared: settled on part of the data, looked at on all.
+
+        None where it stays far behind its ``leader`` on that part.
+        """
+        if self.rough is None or start.renewed:
+            return settled(self.fitter, start.free, start)
+        begun = settled(self.rough, start.free, start)
+        axis = start.free[-1].effect.axis
+        if leader is not None and axis is not None:
+            needed = CLOSE * _taken_away(leader, self.model, axis - 1)
+            if _taken_away(begun, self.screen.model, axis - 1) < needed:
+                return None
+        return self._looked_at(begun)
+
+    def _crooked(self, trials: Sequence[FittedHypothesis]) -> set[int]:
+        """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
+        leaders = ((s.axis, s.best.trial.fitted) for s in self.standings(trials))
+        return {axis for axis, fitted in leaders if bent(self.fitter, fitted) >= BENT}
+
+    def _worth_refining(
+        self, trials: Sequence[FittedHypothesis], crooked: set[int], *, even_felt: bool
+    ) -> list[FittedHypothesis]:
+        """Return the leaders that explain anything, not done yet, where it is not clear which leads.
+
+        An effect is judged on its own axis: how it fares on others says little of what it would be
+        with the simulator's sensitivities its own. Unless it leads there: on others it is held against
+        rivals that were refined.
+        """
+        out = []
+        standings = self.standings(trials)
+        leaders = {s.best.trial.label for s in standings}
+        led: dict[int | None, str] = {s.axis + 1: s.best.trial.label for s in standings}
+        homes = {s.best.trial.label: s.best.trial.hypothesis.effect.axis for s in standings}
+        # Axes that another law of theirs leads, on another axis.
+        away = {home for label, home in homes.items() if led.get(home, label) != label}
+        # Where candidates wait, what leads has had no rivals.
+        wait = {start.option.effect.axis for start in self.waiting}
+        for standing in standings if even_felt else self._not_felt(standings, trials):
+            if standing.axis + 1 in wait:
+                continue
+            leader = standing.best
+            gain = leader.gain * self.layout.samples()[standing.axis]
+            if gain < self.least[standing.axis] or self.mends(leader.trial):
+                continue
+            bends = standing.axis in crooked
+            count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, CLOSE)
+            # What is more usual than the leader is it at its limits, until its own fit says no.
+            special = more_usual(leader.trial) if ended_at_bound(leader.trial) else set()
+            usual = self.usual | more_usual(leader.trial)
+            rivals = standing.ranked[:count]
+            if clear(standing) and not bends:
+                # What leads elsewhere, and is fitted there, is held against one that is fitted as well.
+                rivals = rivals[:1] if standing.axis + 1 in away else ()
+            usual |= {r.trial.label for r in as_good_with_less(standing)}
+            usual |= {r.trial.label for r in of_one_formula(standing)}
+            rivals += tuple(
+                r for r in standing.ranked if r.trial.label in usual and r not in rivals
+            )
+            for r in rivals:
+                place, label = r.trial.hypothesis.effect.axis, r.trial.label
+                here = place in (None, standing.axis + 1) or label in leaders
+                share = _FAR if label in usual else close
+                near = r.score > max(0.5 * self.settings.smallest_score, share * leader.score)
+                # A law at its limits may be the usual one, however badly that was fitted.
+                near = near or label in special
+                if here and near and label not in self.done and r.trial not in out:
+                    out.append(r.trial)
+        return out
+
+    def _not_felt(
+        self, standings: Sequence[AxisPosterior], trials: Sequence[FittedHypothesis]
+    ) -> Sequence[AxisPosterior]:
+        """Return the standings but those whose leaders the one that gains most of all is felt by.
+
+        They are judged in the next round, on top of it; but for its own axis, where it has to lead.
+        """
+        fall = falls(trials, self.current, self.layout)
+        place = {t.label: i for i, t in enumerate(trials)}
+        leaders = [place[s.best.trial.label] for s in standings]
+        first = place.get(self.first(standings, trials), 0)
+        home = trials[first].hypothesis.effect.axis
+        return [
+            s
+            for i, s in zip(leaders, standings, strict=True)
+            if i == first or s.axis + 1 == home or not interact(first, i, s.axis, fall)
+        ]
+
+    def first(self, standings: Sequence[AxisPosterior], trials: Sequence[FittedHypothesis]) -> str:
+        """Return the label of the leader that gains most of all; empty where nothing leads."""
+        fall = falls(trials, self.current, self.layout).sum(axis=1)
+        gain = {t.label: float(f) for t, f in zip(trials, fall, strict=True)}
+        return max((s.best.trial.label for s in standings), key=gain.__getitem__, default="")
+
+    def _worth(self) -> Array:
+        """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""
+        left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
+        return np.asarray(np.maximum(self.least, self.settings.smallest_score * left))
+
+    def _each(
+        self, pool: ThreadPoolExecutor, work: Callable[[A], B], items: Sequence[A], label: str
+    ) -> list[B]:
+        out = []
+        for k, value in enumerate(pool.map(work, items)):
+            out.append(value)
+            self.progress(label, k + 1, len(items))
+        return out
+
+
+def interact(one: int, other: int, axis: int, fall: Array) -> bool:
+    """Whether trial ``one``, taken in, would change what ``other`` gains on ``axis``.
+
+    ``fall`` (n_trials, n_axes): what each lowers the loss by.
+    """
+    return bool(abs(fall[one, axis]) > _FELT * abs(fall[other, axis]))

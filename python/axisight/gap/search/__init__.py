@@ -1,0 +1,1 @@
+"""Sets of causes: added, dropped, exchanged, merged until nothing more is worth a cause."""

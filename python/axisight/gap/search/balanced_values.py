@@ -1,0 +1,130 @@
+"""Values of causes, and of the simulator's own parameters, where the model leaves more than noise.
+
+A real machine is off any rigid model by many times its noise, over stretches of time. Weighed as noise,
+such errors outvote all that is known of masses and friction beforehand: these go to the edge of
+their tolerance for what is not theirs, and take the value of the cause along. Here the errors of
+every axis count for as much as they tell.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.rank_deficiency import pseudo_inverse
+from axisight.gap.search.state import SearchState
+
+Array = NDArray[np.float64]
+
+# Blocks of an axis from which their scatter tells how much its errors count for.
+_BLOCKS = 8
+
+
+def with_balanced_values(found: SearchState, fitter: ModelFitter) -> SearchState:
+    """Return the search with values that weigh the data against tolerances as the errors left ask for.
+
+    What was found, and what it explains, stays. Only where errors of axes add up: a closed loop that
+    leaves more than noise has no causes.
+    """
+    if not fitter.adds_up:
+        return found
+    baseline, model = (_balanced(m, fitter) for m in (found.baseline, found.model))
+    return replace(found, baseline=baseline, model=model)
+
+
+def _balanced(model: FittedModel, fitter: ModelFitter) -> FittedModel:
+    excess = inflation(model)
+    if not (excess > 1).any():
+        return model
+    with suppress(InputError):
+        fitted = fitter.tempered(1 / np.sqrt(excess)).fit(model.free, model, fresh=True)
+        if fitted.converged or fitted.stuck:
+            return replace(
+                model,
+                effects=fitted.effects,
+                free=fitted.free,
+                robot_values=fitted.robot_values,
+                std=deviations(fitted),
+                balanced=fitted.at_bound,
+            )
+    return model
+
+
+def inflation(model: FittedModel) -> Array:
+    """Return by how much the gradient of every axis scatters more than its weights say (n_axes,), one at least.
+
+    tr(H^-1 J) / tr(H^-1 A), with A the normal equations of the axis, H these and the tolerances, and J the
+    scatter of its gradient between blocks: one where errors are independent and of the size that the
+    weights have them. The magnitude adjustment of composite likelihoods (Pauli, Racugno and Ventura
+    2011, Statistica Sinica 21(1)).
+    """
+    out = np.ones(int(model.axis.max()) + 1)
+    if not model.parameters:
+        return out
+    for axis in range(len(out)):
+        mine = (model.axis == axis) & (model.loss > 0)
+        if mine.sum() < _BLOCKS:
+            continue
+        curvature = model.matrix[mine].sum(axis=0)
+        gradient = model.gradient[mine] - model.gradient[mine].mean(axis=0)
+        scatter = gradient.T @ gradient
+        inverse = pseudo_inverse(curvature + model.prior_matrix)
+        told = float(np.sum(inverse * curvature))
+        if told > 0:
+            out[axis] = max(1.0, float(np.sum(inverse * scatter)) / told)
+    return out
+
+
+# Of a normal distribution, by which standard deviations become intervals.
+_NORMAL = 1.96
+
+
+def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
+    """Return the standard deviation of every parameter as if there were many stretches of time.
+
+    What the estimate scatters by where each stretch of time is left out in turn, all axes together
+    (jackknife; few stretches scatter more than their sandwich shows), and what the tolerances leave open, in
+    squares; times the quantile of Student's distribution over that of the normal one.
+    """
+    stretch = _stretches(model)
+    count = int(stretch.max()) + 1
+    if count < _BLOCKS:
+        return dict(model.std)
+    used = [i for i, name in enumerate(model.parameters) if name not in model.at_bound]
+    pick = np.ix_(used, used)
+    matrix = np.zeros((count, len(used), len(used)))
+    gradient = np.zeros((count, len(used)))
+    np.add.at(matrix, stretch, model.matrix[:, used][:, :, used])
+    np.add.at(gradient, stretch, model.gradient[:, used])
+    prior = model.prior_matrix[pick]
+    whole, pull = matrix.sum(axis=0) + prior, gradient.sum(axis=0) + model.prior_gradient[used]
+    without = np.stack(
+        [pseudo_inverse(whole - m) @ (pull - g) for m, g in zip(matrix, gradient, strict=True)]
+    )
+    scatter = (count - 1) * without.var(axis=0)
+    inverse = pseudo_inverse(whole)
+    known = np.diag(inverse @ prior @ inverse)
+    quantile = float(scipy.stats.t.ppf(0.975, count - 1)) / _NORMAL
+    found = quantile * np.sqrt(scatter + known)
+    return {
+        **model.std,
+        **{model.parameters[i]: float(x) for i, x in zip(used, found, strict=True)},
+    }
+
+
+def _stretches(model: FittedModel) -> NDArray[np.int64]:
+    """Return the number of the stretch of time of every block (n_blocks,), one and the same on all axes."""
+    place = np.zeros(len(model.axis), dtype=np.int64)
+    for log in np.unique(model.log):
+        for axis in np.unique(model.axis):
+            mine = np.flatnonzero((model.log == log) & (model.axis == axis))
+            place[mine[np.argsort(model.start[mine])]] = np.arange(len(mine))
+    _, out = np.unique(np.stack([model.log, place]), axis=1, return_inverse=True)
+    return np.asarray(out, dtype=np.int64).reshape(-1)

@@ -1,0 +1,261 @@
+"""Pairs of effects on one axis that hide one another when they are tried one at a time.
+
+Where viscous friction and an offset are both missing, each alone leaves the error of the other,
+which drowns its own gain in some stretches of time and turns it round in others: neither looks
+sure. Together both are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, effect_info
+from axisight.errors import InputError
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.drive_lags import is_lag
+from axisight.gap.ranking.posterior import (
+    AxisPosterior,
+    FittedHypothesis,
+    RankedHypothesis,
+    clearly_worse,
+    stand,
+    trial,
+)
+from axisight.gap.screening.restart_look_alike import ended_at_bound
+from axisight.statistics.tails import normal_deviate
+
+Array = NDArray[np.float64]
+Found = tuple[RankedHypothesis, AxisPosterior]
+
+# Candidates of an axis that are tried in pairs.
+_PARTNERS = 4
+# Share of what is left that each of them explains alone, of what a cause has to: below, there is
+# nothing that hides.
+_HINT = 0.2
+# What each of a pair that is a cause together has to show beside the other: the pair has passed
+# the test of the whole family, its two members are held against one another.
+_OF_TWO = normal_deviate(0.025)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two effects that are causes of ``axis`` (from 0) together: ``both`` in one fit.
+
+    ``gain``: fall of the held-out loss there; ``members``: each as it stands beside the other.
+    """
+
+    axis: int
+    both: FittedHypothesis
+    gain: float
+    members: tuple[Found, Found]
+
+
+class Pairs:
+    """Pairs of candidates on top of one model, on the axes where no single one is a cause."""
+
+    def __init__(
+        self,
+        fitter: ModelFitter,
+        model: FittedModel,
+        trials: Sequence[FittedHypothesis],
+        current: Array,
+        floor: Array,
+        layout: Layout,
+        settings: Settings,
+    ) -> None:
+        self.fitter, self.model, self.trials, self.current = fitter, model, trials, current
+        self.floor, self.layout, self.settings = floor, layout, settings
+
+    def found(self, axis: int, first: float, tried: int) -> Pair | None:
+        """Return the pair that explains most of ``axis`` (from 0), if it is sure.
+
+        ``first``: loss above the floor there before any effect; ``tried``: candidates of the search.
+        """
+        here = self.layout.axis == axis
+        left = float((self.current - self.floor)[here].sum())
+        samples = float(self.layout.samples()[axis])
+        if left <= self.settings.smallest_gain * samples:
+            return None
+        mine = [t for t in self.trials if self._hints(t, axis, left)]
+        mine = self._taken_apart(sorted(mine, key=lambda t: float(t.held_out[here].sum())))
+        pairs = [p for p in combinations(mine, 2) if not _nested(*p)]
+        fits = {(a.label, b.label): f for a, b in pairs if (f := self._both(a, b)) is not None}
+        if not fits:
+            return None
+        best = min(fits, key=lambda k: float(fits[k].held_out[here].sum()) + fits[k].cost)
+        both = fits[best]
+        gain = float((self.current - both.held_out)[here].sum())
+        worth = gain > max(
+            self.settings.smallest_score * left,
+            self.settings.smallest_share * first,
+            self.settings.smallest_gain * samples,
+        )
+        # As many pairs as there could have been, were all candidates tried.
+        level = self.settings.false_alarms / max(tried * len(mine), 1)
+        needed = max(self.settings.significance, normal_deviate(level))
+        if not worth or self.layout.significance(self.current, both.held_out, axis) <= needed:
+            return None
+        one = self._beside(best[0], best[1], mine, axis)
+        other = self._beside(best[1], best[0], mine, axis)
+        return Pair(axis, both, gain, (one, other)) if one and other else None
+
+    def _hints(self, t: FittedHypothesis, axis: int, left: float) -> bool:
+        """Whether a candidate of ``axis`` explains some of what is ``left`` there, and is no ordinary hold."""
+        effect = t.fitted.effects[-1]
+        if is_lag(effect) and self.fitter.within_tolerance(effect):
+            return False
+        fall = float((self.current - t.held_out)[self.layout.axis == axis].sum())
+        own = t.hypothesis.effect.axis == axis + 1
+        return own and fall > _HINT * self.settings.smallest_score * left
+
+    def _taken_apart(self, mine: Sequence[FittedHypothesis]) -> list[FittedHypothesis]:
+        """Return the candidates that are tried in pairs, of all, the best first.
+
+        A composite with a number at its bound is another sum of its parts (a constant larger than the dry
+        friction is no friction that is larger one way): they are tried in its place.
+        """
+        partners = list(mine[:_PARTNERS])
+        present = {e.label for e in self.model.effects}
+        for composite in [t for t in partners if ended_at_bound(t)]:
+            parts = self._parts(composite, present | {t.label for t in partners})
+            if parts:
+                partners = [t for t in partners if t is not composite] + parts
+        return partners
+
+    def _parts(self, composite: FittedHypothesis, known: set[str]) -> list[FittedHypothesis]:
+        """Return the parts of a composite that are not known, each on top of the model."""
+        effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
+        free = [_part(name, effect, bounds) for name in effect_info(effect.name).parts]
+        try:
+            return [
+                trial(f, self.fitter.fit([*self.model.free, f], self.model))
+                for f in free
+                if _new(f, known)
+            ]
+        except InputError:
+            return []
+
+    def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
+        """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""
+        try:
+            fitted = self.fitter.fit([*one.fitted.free, other.hypothesis], one.fitted, lazy=True)
+        except InputError:
+            return None
+        return trial(other.hypothesis, fitted)
+
+    def _beside(
+        self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int
+    ) -> Found | None:
+        """Return how ``one`` stands among the candidates beside its partner, if it leads there."""
+        base = next(t for t in mine if t.label == partner)
+        others = [t for t in mine if t is not base and not _nested(t, base)]
+        beside = [x for t in others if (x := self._both(base, t)) is not None]
+        standing = stand(
+            beside,
+            base.held_out,
+            self.floor,
+            self.layout,
+            axis,
+            explained_share=self.settings.explained_share,
+        )
+        if standing is None or standing.best.trial.label != one:
+            return None
+        sure = self.layout.significance(base.held_out, standing.best.trial.held_out, axis)
+        return (standing.best, standing) if sure > _OF_TWO else None
+
+
+def _nested(one: FittedHypothesis, other: FittedHypothesis) -> bool:
+    """Whether one of two effects contains the other."""
+    a, b = one.hypothesis.effect.name, other.hypothesis.effect.name
+    return a in effect_info(b).contains or b in effect_info(a).contains
+
+
+def without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
+    """Return the standing with the winner in the place of composites that it is a part of.
+
+    Whether their other part is there too is a question of its own, asked once the winner is in.
+    """
+    winner = standing.best.trial.hypothesis.effect
+    composed = [
+        r
+        for r in standing.ranked[1:]
+        if winner.name in effect_info(r.trial.hypothesis.effect.name).parts
+        and r.trial.hypothesis.effect.axis == winner.axis
+    ]
+    for composite in composed:
+        rest = tuple(r for r in standing.ranked[1:] if r is not composite)
+        mass = standing.best.probability + composite.probability
+        standing = replace(standing, ranked=(replace(standing.best, probability=mass), *rest))
+    return standing
+
+
+def in_parts(
+    standing: AxisPosterior, fitter: ModelFitter, model: FittedModel, layout: Layout
+) -> tuple[Found, ...]:
+    """Return the parts of a composite that leads an axis, where they do as well; else none.
+
+    Those of its two parts that show beside the other: an asymmetric friction may be a Coulomb
+    friction and an offset, or one of them.
+    """
+    winner = standing.best
+    effect = winner.trial.hypothesis.effect
+    parts = effect_info(effect.name).parts
+    if not parts:
+        return ()
+    bounds = winner.trial.hypothesis.bounds
+    present = {e.label for e in model.effects}
+    free = [f for f in (_part(name, effect, bounds) for name in parts) if _new(f, present)]
+    try:
+        alone = [trial(f, fitter.fit([*model.free, f], model)) for f in free]
+        both = alone
+        if len(free) == 2:
+            both = [
+                trial(f, fitter.fit([*model.free, g, f], beside.fitted, lazy=True))
+                for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
+            ]
+    except InputError:
+        return ()
+    if not both or clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
+        return ()
+    chosen = _needed(alone, both, layout, standing.axis)
+    labels = {t.label for t in both} | {winner.trial.label}
+    rest = tuple(r for r in standing.ranked if r.trial.label not in labels)
+    mass = sum(r.probability for r in standing.ranked if r.trial.label in labels)
+    found = [replace(winner, trial=t, probability=mass) for t in chosen]
+    return tuple((r, replace(standing, ranked=(r, *rest))) for r in found)
+
+
+def _new(part: Hypothesis, present: set[str]) -> bool:
+    return part.effect.label not in present
+
+
+def _needed(
+    alone: Sequence[FittedHypothesis], both: Sequence[FittedHypothesis], layout: Layout, axis: int
+) -> Sequence[FittedHypothesis]:
+    """Return the trials of those parts that show beside the other; the first if none does."""
+    if len(both) < 2:
+        return both
+    sure = [
+        layout.significance(beside.held_out, t.held_out, axis) > _OF_TWO
+        for beside, t in zip(alone[::-1], both, strict=True)
+    ]
+    if all(sure):
+        return both
+    return [alone[1]] if sure[1] else [alone[0]]
+
+
+def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> Hypothesis:
+    """Return a part of a composite, with the shape that the composite has."""
+    given = composite.parameters or {}
+    info = effect_info(name).parameters
+    values = {p.name: given.get(p.name, p.neutral) for p in info}
+    shared = {p.name: bounds[p.name] for p in info if p.name in bounds}
+    return Hypothesis(Effect(name, composite.axis, values), tuple(values), bounds=shared)

@@ -1,0 +1,86 @@
+"""What the controller tells of a cause that the machine's motion leaves open.
+
+A drive that reports a share of its torque shows both gains of the controller off by that share, and the
+machine a torque constant off by its inverse. On one axis that lifts, a heavier link does as well as that
+constant; the controller's share, which no link changes, says which it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from axisight.effects import Effect
+from axisight.effects.stated import TORQUE_CONSTANT
+from axisight.gap.controller.torque_sensor import share_reported
+from axisight.gap.facts.algebraic_cause import AlgebraicCause
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, clearly_worse
+from axisight.gap.search.state import Round, SearchState
+from axisight.gap.search.swap import in_its_place
+
+# Errors of torque constants range over a tenth either way. One that a share of the controller's asks for
+# may be off by a hundredth: by chance a rival is that in a tenth of cases, for a torque that is reported
+# so always.
+_OFF = 0.01
+_ODDS = 10.0
+# A share that all logs have is known to this.
+_KNOWN = 5e-4
+
+
+def with_constants_told(
+    found: SearchState, fitter: ModelFitter, shown: Sequence[AlgebraicCause]
+) -> SearchState:
+    """Return a search with the torque constant that reported shares ask for in the place of its rivals.
+
+    ``shown``: what logs say of the controller by themselves. Where a cause of the axis, or of the arm,
+    leaves such a constant as likely as itself, and a fit leaves no more with it; one that leads is surer.
+    """
+    told = {
+        Effect(TORQUE_CONSTANT[0], cause.axis).label: share
+        for cause in shown
+        if (share := share_reported(cause)) is not None
+    }
+    for cause, standing in found.accepted if told else ():
+        rival = _told(standing, told)
+        if rival is None:
+            continue
+        model = in_its_place(fitter, found.model, cause, rival)
+        if model is None or clearly_worse(model.total, found.model.total):
+            continue
+        model = _held(fitter, model, rival.trial.label, told)
+        left = found.left()
+        found.model = model
+        weighed = standing.weighed({rival.trial.label: _ODDS})
+        first = next(r for r in weighed.ranked if r.trial is rival.trial)
+        led = weighed.led_by(first)
+        found.rounds.append(Round((led,), ((first, led),), left))
+    return found
+
+
+def _told(standing: AxisPosterior, told: Mapping[str, float]) -> RankedHypothesis | None:
+    """Return the cause, or its rival, that is a torque constant the controller's share asks for."""
+    for one in standing.inseparable():
+        share = told.get(one.trial.label)
+        if share is None:
+            continue
+        (error,) = one.trial.fitted.effects[-1].values()
+        if abs((1 + error) * (1 + share) - 1) < _OFF:
+            return one
+    return None
+
+
+def _held(
+    fitter: ModelFitter, model: FittedModel, label: str, told: Mapping[str, float]
+) -> FittedModel:
+    """Return a model with its torque constant where the controller's share has it."""
+    value = 1 / (1 + told[label]) - 1
+    name = TORQUE_CONSTANT[1]
+    free = [
+        replace(f.at({name: value}), priors={name: (value, _KNOWN)})
+        if f.effect.label == label
+        else f
+        for f in model.free
+    ]
+    return fitter.fit(free, model, refreshes=1)

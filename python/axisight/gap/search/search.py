@@ -1,0 +1,393 @@
+"""Search for causes: try all, take in the best of every axis, drop what is no longer needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, effect_info
+from axisight.errors import InputError
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.data_blocks import layout_of
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.held_out import held_out_loss
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.posterior import (
+    FORMULA_ERROR,
+    AxisPosterior,
+    FittedHypothesis,
+    RankedHypothesis,
+    clearly_worse,
+    falls,
+    without_composite,
+)
+from axisight.gap.screening.column_cache import ColumnCache
+from axisight.gap.screening.promise import HOPELESS
+from axisight.gap.screening.screening import kept_beside
+from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact, settled
+from axisight.gap.search.pairs import Pairs, in_parts, without_rival_composites
+from axisight.gap.search.revision import (
+    drop_idle,
+    finish,
+    merge,
+    straighten,
+    weigh_again,
+    withdraw_doubtful,
+)
+from axisight.gap.search.state import OPEN, Round, SearchState
+from axisight.statistics.tails import normal_deviate
+
+Array = NDArray[np.float64]
+
+# Each round takes in a cause on every axis that has one; this many on top of one another are
+# no longer causes but a shape.
+_MOST_ROUNDS = 8
+
+
+def search(
+    fitter: ModelFitter,
+    candidates: Callable[[FittedModel], list[Hypothesis]],
+    expected: Array,
+    settings: Settings,
+    progress: Progress,
+) -> SearchState:
+    """Search for the causes of a gap.
+
+    ``candidates`` makes the candidates from the residual of a model;
+    ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
+    """
+    progress("re-fitting the simulator", 0, 1)
+    baseline = _refitted(fitter)
+    progress("re-fitting the simulator", 1, 1)
+    floor = expected[baseline.axis] * baseline.samples
+    out = SearchState(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
+    refused: set[str] = set()
+    kept = ColumnCache()
+
+    def offered_beside(model: FittedModel) -> list[Hypothesis]:
+        return fresh(candidates(model), model, refused)
+
+    for number in range(1, _MOST_ROUNDS + 1):
+        least = out.least_falls(settings)
+        round_ = SearchRound(
+            fitter,
+            out.model,
+            floor,
+            out.layout,
+            least,
+            settings,
+            progress,
+            kept,
+            out.mends,
+            offered_beside,
+        )
+        offered = candidates(out.model)
+        options = fresh(offered, out.model, refused)
+        trials = round_.refined(round_.run(options, number), options, number)
+        standings, taken = _judged(round_, trials, out, settings, len(options))
+        if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
+            # What others waited for is no cause.
+            trials = round_.run_waiting(trials, options, number)
+            trials = round_.refined(trials, options, number, even_felt=True)
+            standings, taken = _judged(round_, trials, out, settings, len(options))
+        out.skipped |= round_.skipped
+        out.sensitivities |= round_.sensitivities
+        out.rounds.append(Round(standings, taken, out.left()))
+        if not taken:
+            break
+        try:
+            _take_in(round_, out, taken, progress)
+        except InputError as error:
+            # Together they cannot be simulated: what promised most was none of it.
+            refused.add(taken[0][0].trial.label)
+            out.skipped[taken[0][0].trial.label] = str(error)
+            continue
+        refused |= drop_idle(fitter, out, settings)
+        refused |= merge(fitter, out, settings, offered)
+        if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
+            break
+    if not fitter.adds_up:
+        weigh_again(fitter, out, settings)
+    straighten(fitter, out)
+    if not fitter.adds_up:
+        withdraw_doubtful(fitter, out, settings)
+    finish(fitter, out)
+    return out
+
+
+def _refitted(fitter: ModelFitter) -> FittedModel:
+    """Return the simulator re-fitted without effects: most of the way on the first halves of the logs."""
+    halves = fitter.beginnings()
+    if halves is None:
+        return fitter.fit([], refreshes=1)
+    return fitter.fit([], halves.fit([]))
+
+
+def _judged(
+    round_: SearchRound,
+    trials: Sequence[FittedHypothesis],
+    state: SearchState,
+    settings: Settings,
+    tried: int,
+) -> tuple[tuple[AxisPosterior, ...], tuple[tuple[RankedHypothesis, AxisPosterior], ...]]:
+    """Return how the trials stand on every axis, and what is taken in, as room permits."""
+    standings = tuple(round_.standings(trials))
+    taken = _taken(round_, trials, standings, state, settings, tried)
+    room = settings.max_causes - len(state.model.free)
+    return standings, taken[: max(room, 0)]
+
+
+def _taken(
+    round_: SearchRound,
+    trials: Sequence[FittedHypothesis],
+    standings: Sequence[AxisPosterior],
+    state: SearchState,
+    settings: Settings,
+    tried: int,
+) -> tuple[tuple[RankedHypothesis, AxisPosterior], ...]:
+    """Return the winners of all axes that are causes and do not feel one another."""
+    fall = falls(trials, round_.current, state.layout)
+    place = {t.label: i for i, t in enumerate(trials)}
+    found: list[tuple[RankedHypothesis, AxisPosterior]] = []
+    leaders: list[tuple[int, int]] = []
+
+    def felt_most(s: AxisPosterior) -> tuple[float, float]:
+        # One that leads on several axes is judged where it gains most.
+        mine = fall[place[s.best.trial.label]]
+        return -float(mine.sum()), -float(mine[s.axis])
+
+    causes = {s.axis: _led_by_a_cause(s, state, settings, tried) for s in standings}
+    for standing in sorted(standings, key=felt_most):
+        led = causes[standing.axis]
+        if led is None or _beaten_at_home(led, causes):
+            continue
+        led = led.with_those_that_lead(
+            [s for s in standings if _rival_leads(led, s, fall, place, state, settings)]
+        )
+        least = state.least_falls(settings)
+        led = led.with_what_others_say(
+            [s for s in standings if _leads(led, s, fall[place[led.best.trial.label]], least)]
+        )
+        mine = place[led.best.trial.label]
+        felt = any(
+            interact(one, mine, led.axis, fall) or interact(mine, one, axis, fall)
+            for one, axis in leaders
+        )
+        if not felt and _earns_its_gain(round_.fitter, led.best, state.model, least[led.axis]):
+            leaders.append((mine, led.axis))
+            found += _named_simply(led, round_.fitter, state)
+    if not found and round_.fitter.adds_up:
+        found = _pairs(round_, trials, state, settings, tried)
+    return tuple(found)
+
+
+def _beaten_at_home(led: AxisPosterior, causes: Mapping[int, AxisPosterior | None]) -> bool:
+    """Whether another cause leads on the axis of what leads elsewhere, and is of that axis too.
+
+    How effects of one axis fare on others says little of which of them it is.
+    """
+    effect = led.best.trial.hypothesis.effect
+    if effect.axis is None or effect.axis == led.axis + 1:
+        return False
+    home = causes.get(effect.axis - 1)
+    if home is None:
+        return False
+    other = home.best.trial.hypothesis.effect
+    return other.axis == effect.axis and other.label != effect.label
+
+
+def _rival_leads(
+    led: AxisPosterior,
+    other: AxisPosterior,
+    fall: Array,
+    place: Mapping[str, int],
+    state: SearchState,
+    settings: Settings,
+) -> bool:
+    """Whether a rival of what leads a standing, of the same axis, surely leads another one.
+
+    By more than what the formulas of the first and of the causes before it may leave there, and rather than
+    nothing or something unknown.
+    """
+    first, rival = led.best.trial, other.best.trial
+    mine = first.hypothesis.effect.axis
+    if other.axis == led.axis or mine is None or rival.hypothesis.effect.axis != mine:
+        return False
+    if rival is first or all(r.trial is not rival for r in led.ranked):
+        return False
+    if other.best.probability < other.p_none + other.p_unknown:
+        return False
+    more = fall[place[rival.label], other.axis] - fall[place[first.label], other.axis]
+    formula = settings.model_error**2 * float(fall[place[first.label]].sum())
+    formula += FORMULA_ERROR * float(state.removed()[other.axis])
+    sure = state.layout.significance(first.held_out, rival.held_out, other.axis)
+    return bool(more > formula and sure > settings.significance)
+
+
+def _leads(led: AxisPosterior, other: AxisPosterior, fall: Array, least: Array) -> bool:
+    """Whether what leads a standing also leads another, by what a cause takes away there."""
+    same = other.best.trial is led.best.trial
+    return other.axis != led.axis and same and bool(fall[other.axis] > least[other.axis])
+
+
+def _named_simply(
+    led: AxisPosterior, fitter: ModelFitter, state: SearchState
+) -> Sequence[tuple[RankedHypothesis, AxisPosterior]]:
+    """Return the cause that leads a standing, or what it is made of where that does as well."""
+    if fitter.adds_up:
+        whole = without_rival_composites(led)
+        return in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
+    simpler = _simpler(led, fitter)
+    return ((simpler.best, simpler),)
+
+
+def _pairs(
+    round_: SearchRound,
+    trials: Sequence[FittedHypothesis],
+    state: SearchState,
+    settings: Settings,
+    tried: int,
+) -> list[tuple[RankedHypothesis, AxisPosterior]]:
+    """Return the pairs of causes, on axes that do not feel one another, where none shows alone."""
+    first = state.layout.by_axis(held_out_loss(state.baseline) - state.floor)
+    pairs = Pairs(
+        round_.fitter, state.model, trials, round_.current, state.floor, state.layout, settings
+    )
+    found = [pairs.found(axis, float(first[axis]), tried) for axis in range(state.layout.n_axes)]
+    seen = sorted((p for p in found if p is not None), key=lambda p: -p.gain)
+    fall = falls([p.both for p in seen], round_.current, state.layout)
+    kept: list[int] = []
+    for k, pair in enumerate(seen):
+        felt = (interact(i, k, pair.axis, fall) or interact(k, i, seen[i].axis, fall) for i in kept)
+        if not any(felt):
+            kept.append(k)
+    return [member for i in kept for member in seen[i].members]
+
+
+# Of candidates that explain nearly as much as the first, one may show more evenly over time.
+_NEARLY = 0.8
+
+
+def _led_by_a_cause(
+    standing: AxisPosterior, state: SearchState, settings: Settings, tried: int
+) -> AxisPosterior | None:
+    """Return the standing led by its first candidate that is a cause, not far behind the winner.
+
+    Those before it, which the data do not show evenly enough to be causes, are no rivals.
+    """
+    for k, r in enumerate(standing.ranked):
+        near = r.score >= _NEARLY * standing.best.score
+        if near and _is_cause(r, standing, state, settings, tried):
+            return standing.without_first(k)
+    return None
+
+
+def _is_cause(
+    best: RankedHypothesis,
+    standing: AxisPosterior,
+    state: SearchState,
+    settings: Settings,
+    tried: int,
+) -> bool:
+    """Whether what a candidate explains on an axis is real and worth naming.
+
+    It is one of ``tried`` candidates, each with two chances (its gain and its size): its
+    significance is held against the level that keeps the false alarms of all of them together at
+    ``settings.false_alarms`` (Bonferroni).
+    """
+    needed = max(
+        settings.significance,
+        normal_deviate(settings.false_alarms / max(2 * tried, 1)),
+    )
+    fall = best.gain * float(state.layout.samples()[standing.axis])
+    least = float(state.least_falls(settings)[standing.axis])
+    large = fall > least and not state.mends(best.trial)
+    worth = large and best.score > settings.smallest_score
+    return best.significance > needed and worth and standing.best.probability > standing.p_none
+
+
+def _take_in(
+    round_: SearchRound,
+    state: SearchState,
+    taken: Sequence[tuple[RankedHypothesis, AxisPosterior]],
+    progress: Progress,
+) -> None:
+    label = "adding " + ", ".join(r.trial.label for r, _ in taken)
+    progress(label, 0, 1)
+    start = taken[0][0].trial.fitted
+    # One of a pair that the count of causes has no room for was fitted beside the other.
+    if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:
+        free = list(start.free)
+    else:
+        free = list(state.model.free)
+        for r, _ in taken:
+            new = r.trial.fitted.free[-1]
+            free = [*kept_beside(free, new), new]
+    # From the simulator of the first: a gap may have bent the one without it. As far as the last fit
+    # goes: mostly this is it.
+    state.model = settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN)
+    progress(label, 1, 1)
+
+
+def _first_part(standing: AxisPosterior) -> RankedHypothesis | None:
+    """Return the rival that is the first part of a winner which simpler effects imitate."""
+    effect = standing.best.trial.hypothesis.effect
+    parts = effect_info(effect.name).parts
+    if not parts:
+        return None
+    label = Effect(parts[0], effect.axis).label
+    return next((r for r in standing.ranked if r.trial.label == label), None)
+
+
+def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
+    """Return a standing led by the first part of a composite winner, where parts do nearly as well or better.
+
+    Where the first does nearly as well alone, the composite stays a rival. Where it takes both parts, one cause is
+    likelier than two: it has to leave clearly more than they do.
+    """
+    part = _first_part(standing)
+    if part is None:
+        return standing
+    if any(r is part for r in standing.inseparable()):
+        return standing.led_by(part)
+    winner = standing.best
+    effect = winner.trial.hypothesis.effect
+    second = effect_info(effect.name).parts[1]
+    other = Hypothesis(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
+    try:
+        both = fitter.fit([*part.trial.fitted.free, other], part.trial.fitted, lazy=True)
+    except InputError:
+        return standing
+    if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
+        return without_composite(standing, part)
+    return standing
+
+
+def _earns_its_gain(
+    fitter: ModelFitter, winner: RankedHypothesis, model: FittedModel, least: float
+) -> bool:
+    """Whether logs are fitted better with an effect, and worse again when it is switched off.
+
+    ``least``: what a cause takes away of the loss. A fit with one more effect also moves everything else; where
+    the model was not at its optimum, that may be all it did. And where the simulator's own parameters take up a
+    gap on all logs, what one log tells of them predicts others badly: an effect of no use in fits may mend that.
+    """
+    fitted = winner.trial.fitted
+    others = [replace(f, free=()) for f in fitted.free[:-1]]
+    gain = model.total - fitted.total
+    if fitter.within_tolerance(fitted.effects[-1]) or gain < HOPELESS * least:
+        return False
+    try:
+        without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
+    except InputError:
+        # A loop that swings without end lacks it.
+        return True
+    return without.total - fitted.total > 0.5 * gain
+
+
+def _settled(state: SearchState, settings: Settings) -> bool:
+    """Whether what is left on every axis is less than any cause would take away."""
+    return bool(np.all(state.left() < state.least_falls(settings)))

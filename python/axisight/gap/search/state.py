@@ -1,0 +1,121 @@
+"""State of a search: the simulator re-fitted, the model with the causes so far, and how each round stood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.held_out import held_out_loss, predictable
+from axisight.gap.fit.sensitivity import Sensitivity
+from axisight.gap.ranking.posterior import (
+    FORMULA_ERROR,
+    AxisPosterior,
+    FittedHypothesis,
+    RankedHypothesis,
+)
+from axisight.gap.search.swap import alike
+
+Array = NDArray[np.float64]
+
+OPEN = 1.0
+"""Loss that a step may still promise: half of it is a log-likelihood ratio."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round: how candidates stood on each axis, what was taken in.
+
+    ``left`` (n_axes,): held-out loss above the floor before.
+    """
+
+    standings: tuple[AxisPosterior, ...]
+    accepted: tuple[tuple[RankedHypothesis, AxisPosterior], ...]
+    left: Array
+
+
+@dataclass
+class SearchState:
+    """Result of a search.
+
+    ``baseline``: the simulator re-fitted without effects; ``model``: with the
+    accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
+    blocks lie; ``skipped``: candidates that failed, with the reason;
+    ``sensitivities`` by label, of candidates as they were screened last;
+    ``adds_up``: errors add up axis by axis; ``by_axis``: the effects explain their axes, not the arm.
+    """
+
+    baseline: FittedModel
+    model: FittedModel
+    floor: Array
+    layout: Layout
+    rounds: list[Round] = field(default_factory=list)
+    skipped: dict[str, str] = field(default_factory=dict)
+    sensitivities: dict[str, Sensitivity] = field(default_factory=dict)
+    adds_up: bool = False
+    by_axis: bool = False
+
+    @property
+    def accepted(self) -> list[tuple[RankedHypothesis, AxisPosterior]]:
+        """The causes in the model and how they stood when they entered, in the model's order."""
+        entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
+        return [entered[f.effect.label] for f in self.model.free]
+
+    def standings_of(self, cause: RankedHypothesis) -> tuple[AxisPosterior, ...]:
+        """Return how the round stood in which a cause came in."""
+        return next(x.standings for x in self.rounds if any(r is cause for r, _ in x.accepted))
+
+    def to_explain(self) -> Array:
+        """Return the held-out loss of the re-fitted simulator above the floor, by axis (n_axes,)."""
+        used = predictable(self.model)
+        above = held_out_loss(self.baseline, like=self.model) - self.floor
+        return self.layout.by_axis(np.where(used, above, 0.0))
+
+    def left(self) -> Array:
+        """Return the held-out loss of the model above the floor, by axis (n_axes,)."""
+        return self.left_by(self.model)
+
+    def left_by(self, model: FittedModel) -> Array:
+        """Return the same of another model."""
+        return self.layout.by_axis(held_out_loss(model) - self.floor)
+
+    def removed(self) -> Array:
+        """Return how much of it the causes remove, by axis (n_axes,)."""
+        used = predictable(self.model)
+        fall = held_out_loss(self.baseline, like=self.model) - held_out_loss(self.model)
+        return self.layout.by_axis(np.where(used, fall, 0.0))
+
+    def least_falls(self, settings: Settings) -> Array:
+        """Return the fall of the loss of each axis (n_axes,) below which nothing there is a cause.
+
+        In a loop, where errors do not add up axis by axis, what a cause on one axis takes away
+        leaves the error of its formula on every other.
+        """
+        formulas = 0.0 if self.adds_up else settings.model_error**2 * float(self.removed().sum())
+        return np.maximum(
+            settings.smallest_gain * self.layout.samples() + formulas,
+            settings.smallest_share * self.to_explain(),
+        )
+
+    def mends(self, one: FittedHypothesis) -> bool:
+        """Whether a trial mends the formula of a cause: it is another law of the same gear, or of its dry friction.
+
+        One that takes away no more on its own axis than what formulas may leave of what was removed there.
+        """
+        axis = one.hypothesis.effect.axis
+        others = [
+            e for e in self.model.effects if e.axis == axis and alike(e, one.hypothesis.effect)
+        ]
+        if self.adds_up or axis is None or not others:
+            return False
+        fall = self.layout.by_axis(held_out_loss(self.model) - one.held_out)
+        return bool(fall[axis - 1] < FORMULA_ERROR * self.removed()[axis - 1])
+
+    def explained(self) -> float:
+        """Return the share of the explainable held-out error the model removes."""
+        total = float(self.to_explain().sum())
+        return float(self.removed().sum()) / total if total > 0 else 0.0

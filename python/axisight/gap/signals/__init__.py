@@ -1,0 +1,1 @@
+"""Measured signals for themselves: motion, noise, filters, steps of encoders, standstill."""

@@ -1,0 +1,101 @@
+"""What sensor noise alone leaves of a torque predicted from the measured motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from axisight.gap.facts.simulator_variant import AS_GIVEN
+from axisight.gap.signals.motion import Filtering
+from axisight.gap.signals.noise import position_noise_std, segment_of
+from axisight.gap.signals.repeated_motions import repeated_std_nm
+from axisight.gap.simulator.rigid_torque import predicted_torque
+from axisight.logs import Log, differentiate, lowpass
+from axisight.robot import Robot
+from axisight.simulation import white_noise
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InverseNoise:
+    """Noise of position (or measured velocity) through the inertia, and of the torque.
+
+    ``robot`` without effects; ``position_std_rad`` (n_axes,) of white noise
+    in each sample: that of velocity and torque is each log's own. ``scale`` (n_axes,): factor that
+    makes of it what repeats of a motion differ by, where there are any (``repeated``).
+    """
+
+    filtering: Filtering
+    robot: Robot
+    position_std_rad: Array
+    scale: Array
+    seed: int
+    repeated: bool = False
+
+    @classmethod
+    def of(cls, robot: Robot, logs: Sequence[Log], filtering: Filtering, seed: int) -> InverseNoise:
+        """Return the noise of logs, from what is in their spectra where motion has no power."""
+        std = position_noise_std(list(logs))
+        noise = cls(filtering, robot.with_effects([]), std, np.ones(robot.n_axes), seed)
+        repeated = repeated_std_nm(logs, filtering)
+        if repeated is None:
+            return noise
+        expected = np.std(noise.error(logs[0], 0), axis=0)
+        scale = repeated / np.maximum(expected, 1e-300)
+        return replace(noise, scale=scale, repeated=True)
+
+    def error(self, log: Log, run: int) -> Array:
+        """Return the error (n, n_axes) [Nm] that noise causes in a predicted torque of run ``run``."""
+        step = log.sample_time_s
+        cutoff = self.filtering.motion_cutoff_hz(step)
+        white = white_noise(self.seed, 2 * run, log.n_samples, log.n_axes)
+        _, acceleration = differentiate(white * self.position_std_rad, step, cutoff, curved=True)
+        axes = np.flatnonzero(self.filtering.measured)
+        if axes.size and log.velocity_rad_s is not None:
+            speed = lowpass(
+                (white * _top_std(log, log.velocity_rad_s))[:, axes], step, cutoff, curved=True
+            )
+            acceleration[:, axes] = np.gradient(speed, step, axis=0)
+        torque = white_noise(self.seed, 2 * run + 1, log.n_samples, log.n_axes)
+        left = self._inertial(log, acceleration) - torque * _top_std(log, log.torque_nm)
+        return np.asarray(self.scale * self.filtering.compared(left, step))
+
+    def _inertial(self, log: Log, acceleration: Array) -> Array:
+        """Return the torque of an acceleration added to that of a log (n, n_axes), `M(q)` times it."""
+        position, velocity, own, torque = self.filtering(log)
+        with_it, without = (
+            predicted_torque(self.robot, AS_GIVEN, (position, velocity, a, torque))
+            for a in (own + acceleration, own)
+        )
+        return with_it - without
+
+
+def _top_std(log: Log, x: Array) -> Array:
+    """Return the standard deviation of white noise (n_axes,) from the top fifth of the spectrum.
+
+    Dry friction breaks a torque at every reversal, which shows up there too: not more than what the
+    differences from one sample to the next have without the largest of them.
+    """
+    rate = 1.0 / log.sample_time_s
+    f, density = scipy.signal.welch(x, rate, nperseg=segment_of(log), axis=0)
+    top = (f > 0.4 * rate) & (f < 0.49 * rate)
+    found = np.sqrt(np.mean(density[top], axis=0) * rate / 2)
+    return np.asarray(np.minimum(found, _unbroken_std(x)))
+
+
+# Of the differences of a signal, counted without those that breaks make.
+_KEPT = 0.9
+# Of normal numbers, the variance of the smallest nine tenths; squares of third differences, of white noise.
+_VARIANCE_KEPT, _THIRD = 0.6230, 20.0
+
+
+def _unbroken_std(x: Array) -> Array:
+    """Return the standard deviation of white noise (n_axes,) from the third differences of a signal."""
+    squares = np.sort(np.diff(x, 3, axis=0) ** 2, axis=0)
+    kept = squares[: max(1, int(_KEPT * len(squares)))].mean(axis=0)
+    return np.asarray(np.sqrt(kept / (_VARIANCE_KEPT * _THIRD)))

@@ -1,0 +1,32 @@
+"""The torque that a simulator with rigid gears predicts for a motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import core_effects
+from axisight.fitting import FitOptions, Weighting
+from axisight.gap.facts.simulator_variant import Variant
+from axisight.gap.signals.motion import Motion
+from axisight.gap.simulator.own_parameters import with_values
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
+    """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
+    changed = with_values(robot, variant.robot_values)
+    result = _core.evaluate_inverse_dynamics(
+        changed.core,
+        core_effects(variant.effects),
+        [],
+        [(*at, np.ones_like(at[3]))],
+        Weighting.flat(robot.n_axes).core(),
+        FitOptions(),
+    )
+    # The residual is prediction minus measurement, axis by axis.
+    residual = result.residual.reshape(robot.n_axes, -1).T
+    return np.asarray(residual + at[3])

@@ -1,0 +1,174 @@
+"""The diagnosis put together from what was found and measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.metadata import version
+
+import numpy as np
+
+from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.result import Cause, Diagnosis, Interval, MotionErrors
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import Variant
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.tolerance_edges import parameters_at_edge
+from axisight.gap.measure.chatter import chance_check
+from axisight.gap.measure.detection_limits import detection_limits
+from axisight.gap.measure.gap_figures import gap_figures, stage
+from axisight.gap.measure.motion_errors import motion_errors, velocity_from
+from axisight.gap.measure.where import band_map, findings, led_by_weight, regime_maps
+from axisight.gap.search.prior_strain import bent_for
+from axisight.gap.signals.encoder_steps import encoder_steps
+from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
+from axisight.gap.verdict.carry_over import carried_over, open_check
+from axisight.gap.verdict.coarse_encoders import with_coarse_encoders
+from axisight.gap.verdict.conclusion import Conclusion
+from axisight.gap.verdict.controller_causes import with_controllers_shown
+from axisight.gap.verdict.gap_beyond_torque import beyond_torque
+from axisight.gap.verdict.headline import headline
+from axisight.gap.verdict.remainder import refit_worse, remainder_of, reversals_smeared
+from axisight.gap.verdict.validated import Validated
+from axisight.gap.views.view import View
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+def assembled(
+    name: str,
+    robot: Robot,
+    view: View,
+    held_logs: Sequence[Log],
+    seen: Validated,
+    settings: Settings,
+    noted: tuple[Finding, ...],
+) -> Diagnosis:
+    """Return the diagnosis: the verdict as it holds on the validation logs, with all figures.
+
+    ``noted``: findings of the logs before anything was fitted.
+    """
+    found, conclusion, reach, own = seen.found, seen.conclusion, seen.reach, seen.own
+    bands = band_map(seen.errors, settings.block_s)
+    regimes = regime_maps(seen.errors, settings.bandwidth_hz, settings.block_s)
+    gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
+    gap = replace(gap, motion=_motion(view, held_logs, seen, noted))
+    judged = gap_figures(reach.judged)
+    names = [log.name for log in held_logs]
+    nominal, tolerances = nominal_values(robot), view.fitter.tolerances
+    share = bent_for(view.fitter, found)
+    left = remainder_of(reach.judged, judged, reach.left, settings)
+    removed = view.removed_there(found, held_logs) if conclusion.causes else None
+    steps = encoder_steps(view.robot, view.logs)
+    conclusion = carried_over(
+        conclusion, reach.judged, judged, names, settings, own, share, removed, steps > 0
+    )
+    measured = [view.measured(log) for log in held_logs]
+    conclusion, of_steps = with_coarse_encoders(
+        conclusion,
+        steps,
+        view,
+        held_logs,
+        reach.judged,
+        lambda errors: stage(held_logs, errors, settings.block_s, measured),
+    )
+    conclusion, unfelt = with_controllers_shown(conclusion, view)
+    causes = _causes(conclusion, [*reach.reductions, *of_steps, *unfelt])
+    maps = (bands, regimes, settings.significance)
+    places = findings(*maps) if conclusion.verdict != "none" else ()
+    excess = np.array([axis.excess for axis in conclusion.axes])
+    if conclusion.verdict == "unknown" and excess.max() > settings.largest_scatter:
+        places = led_by_weight(places, *maps, excess)
+    # Where nothing was named, `after` is the simulator re-fitted alone.
+    fitted = found.model if reach.reductions else found.baseline
+    refit = {k: _relative(robot, fitted, k) for k in fitted.robot_values}
+    return Diagnosis(
+        name=name,
+        mode=view.mode,
+        verdict=conclusion.verdict,
+        headline=headline(
+            conclusion, gap, causes, places, robot.effects, refit=refit, joints=robot.axis_names
+        ),
+        gap=gap,
+        where=places,
+        causes=causes,
+        alternatives=conclusion.alternatives,
+        equivalent=conclusion.equivalent,
+        next_experiment=conclusion.next_experiment,
+        ranking=conclusion.ranking,
+        band_map=bands,
+        regime_maps=regimes,
+        overlays=reach.overlays,
+        refit=refit,
+        checks=(
+            *conclusion.checks,
+            *chance_check(reach.stages, reach.judged),
+            *open_check(reach.stages),
+            *view.remarks(),
+        ),
+        axes=conclusion.axes,
+        p_none=conclusion.p_none,
+        p_unknown=conclusion.p_unknown,
+        remainder=left,
+        detection_limits=detection_limits(found, view),
+        findings=(
+            *noted,
+            *refit_worse(reach.stages, names),
+            *beyond_torque(gap, held_logs),
+            *reversals_smeared(left, places, view.cutoff_hz),
+            *parameters_at_edge(fitted, nominal, tolerances),
+        ),
+        settings=settings.as_dict(robot),
+        provenance=_provenance(robot, view, names, settings),
+    )
+
+
+def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cause, ...]:
+    return tuple(
+        Cause(
+            c.effect,
+            c.axis,
+            c.probability,
+            c.parameters,
+            c.units,
+            r,
+            c.family,
+            c.family_probability,
+            c.axes,
+            conclusion.rivals_of(c.label),
+        )
+        for c, r in zip(conclusion.causes, reductions, strict=False)
+    )
+
+
+def _provenance(
+    robot: Robot, view: View, held: Sequence[str], settings: Settings
+) -> dict[str, object]:
+    return {
+        "axisight_version": version("axisight"),
+        "seed": settings.seed,
+        "robot": robot.name,
+        "robot_effects": [effect.label for effect in robot.effects if effect.acts],
+        "axis_names": list(robot.axis_names),
+        "axis_kinds": ["prismatic" if p else "revolute" for p in robot.axis_is_prismatic],
+        "estimation_logs": [log.name for log in view.logs],
+        "validation_logs": list(held),
+        "position_noise_std_rad": view.floor.position_std_rad.tolist(),
+        "cutoff_hz": view.cutoff_hz,
+    }
+
+
+def _relative(robot: Robot, model: FittedModel, name: str) -> Interval:
+    """Return the relative change of a re-fitted parameter with its 95 % interval."""
+    nominal, size = nominal_and_size(robot, name)
+    change = (model.robot_values[name] - nominal) / size
+    spread = 1.96 * model.std.get((None, name), 0.0) / size
+    return Interval(change, change - spread, change + spread)
+
+
+def _motion(
+    view: View, logs: Sequence[Log], seen: Validated, noted: Sequence[Finding]
+) -> MotionErrors | None:
+    """Return the errors of position and velocity on the validation logs, where positions are compared."""
+    refitted, after = Variant(seen.found.baseline.robot_values), seen.reach.simulator
+    return motion_errors(view, logs, refitted, after, velocity_from(logs, noted))

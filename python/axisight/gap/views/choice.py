@@ -1,0 +1,33 @@
+"""The one place that decides how simulator and logs are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.fitting.simulation_error import is_closed_loop
+from axisight.gap.facts.settings import Settings
+from axisight.gap.prepare.position_targets import Commanded
+from axisight.gap.views.closed_loop import ClosedLoopView
+from axisight.gap.views.inverse_dynamics import InverseView
+from axisight.gap.views.targets import TargetsView
+from axisight.gap.views.view import View
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+def view_of(
+    robot: Robot,
+    estimation: Sequence[Log],
+    validation: Sequence[Log],
+    settings: Settings,
+    commanded: Commanded | None = None,
+) -> View:
+    """Return closed loop if robot and all logs have what it takes, else inverse dynamics.
+
+    ``commanded``: where no torque was logged; the logs are then among those of it.
+    """
+    if commanded is not None:
+        return TargetsView(commanded, list(estimation), settings)
+    if is_closed_loop(robot, [*estimation, *validation]):
+        return ClosedLoopView(robot, list(estimation), settings)
+    return InverseView(robot, list(estimation), settings, validation)

@@ -1,0 +1,365 @@
+"""Closed-loop mode: simulator and machine under the same references and controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import Effect, EffectTuple, core_effects
+from axisight.errors import InputError
+from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.gap.controller.feedback import loop_responses, periodic_response
+from axisight.gap.controller.loop_decay import FORGOTTEN, slowest_decay_1_s
+from axisight.gap.controller.other_controllers import check_gains, other_controllers
+from axisight.gap.controller.speed_loop import with_integral
+from axisight.gap.controller.torque_limits import missing, reported, torque_limits
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.drive_lags import is_lag
+from axisight.gap.search.state import SearchState
+from axisight.gap.signals.encoder_steps import encoder_steps
+from axisight.gap.signals.lowpass_cutoff import highest_cutoff_hz
+from axisight.gap.signals.motion import Motion, motion
+from axisight.gap.signals.standstill import certainty, open_errors, sure_friction_nm
+from axisight.gap.simulator.closed_loop_runs import noise_torques, simulated_run, simulated_torques
+from axisight.gap.simulator.own_parameters import with_values
+from axisight.gap.simulator.rigid_torque import predicted_torque
+from axisight.gap.views.tracking_weights import passed, shortest, tracking_floor
+from axisight.gap.views.view import View
+from axisight.logs import Log, differentiate
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+# Speed of the loop that keeps a simulator on a log, relative to the machine's own. Any loop will do
+# where all is linear: weights undo its response. But with lost motion or stiction in the model a
+# tight one chatters: widths of a play two thousandths apart differ by a third in loss, which in
+# a loop of a third of the speed is all but smooth. Slower still, the simulator strays from
+# the log by more than waves of a ripple are long.
+TRACKING_SPEED = 1 / 3
+
+# Position [rad] and torque [Nm] of a log (lead + n, n_axes), its certainty (n, n_axes), the joint angles
+# where its run begins [rad], (n_axes,), None at the operating point, and how many samples lead to it.
+Record = tuple[Array, Array, Array, Array | None, int]
+# Robot, effects, parameters, records and weights, as the core takes them.
+Problem = tuple[
+    _core.Robot,
+    list[EffectTuple],
+    list[Spec],
+    list[Record],
+    list[tuple[list[float], list[float], int]],
+]
+
+
+class ClosedLoopView(View):
+    """Simulator and machine driven by the same references."""
+
+    fitter: ClosedLoopFitter
+
+    def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
+        slow = with_integral(robot).with_controller_speed(TRACKING_SPEED)
+        # What keeps a simulator on a log acts on its motors at once.
+        self.tracking = slow.with_effects([e for e in robot.effects if not is_lag(e)])
+        limits = torque_limits(robot, logs)
+        others = other_controllers(robot, logs)
+        check_gains(others)
+        self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
+        self._step_rad = encoder_steps(robot, logs)
+        floor, self._weights = tracking_floor(self.tracking, self._noisy, logs, settings)
+        # A torque reported after the limit is what the motor got: it needs no limit once more.
+        after = {limit.effect.label for limit in limits}
+        own = [e for e in robot.effects if e.label not in after]
+        kept_on_log = slow.with_effects(own)
+        data = records_of(self.tracking, logs, floor.weighting)
+        fitter = ClosedLoopFitter(
+            kept_on_log, data, floor.weighting, settings.tolerances_of(robot), settings.block_s
+        )
+        super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+        self.limits = limits
+        self.shown = (*missing(limits, robot), *others)
+        self.not_offered = frozenset(after)
+        self._loops: dict[tuple[int, float], tuple[Complex, Complex]] = {}
+
+    def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        """Return the response of the feedback that keeps the simulator on the log.
+
+        An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``; a torque
+        on the motor passes the machine before, and an error of the gear becomes one.
+        """
+        loops = self._loop(frequency_hz)
+        return periodic_response(self.tracking, effect, axis, loops, frequency_hz)
+
+    def _loop(self, frequency_hz: Array) -> tuple[Complex, Complex]:
+        """Return the responses to errors of sensors and to torques (n_freq, n_axes, n_axes)."""
+        key = (len(frequency_hz), float(frequency_hz[-1]))
+        if key not in self._loops:
+            self._loops[key] = loop_responses(self.tracking, frequency_hz)
+        return self._loops[key]
+
+    def measured(self, log: Log) -> Array:
+        """Return the logged torque."""
+        return log.torque_nm
+
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the simulated torque of every log."""
+        out = simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
+        return [self._reported(torque, variant) for torque in out]
+
+    def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
+        """Return torque and position of the simulator on one log."""
+        torque, position = simulated_run(self.robot, variant, log)
+        return self._reported(torque, variant), position
+
+    def _reported(self, torque_nm: Array, variant: Variant) -> Array:
+        # An effect of a variant replaces the simulator's own.
+        effects = {e.label: e for e in (*self.robot.effects, *variant.effects)}.values()
+        return reported(torque_nm, self.limits, effects)
+
+    def weighting_with(self, torque_nm: Array) -> Weighting:
+        """Return the weights that there would be with one more log, of this torque (n, n_axes)."""
+        torques = [*(log.torque_nm for log in self.logs), torque_nm]
+        weight = self._weights.of(torques, shortest(self.logs))
+        return replace(self.floor.weighting, weight=weight)
+
+    def followed(self, found: SearchState, logs: Sequence[Log]) -> float:
+        """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
+        there = self.fitter.along(records_of(self.tracking, logs, self.floor.weighting))
+        try:
+            before = there.loss([], found.baseline)
+            left = there.loss(found.model.free, found.model)
+        except InputError:
+            # One of them cannot be kept there.
+            return 0.0
+        noise = float(there.counted_by_axis() @ self.floor.expected)
+        return (before - left) / max(before - noise, 1e-300)
+
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
+        """Return the torque that sensor noise causes through the loop, for every log."""
+        machine = with_values(self._noisy, variant.robot_values)
+        effects = {e.label: e for e in (*machine.effects, *variant.effects)}.values()
+        # Steps are no white noise: what they make of a slow motion is run.
+        stated = self.robot.position_noise_std
+        return noise_torques(
+            machine.with_effects(list(effects)),
+            logs,
+            np.where(self._step_rad > 0, stated, self.floor.position_std_rad),
+            self.settings.seed,
+            first_run,
+            step_rad=self._step_rad,
+            threads=self.settings.threads,
+        )
+
+    def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return the torque that noise of the stated sensor causes through the loop, for every log."""
+        std = np.full(self.robot.n_axes, self.robot.position_noise_std)
+        seed, threads = self.settings.seed, self.settings.threads
+        return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
+
+
+def _contiguous(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=np.float64)
+
+
+# Of the low-pass that speeds are taken with, where noise of the sensor is no motion; and of the one
+# below which most arms are rigid.
+_SPEED_HZ = 20.0
+_RIGID_HZ = 5.0
+
+
+def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Array]:
+    """Return how far a simulator can be asked to follow each sample of logs (n, n_axes).
+
+    Where a motor stands or turns round, dry friction leaves its torque open: no two laws agree there.
+    """
+    step_s = logs[0].sample_time_s
+    highest = highest_cutoff_hz(step_s)
+    cutoff = min(_SPEED_HZ, highest)
+    speeds = [differentiate(log.position_rad, step_s, cutoff)[0] for log in logs]
+    slow = [motion(log, min(_RIGID_HZ, highest)) for log in logs]
+
+    def rigid(at: Motion) -> Array:
+        return predicted_torque(tracking.with_effects([]), AS_GIVEN, at)
+
+    friction = sure_friction_nm(slow, rigid)
+    weight = weighting.weight * passed(tracking, weighting.frequency_hz)
+    weighting = replace(weighting, weight=weight)
+    out = []
+    for speed in speeds:
+        left_open = open_errors(speed, friction, weighting, step_s)
+        factor = np.repeat(certainty(left_open, np.ones(1)), weighting.decimation, axis=0)
+        out.append(_contiguous(np.pad(factor, ((0, len(speed) - len(factor)), (0, 0)), "edge")))
+    return out
+
+
+# Beginning of a log with a run-up that does not count [s]. Weights mirror an error there: of a log that
+# begins at rest it is none, in motion it is noise in mid-course, and counts twice.
+_MIRRORED_S = 0.1
+
+
+def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
+    """Return what a simulator that is kept on logs is compared with."""
+    certain = certainties(tracking, logs, weighting)
+    stepped = encoder_steps(tracking, logs) > 0
+    forgets_s = _forgets_s(tracking) if stepped.any() else 0.0
+    out = []
+    for log, c in zip(logs, certain, strict=True):
+        if log.run_up is not None:
+            c[: round(_MIRRORED_S / log.sample_time_s)] = 0.0
+        c[np.ix_(_at_edges(log, forgets_s), stepped)] = 0.0
+        position, torque = (_contiguous(log.led(x)) for x in ("position_rad", "torque_nm"))
+        out.append((position, torque, c, log.start_rad, log.lead))
+    return out
+
+
+# Of a log, what its beginning may be at most; and its end that does not count where positions come in steps [s],
+# for the same reason as `_MIRRORED_S`: the error of a position there is no smaller than half a step.
+_MOST_FORGOTTEN = 0.25
+_END_S = 0.5
+
+
+def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
+    """Return which samples of a log are so near its beginning or its end that steps of an encoder do not tell."""
+    first_s = min(forgets_s, _MOST_FORGOTTEN * log.duration_s)
+    time_s = np.arange(log.n_samples) * log.sample_time_s
+    last_s = time_s[-1] - min(_END_S, _MOST_FORGOTTEN * log.duration_s)
+    return np.asarray((time_s < first_s) | (time_s > last_s))
+
+
+def _forgets_s(tracking: Robot) -> float:
+    """Return for how long [s] a loop remembers where it began.
+
+    A motor that is held between two steps of its encoder swings between them before a log begins: nobody
+    knows with what speed it does begin.
+    """
+    decay_1_s = slowest_decay_1_s(tracking, np.array(tracking.operating_point))
+    return float(-np.log(FORGOTTEN) / decay_1_s) if decay_1_s > 0 else np.inf
+
+
+# Seconds that a log is not cut below.
+_LEAST_S = 4.0
+
+
+class ClosedLoopFitter(ModelFitter):
+    """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
+
+    In a linear loop this is the torque by which a run driven by the references
+    would be off; in a nonlinear one the simulator also stays in phase with the
+    log, without which lost motion and stiction have no smooth error to fit. The controller is
+    that of ``robot``, which need not be the machine's.
+    ``records``: position [rad] and torque [Nm] of each log, and how far a simulator can be asked to
+    follow it, (n, n_axes), where its run begins, and how many samples lead to it.
+    """
+
+    driven_by: ClassVar[Literal["tracking", "reference"]] = "tracking"
+    compared: ClassVar[Literal["torque", "position"]] = "torque"
+
+    def __init__(
+        self,
+        robot: Robot,
+        records: list[Record],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, weighting, tolerances, block_s)
+        self.records = records
+
+    def _keep(self, logs: Sequence[int]) -> None:
+        self.records = [self.records[i] for i in logs]
+
+    def counted(self) -> Array:
+        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        return np.concatenate([row for log in self._counted_by_log() for row in log.T])
+
+    def counted_by_axis(self) -> Array:
+        """Return the sum of the same by axis (n_axes,)."""
+        return np.asarray(np.sum([log.sum(axis=0) for log in self._counted_by_log()], axis=0))
+
+    def _counted_by_log(self) -> list[Array]:
+        step = self.weighting.decimation
+        return [c[: len(c) // step * step : step] ** 2 for _, _, c, _, _ in self.records]
+
+    def along(self, records: list[Record]) -> ClosedLoopFitter:
+        """Return the same for other runs, as ``records`` are."""
+        other = copy(self)
+        other.records = records
+        return other
+
+    def beginnings(self) -> ModelFitter | None:
+        """Return the same for the first halves of the logs, if they are long enough."""
+        halves = [len(c) // 2 for _, _, c, _, _ in self.records]
+        if min(halves) < _LEAST_S / self.robot.sample_time_s:
+            return None
+        return self.along(
+            [
+                (p[: lead + n], t[: lead + n], c[:n], start, lead)
+                for n, (p, t, c, start, lead) in zip(halves, self.records, strict=True)
+            ]
+        )
+
+    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> Problem:
+        """Return the problem as the core takes it."""
+        specs = [core_spec(p, effects) for p in parameters]
+        return self.robot.core, core_effects(effects), specs, self.records, self.weighting.core()
+
+    def solve(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, _core.Column]],
+        near: _core.Courses | None = None,
+    ) -> _core.FitResult:
+        """Run the fit in the core."""
+        return _core.fit_simulation(
+            *self._problem(effects, parameters),
+            options,
+            input=self.driven_by,
+            output=self.compared,
+            warm=warm,
+            courses=near,
+            cancel=self.cancel,
+        )
+
+    def run(
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
+    ) -> _core.Courses:
+        """Run the model in the core."""
+        return _core.courses(
+            *self._problem(effects, parameters),
+            options,
+            input=self.driven_by,
+            output=self.compared,
+            cancel=self.cancel,
+        )
+
+    def linearize(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, _core.Column]],
+        near: _core.Courses | None = None,
+    ) -> _core.Linearization:
+        """Evaluate the model in the core."""
+        return _core.evaluate_simulation(
+            *self._problem(effects, parameters),
+            options,
+            input=self.driven_by,
+            output=self.compared,
+            warm=warm,
+            courses=near,
+            cancel=self.cancel,
+        )

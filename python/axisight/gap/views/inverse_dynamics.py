@@ -1,0 +1,368 @@
+"""Inverse-dynamics mode: torque predicted from the measured motion, no reference needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight import _core
+from axisight.effects import Effect, core_effects
+from axisight.effects.stated import VISCOUS_FRICTION, WARMING
+from axisight.errors import InputError
+from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.gap.controller.speed_loop import other_controllers_of_targets
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.drive_lags import is_lag
+from axisight.gap.signals.lowpass_cutoff import chosen_filtering, rigid_below_hz
+from axisight.gap.signals.motion import Motion, has_velocity
+from axisight.gap.signals.noise import Floor
+from axisight.gap.signals.standstill import (
+    alike,
+    certainty,
+    dry_friction_nm,
+    open_torque_nm,
+    standing,
+)
+from axisight.gap.simulator.deflection_torque import deflection_torque
+from axisight.gap.simulator.inverse_noise import InverseNoise
+from axisight.gap.simulator.rigid_torque import predicted_torque
+from axisight.gap.views.view import View
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+# Of the table of the low-pass, linear in between: it follows the gain to a few ten-thousandths.
+_FREQUENCIES = 200
+# Mean square distance of a uniform band from one of its ends is four times that from its middle.
+_FROM_ONE_END = 2.0
+# Natural step of effects, as a share of their typical size.
+_STEP = 1e-3
+
+
+class InverseView(View):
+    """Torque predicted from the measured motion."""
+
+    feels_steps: ClassVar[bool] = False
+    """What a loop makes of them moves the machine, and is in the torque as in the motion; the rest is smoothed."""
+
+    def __init__(
+        self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
+    ) -> None:
+        cutoff = settings.cutoff_hz
+        nyquist_hz = 0.5 / logs[0].sample_time_s
+        if cutoff is not None and not 0 < cutoff < nyquist_hz:
+            raise InputError(
+                f"cutoff_hz: expected between 0 and the Nyquist frequency {nyquist_hz:g} Hz, got {cutoff:g} Hz"
+            )
+        self.filtering = chosen_filtering(
+            logs,
+            lambda m: predicted_torque(robot, AS_GIVEN, m),
+            cutoff,
+            # All logs are treated alike, those held out too.
+            measured=has_velocity([*logs, *held_out]),
+            highest_hz=rigid_below_hz(robot),
+        )
+        self._sample_time_s = logs[0].sample_time_s
+        self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
+        floor = inverse_floor(logs, self.noise, settings)
+        motions = [self._as_rigid(robot, log) for log in logs]
+        self._dry_friction_nm = dry_friction_nm(motions, _without_effects(robot))
+        fitter = InverseDynamicsFitter(
+            robot,
+            motions,
+            self._certain(logs, motions, floor),
+            floor.weighting,
+            settings.tolerances_of(robot),
+            block_s(logs, self.filtering.cutoff_hz, settings),
+        )
+        super().__init__(
+            "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
+        )
+        self.unfelt = other_controllers_of_targets(robot, logs)
+
+    def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
+        """Return how far every sample of the estimation logs can be predicted, zero where it does not count."""
+        found = certainties(
+            motions,
+            self._dry_friction_nm,
+            floor.weighting,
+            lambda x: self.filtering.spread(x, self._sample_time_s),
+        )
+        # What counts in part has a part of what padding makes: the fit leaves it out.
+        whole = [np.floor(self.filtering.counted(log))[:, None] for log in logs]
+        return [certain * counts for certain, counts in zip(found, whole, strict=True)]
+
+    def _as_rigid(self, robot: Robot, log: Log) -> Motion:
+        """Return the motion of a log, and its torque as rigid gears would have it."""
+        position, velocity, acceleration, torque = at = self.filtering(log)
+        bent = deflection_torque(robot, at, log.sample_time_s)
+        return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
+
+    def candidates(
+        self, model: FittedModel, *, axes: Collection[int] | None = None
+    ) -> list[Hypothesis]:
+        """Return the candidates of `View`, each in its turn."""
+        return [f for f in super().candidates(model, axes=axes) if _in_its_turn(f.effect, model)]
+
+    def measured(self, log: Log) -> Array:
+        """Return the low-passed torque."""
+        return self._low_passed(log.torque_nm)
+
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the predicted torque of every log, low-passed as the measured one."""
+        return [self._low_passed(self._predicted(variant, log)) for log in logs]
+
+    def counted(self, log: Log) -> Array:
+        """Return what the error of every sample counts for (n, 1), of mean square one: of ends in motion nothing."""
+        counts = self.filtering.counted(log)[:, None]
+        return np.asarray(counts / np.sqrt(np.mean(counts**2)))
+
+    def _predicted(self, variant: Variant, log: Log) -> Array:
+        at = self.filtering(log)
+        bent = deflection_torque(self.robot, at, log.sample_time_s)
+        return predicted_torque(self.robot, variant, at) + bent
+
+    def taken_off(self, log: Log, off_nm: Array) -> Array:
+        """Return what the torque of a log is off the predicted one (n, n_axes) [Nm], as others are low-passed later."""
+        del off_nm
+        return log.torque_nm - self._predicted(AS_GIVEN, log)
+
+    def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
+        """Return how far the motions of others are off those of logs (n_axes,) [1].
+
+        The larger of two: rms of speeds, and of the torques predicted along both, over those of the logs.
+        """
+        speeds, theirs = ([self.filtering(x)[1] for x in each] for each in (logs, others))
+        torques = [self.torques(AS_GIVEN, each) for each in (logs, others)]
+        return np.maximum(_relative(speeds, theirs), _relative(*torques))
+
+    def _low_passed(self, torque_nm: Array) -> Array:
+        return self.filtering.compared(torque_nm, self._sample_time_s)
+
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
+        """Return the error that noise of position and torque causes, for every log."""
+        del variant
+        return [
+            self.counted(log) * self.noise.error(log, run)
+            for run, log in enumerate(logs, start=first_run)
+        ]
+
+    def left_open(self, logs: Sequence[Log]) -> list[Array]:
+        """Return what dry friction leaves open where motors stand or turn round.
+
+        A simulator may stand at one end of the band, and the machine anywhere in it.
+        """
+        found = open_torque_nm([self.filtering(log) for log in logs], self._dry_friction_nm)
+        return [_FROM_ONE_END * x for x in found]
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say how the logs were filtered, and what the floor is made of."""
+        chosen = "chosen as what predicts data left out best"
+        highest = rigid_below_hz(self.robot)
+        if self.settings.cutoff_hz:
+            chosen = "as given"
+        elif np.isfinite(highest):
+            chosen += f", below a third of the first elastic mode ({highest:.3g} Hz)"
+        out = [
+            f"Torques, predicted and measured, and their noise are low-passed alike at "
+            f"{self.filtering.cutoff_hz:.3g} Hz, {chosen}; the motion an octave above."
+        ]
+        cut = [log.name for log in self.logs if self.filtering.counted(log).min() < 1]
+        if cut:
+            out.append(
+                f"{', '.join(cut)}: where a log begins or ends in motion, no low-pass knows the torque before "
+                f"or after it; 1.5 of its periods there count for nothing."
+            )
+        axes = [str(axis) for axis, used in enumerate(self.filtering.measured, 1) if used]
+        if axes:
+            out.append(
+                f"Velocity and acceleration of axis {', '.join(axes)} come from the measured velocity, "
+                f"which predicts data left out better than the position does."
+            )
+        if self.noise.repeated:
+            out.append("The floor is what repeats of one motion differ by.")
+        return tuple(out)
+
+
+def _in_its_turn(effect: Effect, model: FittedModel) -> bool:
+    """Whether an effect is looked for beside the causes of a model by inverse dynamics.
+
+    What no formula has of a real machine passes for something late beside a cause, and, where friction
+    is missing at all, for one that changes with time: that is asked where plain friction is a cause.
+    """
+    beside = {f.effect.name for f in model.free if f.effect.axis == effect.axis}
+    if effect.name == WARMING:
+        return VISCOUS_FRICTION in beside
+    return not (is_lag(effect) and beside)
+
+
+def _relative(these: Sequence[Array], others: Sequence[Array]) -> Array:
+    """Return the rms (n_axes,) of what others are off signals over theirs about its mean [1]."""
+    signal, other = np.concatenate(these), np.concatenate(others)
+    size = np.maximum(signal.std(axis=0), 1e-300)
+    return np.asarray(np.sqrt(np.mean((other - signal) ** 2, axis=0)) / size)
+
+
+# Stretches of time that a gain is compared over need that many blocks, all logs together.
+_BLOCKS = 20.0
+# A block is longer than what the low-pass and the friction around a reversal smear.
+_PERIODS = 10.0
+
+
+def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
+    """Return how long blocks of data are [s]: those of the settings, shorter in short logs."""
+    total = sum(log.duration_s for log in logs)
+    return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
+
+
+def certainties(
+    motions: Sequence[Motion],
+    friction_nm: Array,
+    weighting: Weighting,
+    spread: Callable[[Array], Array],
+) -> list[Array]:
+    """Return how far low-passed torques can be predicted in every sample: dry friction leaves some open.
+
+    A stretch at standstill counts as one residual. ``spread``: what the low-pass makes of what is open.
+    """
+    # Of white noise, as the weight at rest counts it.
+    error_nm = 1 / (weighting.weight[:, 0] * np.sqrt(weighting.decimation))
+    out = []
+    for left_open, still in zip(
+        open_torque_nm(motions, friction_nm), standing(motions), strict=True
+    ):
+        residuals = np.maximum(alike(still) / weighting.decimation, 1.0)
+        out.append(certainty(np.sqrt(residuals) * spread(left_open), error_nm))
+    return out
+
+
+def _without_effects(robot: Robot) -> Callable[[Motion], Array]:
+    """Return what a robot without its effects predicts."""
+    bare = robot.with_effects([])
+    return lambda at: predicted_torque(bare, AS_GIVEN, at)
+
+
+class InverseDynamicsFitter(ModelFitter):
+    """Error of the torque predicted from the measured motion."""
+
+    adds_up = True
+
+    def __init__(
+        self,
+        robot: Robot,
+        motions: Sequence[Motion],
+        certainty: Sequence[Array],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, weighting, tolerances, block_s)
+        self.records = [(*m, c) for m, c in zip(motions, certainty, strict=True)]
+
+    def _keep(self, logs: Sequence[int]) -> None:
+        self.records = [self.records[i] for i in logs]
+
+    def tempered(self, factor: Array) -> ModelFitter:
+        """Return the same with the errors of every axis times a factor (n_axes,)."""
+        other = copy(self)
+        other.records = [(q, v, a, u, c * factor) for q, v, a, u, c in self.records]
+        return other
+
+    def counted(self) -> Array:
+        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        step = self.weighting.decimation
+        kept = (factor[: len(factor) // step * step : step] for *_, factor in self.records)
+        return np.concatenate([row for log in kept for row in log.T**2])
+
+    def tolerated(self, effect: Effect) -> float:
+        """Return the same; of what is late a sample, for which a drive holds what it commands."""
+        return self.robot.sample_time_s if is_lag(effect) else super().tolerated(effect)
+
+    def takes_part(self, name: str) -> bool:
+        """Springs and their damping do not show in a rigid prediction."""
+        quantity = name.rsplit(".", 1)[1]
+        return quantity not in ("stiffness", "damping")
+
+    def _specs(self, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> list[Spec]:
+        """Return the parameters for the core, effects in small steps.
+
+        What moves a block beyond all reason within its natural step has no derivative in the core: a
+        simulation is chaotic there. A predicted torque never is, and motors may be small.
+        """
+        steps = (p if p.effect is None else replace(p, scale=_STEP * p.scale) for p in parameters)
+        return [core_spec(p, effects) for p in steps]
+
+    def solve(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, _core.Column]],
+        _near: _core.Courses | None = None,
+    ) -> _core.FitResult:
+        """Run the fit in the core."""
+        return _core.fit_inverse_dynamics(
+            self.robot.core,
+            core_effects(effects),
+            self._specs(parameters, effects),
+            self.records,
+            self.weighting.core(),
+            options,
+            warm=warm,
+            cancel=self.cancel,
+        )
+
+    def linearize(
+        self,
+        effects: Sequence[Effect],
+        parameters: Sequence[Parameter],
+        options: FitOptions,
+        warm: list[tuple[int, _core.Column]],
+        _near: _core.Courses | None = None,
+    ) -> _core.Linearization:
+        """Evaluate the model in the core."""
+        return _core.evaluate_inverse_dynamics(
+            self.robot.core,
+            core_effects(effects),
+            self._specs(parameters, effects),
+            self.records,
+            self.weighting.core(),
+            options,
+            warm=warm,
+            cancel=self.cancel,
+        )
+
+
+def inverse_floor(logs: Sequence[Log], noise: InverseNoise, settings: Settings) -> Floor:
+    """Return the floor of a predicted torque: its noise, and the errors of formulas."""
+    rate = 1.0 / logs[0].sample_time_s
+    variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
+    # What is drawn scatters by a few percent from log to log, and what is estimated from it too.
+    noise_variance = np.mean([noise.error(x, i).var(axis=0) for i, x in enumerate(logs)], axis=0)
+    total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
+    filtering = noise.filtering
+    decimation = max(1, int(rate / (2 * filtering.cutoff_hz)))
+    frequency_hz = np.linspace(0.0, rate / (2 * decimation), _FREQUENCIES)
+    weight = filtering.gain(frequency_hz) / np.sqrt(decimation * total)[:, None]
+    weighting = Weighting(frequency_hz, weight, decimation)
+    flat = np.ones((len(variance), 1))
+    return Floor(
+        noise.position_std_rad,
+        np.zeros(1),
+        noise_variance[:, None] * flat,
+        weighting,
+        noise_variance / total,
+    )

@@ -1,0 +1,292 @@
+"""Positions of simulator and machine under the same targets, where no torque was logged.
+
+Errors of position are told as the torque that the controller's gains make of them: one number for the
+whole band, comparable with torques of causes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.errors import InputError
+from axisight.fitting import Weighting
+from axisight.gap.controller.feedback import (
+    controller_response,
+    inertia_of_motors,
+    loop_responses,
+    periodic_response,
+    told_gain,
+)
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant
+from axisight.gap.prepare.position_targets import Commanded
+from axisight.gap.search.state import SearchState
+from axisight.gap.signals.noise import Floor, position_noise_std, torque_density
+from axisight.gap.simulator.closed_loop_runs import simulated_positions
+from axisight.gap.simulator.own_parameters import uncertain_gains
+from axisight.gap.views.closed_loop import ClosedLoopFitter, Record
+from axisight.gap.views.tracking_weights import shortest
+from axisight.gap.views.view import View
+from axisight.logs import Log, lowpass
+from axisight.robot import Robot
+from axisight.simulation import white_noise
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Of the rate of the logs: what is compared lies below, where a spline between samples is a motion, and
+# noise, which gains of speed make the more of the faster it is, does not drown it.
+_BAND = 0.2
+# How often what a motion does between samples is taken from the gains that were found.
+_ROUNDS = 2
+# Samples of a segment of a density, at the rate of the logs.
+_SEGMENT = 256
+# Of the slowest frequency that a log holds, half a wave of it: what is slower is constant.
+_WHOLE_LOG = 0.5
+
+
+class TargetsView(View):
+    """Simulator and machine driven by the same targets, positions compared."""
+
+    by_targets = True
+    compared = "positions"
+    fitter: TargetsFitter
+
+    def __init__(self, commanded: Commanded, logs: list[Log], settings: Settings) -> None:
+        self._commanded = commanded
+        robot = commanded.robot
+        std = np.maximum(position_noise_std(commanded.as_logged()), robot.position_noise_std)
+        self._std_rad = std
+        floor = self._floor(robot, logs, settings)
+        self._like = AS_GIVEN
+        records = _records(logs, self._between_samples(logs, settings))
+        fitter = TargetsFitter(
+            robot, records, floor.weighting, _tolerances(robot, settings), settings.block_s
+        )
+        for _ in range(_ROUNDS if fitter.gains else 0):
+            # Gains say most of what a motion does between samples.
+            self._like = Variant(fitter.fit([]).robot_values)
+            fitter.records = _records(logs, self._between_samples(logs, settings))
+        super().__init__("closed_loop", robot, logs, settings, fitter, floor)
+
+    def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:
+        """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator.
+
+        As given, but for uncertain gains, which are as they are found.
+
+        Targets are steps, and a joint answers each of them within a sample: a spline through positions
+        that were logged just before the next step knows nothing of it, and lags the motion.
+        """
+        of, step = self._commanded, self._commanded.step
+        positions = simulated_positions(of.robot, self._like, logs, threads=settings.threads)
+        return [x - of.fine(x[::step]) for x in positions]
+
+    def removed_there(self, found: SearchState, logs: Sequence[Log]) -> float | None:
+        """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove."""
+        there = self.fitter.along(_records(logs, self._between_samples(logs, self.settings)))
+        try:
+            before = there.loss([], found.baseline)
+            left = there.loss(found.model.free, found.model)
+        except InputError:
+            return None
+        above = before - float(there.counted_by_axis() @ self.floor.expected)
+        return (before - left) / above if above > 0 else 0.0
+
+    def _floor(self, robot: Robot, logs: list[Log], settings: Settings) -> Floor:
+        """Return the floor: noise of the sensors as the gains take it, and errors of formulas.
+
+        Densities at the rate of the logs: below half of it those at the controller's are ``step`` times
+        as large. What is constant along a log is left out: where it begins is known no better.
+        """
+        step = self._commanded.step
+        rate = 1.0 / (robot.sample_time_s * step)
+        slow = [x.torque_nm[::step] for x in logs]
+        like = shortest(logs)
+        segment = max(8, min(_SEGMENT, like.n_samples // step // 2))
+        found = [torque_density(x, rate, segment) for x in slow]
+        f, torque = found[0][0], np.asarray(np.mean([density for _, density in found], axis=0))
+        torque[:, 0] = torque[:, 1]
+        gain = self._gains(f)
+        noise = gain**2 * (self._std_rad**2)[:, None]
+        total = noise + settings.model_error**2 * torque
+        weight = 1.0 / np.sqrt(np.maximum(total, 1e-12 * torque.max()))
+        band = min(settings.bandwidth_hz, _BAND * rate)
+        decimation = max(1, int(rate * step / (2 * band)))
+        passed = f <= rate * step / (2 * decimation)
+        expected = np.mean((noise * weight**2)[:, passed], axis=1)
+        table = gain * weight / np.sqrt(step)
+        slowest = _WHOLE_LOG / max(log.duration_s for log in logs)
+        weighting = Weighting(
+            np.array([0.0, slowest, *f[1:]]),
+            np.column_stack([np.zeros(len(table)), table[:, 0], table[:, 1:]]),
+            decimation,
+        )
+        return Floor(self._std_rad, f, noise, weighting, expected)
+
+    def _gains(self, frequency_hz: Array) -> Array:
+        """Return how the controller answers an error of position, (n_axes, n_freq) [Nm/rad]."""
+        f = np.maximum(frequency_hz, frequency_hz[1])
+        return told_gain(self._commanded.robot, f)
+
+    def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
+        """Return the answer of the loop's position to an effect (n_freq,)."""
+        f = np.maximum(frequency_hz, frequency_hz[1])
+        found = periodic_response(self.robot, effect, axis, loop_responses(self.robot, f), f)
+        return np.asarray(found / controller_response(self.robot, f)[:, axis, axis])
+
+    def measured(self, log: Log) -> Array:
+        """Return what the controller commands along the measured positions."""
+        return log.torque_nm
+
+    @property
+    def step(self) -> int:
+        """Samples of the controller per sample of the logs."""
+        return self._commanded.step
+
+    @property
+    def logged_s(self) -> float:
+        """Time between samples of the logs [s]."""
+        return self.robot.sample_time_s * self.step
+
+    def positions(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return the motor positions of a simulator on each log (n, n_axes) [rad], at the controller's rate."""
+        return simulated_positions(self.robot, variant, logs, threads=self.settings.threads)
+
+    def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
+        """Return what it commands along the simulated positions."""
+        return [
+            log.torque_nm + self._as_torque(self.off_by(position, log))
+            for position, log in zip(self.positions(variant, logs), logs, strict=True)
+        ]
+
+    def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
+        """Return the same of one log, and its simulated position."""
+        (position,) = simulated_positions(self.robot, variant, [log])
+        return log.torque_nm + self._as_torque(self.off_by(position, log)), position
+
+    def off_by(self, position_rad: Array, log: Log) -> Array:
+        """Return what is compared of an error of position, at the samples of a log (n, n_axes) [rad].
+
+        Without its mean: a log's first position is as noisy as the others, and a run begins there.
+        """
+        logged = (position_rad - log.position_rad)[:: self.step]
+        return self.passed(logged - logged.mean(axis=0))
+
+    def passed(self, logged: Array) -> Array:
+        """Return of a signal at the rate of the logs (n, n_axes) what is compared of it."""
+        return lowpass(np.ascontiguousarray(logged), self.logged_s, _BAND / self.logged_s)
+
+    def _as_torque(self, passed_rad: Array) -> Array:
+        """Return an error at the rate of the logs (n, n_axes) [rad] as torque, at the controller's."""
+        return self._commanded.told_as(self._commanded.fine(passed_rad))
+
+    def position_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
+        """Return what is compared of the noise of the sensors, at the samples of every log [rad]."""
+        noise = [
+            white_noise(self.settings.seed, run, len(log.time_s[:: self.step]), self.robot.n_axes)
+            for run, log in enumerate(logs, start=first_run)
+        ]
+        return [self.passed(x * self._std_rad) for x in noise]
+
+    def noises(
+        self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
+    ) -> list[Array]:
+        """Return what noise of the sensors is as torque, for every log."""
+        del variant
+        return [self._as_torque(x) for x in self.position_noises(logs, first_run)]
+
+    def remarks(self) -> tuple[str, ...]:
+        """Say what was compared."""
+        said = what_is_compared(1.0 / self.logged_s)
+        short = ", ".join(map(str, self._commanded.short_of_inertia))
+        if not short:
+            return (said,)
+        return (
+            said,
+            f"The simulator's steps take more inertia than the motor has on axis {short} (speed gains that are "
+            f"explicit): it is taken as none, and the simulator is reproduced less well there.",
+        )
+
+
+def what_is_compared(rate_hz: float) -> str:
+    """Return a sentence that says what is compared of logs of a rate [Hz]."""
+    return (
+        f"No torque was logged: positions are compared under the same targets, up to {_BAND * rate_hz:.3g} Hz, "
+        "and their errors told as the torque that the stated gains make of them."
+    )
+
+
+# Of a sample of the controller: how well it is known when a target takes effect. Simulators and drives
+# differ by half of their own steps, which are shorter.
+_WHEN = 0.125
+
+
+def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
+    """Return the tolerances of the simulator's parameters where targets drive it.
+
+    A target that takes effect ``t`` later acts as friction ``kp t`` on the motor: viscous friction is known no
+    better than that.
+    """
+    out = dict(settings.tolerances_of(robot))
+    values, late_s = robot.parameters(), _WHEN * robot.sample_time_s
+    for axis, gain in zip(robot.axis_numbers(), _stiffness(robot), strict=True):
+        name = robot.axis_parameter(axis, "viscous_friction")
+        if name is not None and values[name] > 0:
+            stated = out.get(name, out["viscous_friction"])
+            out[name] = float(np.hypot(stated, gain * late_s / values[name]))
+    return out
+
+
+def _stiffness(robot: Robot) -> Array:
+    """Return the torque of each motor for its own error of angle (n_axes,) [Nm/rad], at the operating point."""
+    gains = robot.controller_gains
+    gain = np.asarray(gains["kp"])
+    if "kv" in gains:
+        return np.asarray(gain * gains["kv"])
+    return gain * np.diag(inertia_of_motors(robot)) if robot.computed_torque else gain
+
+
+def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
+    """Return references, positions, how far each sample counts, and where each log begins.
+
+    ``between``: what the motion does between samples that were logged.
+    """
+    out = []
+    for log, off in zip(logs, between, strict=True):
+        before = np.zeros((log.lead, log.n_axes))
+        reference, position = (
+            np.ascontiguousarray(x, np.float64)
+            for x in (
+                log.led("velocity_ref_rad_s"),
+                log.led("position_rad") + np.concatenate([before, off]),
+            )
+        )
+        out.append((reference, position, np.ones_like(off), log.start_rad, log.lead))
+    return out
+
+
+class TargetsFitter(ClosedLoopFitter):
+    """Position of a simulator that is driven by targets, less the measured one."""
+
+    driven_by = "reference"
+    compared = "position"
+
+    def __init__(
+        self,
+        robot: Robot,
+        records: list[Record],
+        weighting: Weighting,
+        tolerances: Mapping[str, float],
+        block_s: float,
+    ) -> None:
+        super().__init__(robot, records, weighting, tolerances, block_s)
+        gains = uncertain_gains(robot, tolerances)
+        self.own += gains
+        self.gains = frozenset(p.name for p in gains)
+
+    def bends(self, name: str) -> bool:
+        """Whether a parameter changes what others do, by much more than masses and stiffness."""
+        return name in self.gains

@@ -1,0 +1,97 @@
+"""An effect is whole in one place: its definition; its start values stand in one table."""
+
+import re
+from dataclasses import fields
+from itertools import zip_longest
+from pathlib import Path
+
+import pytest
+
+from axisight import _core
+from axisight.effects import EffectInfo, effect_table
+from axisight.gap.facts.settings import DEFAULT_TOLERANCES
+from axisight.gap.hypotheses.start_values import STARTS
+from axisight.gap.verdict.separating_advice import separating_experiment
+
+TABLE = effect_table()
+# What may know an effect by name: its definition, and the tables made for it.
+KNOWING = (
+    "crates/axisight-core/src/effects/",
+    "python/axisight/gap/starts.py",
+    "python/axisight/effects/stated.py",
+    # Closed forms of the laws of gears, which tests hold against simulations.
+    "python/axisight/effects/gear_curves.py",
+    # What a benchmark withholds has the names that verdicts give it.
+    "python/axisight/blind/withheld.py",
+    "python/axisight/blind/withheld_formulas.py",
+)
+
+
+def test_the_core_says_all_that_the_class_holds() -> None:
+    row = _core.effect_table()[0]
+    assert list(row) == [f.name for f in fields(EffectInfo)]
+
+
+def test_every_effect_has_start_values_and_no_entry_is_stray() -> None:
+    pairs = enumerate(zip_longest(STARTS, TABLE, fillvalue="nothing"), start=1)
+    wrong = [f"entry {i}: STARTS has {a}, mod.rs has {b}" for i, (a, b) in pairs if a != b]
+    assert not wrong, wrong[0]
+
+
+@pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)
+def test_an_effect_states_all_of_itself(info: EffectInfo) -> None:
+    assert info.summary and info.equation and len(info.source) > 20
+    assert info.parameters
+    assert any(p.role == "amplitude" for p in info.parameters)
+    # Effects that it names are effects, of the same scope, and other ones.
+    for name in (*info.contains, *info.parts, *info.usual, *info.twins):
+        # What is usual instead of one link may be of the whole arm.
+        assert TABLE[name].scope == info.scope or (
+            name in info.usual and TABLE[name].scope == "arm"
+        )
+        assert name != info.name
+    assert all(info.name in TABLE[name].contained_in for name in info.contains)
+    assert all(info.name not in TABLE[name].contains for name in info.contains)
+    assert len(info.parts) in (0, 2)
+    # A mode beyond what a motion excites is an inertia of its link.
+    families = {info.family, "load"} if info.family == "arm" else {info.family}
+    assert all(TABLE[name].family in families for name in info.usual)
+    # A parameter that it stands for has a tolerance beyond which it is an effect.
+    if info.stands_for is not None:
+        assert info.stands_for[0] in DEFAULT_TOLERANCES
+        assert len(info.parameters) == 1
+    # Where a rigid gear stands in its place, torque cannot hold it.
+    if info.acts in ("transmission", "sensor"):
+        assert not info.inverse_dynamics
+    # Somebody who cannot tell it from another is told what would.
+    assert separating_experiment([f"{info.name}@1"])
+
+
+def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
+    names = "|".join(TABLE)
+    # Quoted names; quantities of the robot that share a name with an effect are none.
+    shared = {"viscous_friction", "motor_inertia"}
+    # Terms of a torque model and quantities that fits find, which are named as in the field.
+    terms = {
+        "rigid_body/friction.py": {"coulomb_friction", "torque_offset"},
+        "rigid_body/estimate.py": {"coulomb_friction"},
+        "rigid_body/checks.py": {"coulomb_friction"},
+        "graybox/robot_values.py": {"torque_offset", "backlash"},
+        # A key of controllers that are told positions.
+        "robot_file/reader.rs": {"gravity_compensation"},
+        "gap/speed_loop.py": {"gravity_compensation"},
+        # A load that is mounted, as drive data state it.
+        "cli/model_options.py": {"payload"},
+    }
+    strays = []
+    for folder in ("crates", "python"):
+        for path in sorted((repository / folder).rglob("*")):
+            name = path.relative_to(repository).as_posix()
+            if path.suffix not in (".rs", ".py") or name.startswith(KNOWING):
+                continue
+            text = path.read_text("utf-8")
+            text = text.split("#[cfg(test)]")[0]
+            allowed = shared.union(*(v for k, v in terms.items() if name.endswith(k)))
+            found = set(re.findall(f'"({names})"', text)) - allowed
+            strays += [f"{name}: {', '.join(sorted(found))}"] if found else []
+    assert not strays

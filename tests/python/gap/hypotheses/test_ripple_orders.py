@@ -1,0 +1,151 @@
+"""Orders of the motor angle in residuals."""
+
+import numpy as np
+import pytest
+
+from axisight import Effect, load_robot, simulate
+from axisight.gap.controller.feedback import controller_response, loop_responses, periodic_response
+from axisight.gap.hypotheses.ripple_orders import Turning, strongest_orders, turning
+
+T = 4e-3
+N = 2500
+
+
+def turned(residual, scale: float = 3.0) -> Turning:
+    time = np.arange(N) * T
+    angle = scale * time + 0.5 * np.sin(time)
+    return Turning(residual, angle, np.gradient(angle, T), T)
+
+
+def flat(log: Turning):
+    return np.ones(len(log.frequency_hz), dtype=complex)
+
+
+def test_orders_are_found_in_a_noisy_ripple_strongest_first():
+    rng = np.random.default_rng(7)
+    angle = turned(np.zeros(N)).angle_rad
+    ripple = 0.2 * np.cos(7 * angle + 1) + 0.1 * np.sin(18 * angle)
+    log = turned(ripple + 0.2 * rng.normal(size=N))
+    assert strongest_orders([log], [flat(log)], count=4) == [7, 18]
+    assert strongest_orders([log], [flat(log)], count=1) == [7]
+
+
+def test_noise_alone_has_no_order():
+    rng = np.random.default_rng(8)
+    log = turned(rng.normal(size=N))
+    assert strongest_orders([log], [flat(log)], count=3) == []
+
+
+def test_logs_share_amplitude_and_phase():
+    """What cancels over the logs is no ripple of the machine, however strong in each."""
+    angle = turned(np.zeros(N)).angle_rad
+    here, there = turned(np.cos(5 * angle)), turned(-np.cos(5 * angle))
+    assert strongest_orders([here, there], [flat(here)] * 2, count=1) == []
+    assert strongest_orders([here, here], [flat(here)] * 2, count=1) == [5]
+
+
+def test_orders_are_seen_through_the_response():
+    """A second late, at changing speed, a wave of the angle is none of the residual."""
+    empty = turned(np.zeros(N))
+    late = np.exp(-2j * np.pi * empty.frequency_hz * 1.0)
+    log = turned(np.fft.irfft(late * (empty.spectra[23] + 0.5 * empty.spectra[4]), N))
+    assert strongest_orders([log], [late], count=2) == [24, 5]
+    assert strongest_orders([log], [flat(log)], count=2) != [24, 5]
+
+
+@pytest.mark.parametrize("n", [N, N - 1])
+def test_products_of_waves_are_those_of_their_series(n: int):
+    """Normal equations from spectra against the series themselves, which the response has passed."""
+    rng = np.random.default_rng(11)
+    whole = turned(np.zeros(N))
+    log = Turning(rng.normal(size=n), whole.angle_rad[:n], whole.speed_rad_s[:n], T)
+    response = 1.0 / (1.0 + 0.3j * log.frequency_hz)
+    if n % 2 == 0:
+        response[-1] = 0.0
+    spectra = log.spectra * response
+    spectra[:, 0] = 0.0
+    series = np.fft.irfft(spectra, n)
+    normal, along = series @ series.T, series @ log.residual
+    assert log.normal(response) == pytest.approx(normal, abs=1e-12 * normal.max())
+    assert log.along(response, log.residual) == pytest.approx(
+        along, abs=1e-12 * np.abs(along).max()
+    )
+
+
+def test_what_is_known_of_waves_is_kept_for_another_residual():
+    """It is taken once for all models of a search."""
+    log = turned(np.zeros(N))
+    known = log.normal(flat(log))
+    assert log.leaving(np.ones(N)).normal(flat(log)) is known
+
+
+def test_a_decimated_residual_stands_in_the_middle_of_its_samples():
+    """Against the full log mirrored at its ends, order 30 keeps its phase only so."""
+    full, factor = 5e-4, 8
+    time = np.arange(N * factor) * full
+    angle = 4 * time
+    speed = np.full_like(angle, 4.0)
+    centre = angle.reshape(-1, factor).mean(axis=1)
+    log = turning(np.cos(30 * centre), angle, speed, full, factor)
+    assert log.later_s == pytest.approx(3.5 * full)
+    wave = np.fft.irfft(log.spectra[29], N)
+    inside = slice(200, -200)  # where it does not fade
+    np.testing.assert_allclose(wave[inside], log.residual[inside], atol=0.02)
+
+
+@pytest.mark.parametrize("name", ["two_mass_axis", "irb6600_like"])
+def test_the_controller_is_that_of_the_simulation(name):
+    """A sine of the sensor on a motor at rest: what the controller answers is its response."""
+    robot = load_robot(name).with_effects([])
+    n, size = 8192, 1e-7
+    line = 64
+    f = line / (n * robot.sample_time_s)
+    wave = np.zeros((n, robot.n_axes))
+    wave[:, 0] = size * np.sin(2 * np.pi * line * np.arange(n) / n)
+    out = simulate(robot, np.zeros((n, robot.n_axes)), noise=wave, method="rk4")
+    command = out.torque_cmd_nm.values[:, 0]
+    seen = out.position_rad.values[:, 0]
+    half = slice(n // 2, n)
+    u, y = (np.fft.fft(x[half])[line // 2] for x in (command, seen))
+    (response,) = controller_response(robot, np.array([f]))[:, 0, 0]
+    assert -u / y == pytest.approx(response, rel=2e-3)
+
+
+EVEN = 2 * np.pi * 5.0
+"""Speed of a motor that turns five times a second."""
+AT_ONE_SPEED = {
+    "torque_ripple": ("cosine_1_nm", "order_1", 1e-3),
+    "resolver_ripple": ("cosine_1_rad", "order_1", 1e-6),
+    "transmission_error": ("cosine_rad", "order", 1e-7),
+}
+
+
+@pytest.mark.parametrize("order", [1, 4])
+@pytest.mark.parametrize("effect", AT_ONE_SPEED)
+@pytest.mark.parametrize("name", ["two_mass_axis", "irb6600_like"])
+def test_what_repeats_with_the_angle_shows_as_its_response_says(name: str, effect: str, order: int):
+    """At one speed it is a sine: the command with it less that without, line by line, in a full simulation.
+
+    Its size is small, so that the second order, which is left out, is below a thousandth.
+    """
+    robot = load_robot(name).with_effects([])
+    n = round(8.0 / robot.sample_time_s)
+    reference = np.zeros((n, robot.n_axes))
+    time = np.arange(n) * robot.sample_time_s
+    reference[:, 0] = EVEN * np.minimum(time, 1.0)
+    wave, number, size = AT_ONE_SPEED[effect]
+    ripple = Effect(effect, 1, {number: float(order), wave: size})
+    runs = [simulate(robot, reference, effects=e, method="rk4") for e in ([], [ripple])]
+    # Two whole seconds, once all has settled.
+    half = slice(3 * n // 4, n)
+    less, more = (run.torque_cmd_nm.values[half, 0] for run in runs)
+    angle = runs[0].motor_position_rad.values[half, 0]
+    line = round(2.0 * order * EVEN / (2 * np.pi))
+    seen = np.fft.fft(more - less)[line] / np.fft.fft(size * np.cos(order * angle))[line]
+    frequency_hz = np.array([0.5 * line])
+    loops = loop_responses(robot, frequency_hz)
+    (response,) = periodic_response(robot, effect, 0, loops, frequency_hz)
+    # A torque on the motor is taken off by the controller; held commands come half a sample later.
+    assert abs(seen) == pytest.approx(abs(response), rel=0.02)
+    late = 2 * np.pi * frequency_hz[0] * robot.sample_time_s
+    assert abs(np.angle(-seen / response)) < 2 * late + 0.03

@@ -1,0 +1,283 @@
+"""The search: what waits for the next round, what is withdrawn in the end."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Settings
+from axisight.errors import InputError
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.screening import search_round
+from axisight.gap.screening.screening import Start
+from axisight.gap.screening.search_round import SearchRound
+from axisight.gap.search import revision, search
+from axisight.gap.search import state as states
+from gap_data import linear_evidence
+
+
+def free(label: str) -> Hypothesis:
+    name, _, axis = label.partition("@")
+    return Hypothesis(Effect(name, int(axis) if axis else None), ())
+
+
+class Round(SearchRound):
+    """A round on axes with one block each, whose fits have known losses by label."""
+
+    def __init__(self, losses: dict[str, tuple[float, ...]]) -> None:
+        n = len(next(iter(losses.values()), (0.0, 0.0)))
+        one = np.ones(n, dtype=np.int64)
+        self.layout = Layout(np.arange(n), one, one, one)
+        self.current, self.floor = np.array([10.0, *[2.0] * (n - 1)]), np.ones(n)
+        self.least, self.settings = np.zeros(n), Settings()
+        self.losses, self.waiting, self.asked = losses, [], []
+        self.progress = lambda *_: None
+
+    def _fitted(self, pool, starts):
+        labels = [start.option.effect.label for start in starts]
+        self.asked += labels
+        return [
+            SimpleNamespace(
+                label=label, hypothesis=start.option, held_out=np.array(self.losses[label])
+            )
+            for label, start in zip(labels, starts, strict=True)
+        ]
+
+    def fit(self, promises: dict[str, float], falls: tuple[float, float] = (0.5, 0.5)) -> list[str]:
+        """Fit candidates with these promises, one of the arm by axis; return the labels of those fitted."""
+        starts = [
+            Start(free(label), {}, gain, None if "@" in label else np.array(falls))
+            for label, gain in promises.items()
+        ]
+        with ThreadPoolExecutor(1) as pool:
+            return [t.label for t in self._fitted_by_place(pool, starts, "fitting")]
+
+
+PROMISES = {"torque_offset@2": 0.8, "backlash@1": 8.0, "payload": 1.0}
+
+
+def test_what_one_elsewhere_explains_waits():
+    # Play on axis 1 takes three tenths of what is left on axis 2: more than a fifth of any gain there.
+    losses = {"backlash@1": (2.0, 1.7), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)}
+    round_ = Round(losses)
+    # The load comes near the offset, and nowhere near the play: it is no rival of the play's.
+    assert round_.fit(PROMISES) == ["backlash@1"]
+    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@2", "payload"]
+    # One that does is tried beside it.
+    assert Round(losses).fit(PROMISES, (3.0, 0.1)) == ["backlash@1", "payload"]
+
+
+def test_what_promises_as_much_as_any_does_not_wait():
+    # An offset on axis 3 hangs on axis 2 as well: either may be the other's shadow.
+    round_ = Round({"torque_offset@1": (1.0, 1.4), "torque_offset@2": (1.0, 1.0)})
+    promises = {"torque_offset@1": 8.0, "torque_offset@2": 7.9, "backlash@2": 5.0}
+    assert round_.fit(promises) == ["torque_offset@1", "torque_offset@2"]
+    assert [s.option.effect.label for s in round_.waiting] == ["backlash@2"]
+
+
+def test_what_promises_as_much_as_what_explains_it_does_not_wait():
+    # A constant on axis 3 hangs on axis 2, too; that play promises far more on axis 1 is nothing to it.
+    losses = {
+        "backlash@1": (2.0, 2.0, 2.0),
+        "torque_offset@2": (10.0, 1.1, 1.1),
+        "torque_offset@3": (10.0, 1.0, 1.0),
+    }
+    promises = {"backlash@1": 8.0, "torque_offset@2": 0.81, "torque_offset@3": 0.8}
+    assert set(Round(losses).fit(promises)) == set(losses)
+    # What promises less waits.
+    round_ = Round(losses)
+    round_.fit({**promises, "torque_offset@3": 0.5})
+    assert [s.option.effect.label for s in round_.waiting] == ["torque_offset@3"]
+
+
+def test_what_nothing_elsewhere_explains_is_fitted():
+    round_ = Round({"backlash@1": (2.0, 1.9), "payload": (10.0, 2.0), "torque_offset@2": (10, 1)})
+    assert set(round_.fit(PROMISES)) == set(PROMISES)
+    assert round_.waiting == []
+    # The most promising axis comes first.
+    assert round_.asked[0] == "backlash@1"
+
+
+def test_effects_of_the_arm_alone_are_tried():
+    round_ = Round({"payload": (10.0, 2.0)})
+    assert round_.fit({"payload": 1.0}) == ["payload"]
+
+
+@pytest.mark.parametrize(
+    ("probability", "left_in_the_end", "kept"),
+    [
+        # Something unknown is likelier, and most of what it was to explain is still there.
+        (0.04, 0.19, ["backlash@2"]),
+        # Others have explained the rest since.
+        (0.04, 0.02, ["torque_constant@1", "backlash@2"]),
+        # Nothing is likelier.
+        (0.95, 0.19, ["torque_constant@1", "backlash@2"]),
+    ],
+)
+def test_a_cause_less_likely_than_something_unknown_needs_the_rest_explained(
+    monkeypatch: pytest.MonkeyPatch, probability: float, left_in_the_end: float, kept: list[str]
+):
+    accepted = (
+        entered("torque_constant@1", 0, probability, 0.9 if probability < 0.5 else 0.02),
+        entered("backlash@2", 1, 0.99, 0.0),
+    )
+    state = searched(accepted, left=np.array([0.25, 5.0]), now=np.array([left_in_the_end, 4.0]))
+    monkeypatch.setattr(revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
+    revision.withdraw_doubtful(None, state, Settings())  # type: ignore[arg-type]
+    assert [f.effect.label for f in state.model.free] == kept
+
+
+def entered(label: str, axis: int, p: float, unknown: float, beside: Sequence[str] = ()):
+    fitted = SimpleNamespace(free=[free(x) for x in (*beside, label)])
+    ranked = SimpleNamespace(trial=SimpleNamespace(label=label, fitted=fitted), probability=p)
+    return ranked, SimpleNamespace(axis=axis, p_unknown=unknown)
+
+
+def searched(accepted, left, now):
+    model = SimpleNamespace(free=[free(r.trial.label) for r, _ in accepted])
+    round_ = states.Round((), accepted, left)
+    layout = Layout(*[np.zeros(4, int)] * 3, np.ones(4))
+
+    class State(SimpleNamespace):
+        @property
+        def accepted(self):
+            labels = {f.effect.label for f in self.model.free}
+            return [x for x in accepted if x[0].trial.label in labels]
+
+    return State(
+        model=model,
+        rounds=[round_],
+        left=lambda: now,
+        floor=np.ones(4),
+        layout=layout,
+    )
+
+
+@pytest.mark.parametrize(("explained", "stays"), [(0.1, False), (0.999, True)])
+def test_what_came_in_beside_a_cause_that_is_none_is_judged_anew(
+    monkeypatch: pytest.MonkeyPatch, explained: float, stays: bool
+):
+    accepted = (
+        entered("torque_constant@1", 0, 0.04, 0.9),
+        entered("link_com@1", 0, 1.0, 0.0, beside=["torque_constant@1"]),
+    )
+    state = searched(accepted, left=np.array([5.0]), now=np.array([4.9]))
+
+    class Fitter:
+        def fit(self, free_effects, start, *, lazy):
+            share = explained if free_effects else 0.0
+            return SimpleNamespace(
+                free=free_effects, held_out=1.0 + 99.0 * (1 - share) + np.zeros(4)
+            )
+
+    quiet = linear_evidence(np.ones((80, 1)), np.zeros(80), np.zeros(80, int))
+
+    def tried(candidate, fitted):
+        return search_round.FittedHypothesis(candidate, quiet, fitted.held_out)
+
+    monkeypatch.setattr(revision, "trial", tried)
+    monkeypatch.setattr(revision, "held_out_loss", lambda fitted: fitted.held_out)
+    monkeypatch.setattr(revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
+    revision.withdraw_doubtful(Fitter(), state, Settings())  # type: ignore[arg-type]
+    assert [f.effect.label for f in state.model.free] == (["link_com@1"] if stays else [])
+
+
+def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monkeypatch):
+    """A stiff law may be fitted along a run of another model and break down by itself."""
+    whole = SimpleNamespace(hypothesis=free("gear_hysteresis@1"), label="gear_hysteresis@1")
+    whole.fitted = SimpleNamespace(free=())
+    other = SimpleNamespace(hypothesis=free("backlash@1"), label="backlash@1")
+    other.fitted = SimpleNamespace(free=(1,))
+
+    class Field(Round):
+        def _crooked(self, trials):
+            return set()
+
+        def _leader_before(self, one, trials):
+            return None
+
+        def _worth_refining(self, trials, crooked, *, even_felt):
+            return [t for t in trials if t.label not in self.done]
+
+        def _with_kin(self, pool, trials, options):
+            return trials
+
+    def settled(fitter, free_, start):
+        if start is whole.fitted:
+            raise InputError("the simulation failed")
+        return start
+
+    field = Field({})
+    field.settings = Settings()
+    field.bench = SimpleNamespace(skipped={})
+    field.screen = SimpleNamespace(bench=field.bench)
+    field.fitter = field.model = None
+    field.done = set()
+    monkeypatch.setattr(search_round, "settled", settled)
+    monkeypatch.setattr(search_round, "trial", lambda candidate, fitted, model: other)
+    assert SearchRound.refined(field, [whole, other], [], 1) == [other]
+    assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}
+
+
+def finished(pull: float) -> list[dict[str, object]]:
+    """What a search asks a fitter for at its end, where the slope of its model is ``pull``."""
+    asked: list[dict[str, object]] = []
+
+    class Fitter:
+        def fit(self, free, start, **options):
+            asked.append(options)
+            return replace(start, gradient=0 * start.gradient)
+
+    x = np.ones((40, 1))
+    model = linear_evidence(x, x[:, 0], np.repeat([0, 1], 20))
+    effect = Hypothesis(Effect("payload", None), ("mass_kg",))
+    model = replace(model, free=(effect,), effects=(effect.effect,), gradient=model.gradient + pull)
+    state = states.SearchState(
+        model, model, np.zeros(2), Layout(*[np.zeros(2, int)] * 3, np.ones(2))
+    )
+    revision.finish(Fitter(), state)
+    assert (state.model is model) == (not asked)
+    return asked
+
+
+def test_a_model_short_of_its_best_is_fitted_on():
+    # Two blocks of twenty samples and a unit column: a slope s promises (2 s)^2 / 40.
+    assert finished(3.0) == []
+    (options,) = finished(3.3)
+    assert options["worth"] == 1.0
+
+
+def earns(without, within: bool = False, least: float = 1.0) -> bool:
+    """Whether a fit that takes 6 of 10 away earns that; ``without`` is what is left without its effect."""
+
+    def evaluate(free, model, *, robot_values):
+        if without is None:
+            raise InputError("the simulation failed: diverged at sample 5")
+        return SimpleNamespace(total=without)
+
+    fitter = SimpleNamespace(evaluate=evaluate, within_tolerance=lambda effect: within)
+    one = free("torque_offset@1")
+    fitted = SimpleNamespace(free=(one,), effects=(one.effect,), robot_values={}, total=4.0)
+    winner = SimpleNamespace(trial=SimpleNamespace(fitted=fitted))
+    return search._earns_its_gain(fitter, winner, SimpleNamespace(total=10.0), least)
+
+
+def test_a_gain_that_stays_without_its_cause_is_not_earned():
+    assert earns(without=8.0)
+    assert not earns(without=6.0)
+    assert not earns(without=8.0, within=True)
+
+
+def test_what_predicts_better_and_fits_no_better_is_no_cause():
+    """Parameters within their tolerances do as much on all logs together; a linear step may be a third of a gain."""
+    assert earns(without=8.0, least=19.0)
+    assert not earns(without=8.0, least=21.0)
+
+
+def test_a_simulation_that_diverges_without_a_cause_needs_it():
+    assert earns(without=None)
+    assert not earns(without=None, within=True)

@@ -1,0 +1,133 @@
+"""Effects and causes in sentences."""
+
+from dataclasses import replace
+
+import pytest
+
+from axisight.effects import Effect, effect_table, noun, phrase, title
+from axisight.gap.facts.result import Cause, Interval
+from axisight.gap.verdict.conclusion import Conclusion
+from axisight.gap.verdict.headline import headline, named
+from axisight.report.wording import plain_name, torque_unit, torque_word
+from diagnosis_data import explained, gap
+
+ONE = Interval(1.0, 1.0, 1.0)
+
+
+def cause(effect: str, axis: int | None = None) -> Cause:
+    return Cause(effect, axis, 0.9, {}, {}, ONE)
+
+
+def conclusion(verdict: str, *rivals: str) -> Conclusion:
+    return Conclusion(
+        verdict=verdict,
+        causes=(),
+        alternatives=(),
+        equivalent=(rivals,) if rivals else (),
+        next_experiment=None,
+        ranking=(),
+        p_none=0.0,
+        p_unknown=0.0,
+        axes=(),
+        checks=(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [
+        ("coulomb_friction", "Coulomb friction"),
+        ("stribeck_friction", "Stribeck friction"),
+        ("load_dependent_friction", "load-dependent friction"),
+        ("payload", "a payload"),
+        ("backlash", "backlash"),
+        ("input_delay", "an input delay"),
+        ("torque_offset", "a torque offset"),
+        ("joint_stiffness", "the machine's joint stiffness"),
+        ("torque_constant", "the machine's torque constant"),
+        ("nonlinear_stiffness", "nonlinear stiffness"),
+    ],
+)
+def test_an_effect_has_its_article_and_capitals(effect, words):
+    assert phrase(effect) == words
+
+
+@pytest.mark.parametrize("verdict", ["none", "unknown", "explained", "undecidable"])
+@pytest.mark.parametrize("causes", [[], [cause("payload")]])
+def test_positions_have_a_gap_of_their_own(verdict, causes):
+    if verdict in ("explained", "undecidable") and not causes:
+        return
+    of = gap(0.3, 0.3, 0.06, 0.05, 3)
+    rivals = ["payload", "link_mass@2"] if verdict == "undecidable" else []
+    by_torque = headline(conclusion(verdict, *rivals), of, causes, ())
+    positions = replace(of, compared="positions")
+    text = headline(conclusion(verdict, *rivals), positions, causes, ())
+    assert "of the torque" in by_torque
+    expected = by_torque.replace("of the torque", "of the commanded torque")
+    assert text == expected.replace("the gap on", "the gap of positions on")
+
+
+def test_torques_from_positions_say_so():
+    logged = explained()
+    told = replace(logged, gap=replace(logged.gap, compared="positions"))
+    slides = replace(told, provenance={"axis_kinds": ["prismatic"]})
+    units = [torque_unit(x, 1) for x in (logged, told, slides)]
+    assert units == ["Nm", "Nm, from positions", "N, from positions"]
+    words = [torque_word(unit) for unit in (*units, "N")]
+    assert words == ["motor torque", "commanded torque", "commanded force", "motor force"]
+
+
+@pytest.mark.parametrize("name", effect_table())
+def test_every_effect_can_stand_in_a_sentence(name):
+    assert "_" not in phrase(name)
+    assert phrase(name).endswith(noun(name))
+    assert title(name)[0].isupper()
+    assert plain_name(name) == title(name)
+
+
+@pytest.mark.parametrize(
+    ("causes", "words"),
+    [
+        ([cause("coulomb_friction", 2)], "Coulomb friction on axis 2"),
+        ([cause("payload")], "a payload"),
+        (
+            [cause("backlash", 1), cause("input_delay", 3)],
+            "backlash on axis 1 and an input delay on axis 3",
+        ),
+        ([cause("coulomb_friction", a) for a in (5, 1, 2)], "Coulomb friction on axes 1, 2 and 5"),
+        (
+            [cause(e, a) for a in range(1, 7) for e in ("coulomb_friction", "viscous_friction")],
+            "Coulomb and viscous friction on all six axes",
+        ),
+        (
+            [cause("torque_ripple", 1), cause("resolver_ripple", 2)],
+            "torque ripple on axis 1 and resolver ripple on axis 2",
+        ),
+    ],
+)
+def test_causes_are_grouped(causes, words):
+    assert named(causes, (), 6) == words
+
+
+def test_what_the_simulator_has_already_has_other_values():
+    own = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})
+    words = named([cause("coulomb_friction", 1)], (own,), 1)
+    assert words == "the machine's values of Coulomb friction on axis 1"
+
+
+def test_the_headline_says_it_lacks_a_payload():
+    text = headline(conclusion("explained"), gap(0.3, 0.3, 0.06, 0.05, 3), [cause("payload")], ())
+    assert text.startswith("The simulator lacks a payload: adding it shrinks the gap")
+
+
+def test_rivals_are_named_in_words():
+    rivals = ("torque_constant@2", "payload")
+    text = headline(
+        conclusion("undecidable", *rivals),
+        gap(0.3, 0.3, 0.06, 0.05, 3),
+        [cause("torque_constant", 2)],
+        (),
+    )
+    assert text.startswith(
+        "This data cannot tell the machine's torque constant on axis 2 and a payload apart"
+    )
