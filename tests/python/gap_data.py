@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -124,3 +125,10 @@ def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 
         residual=residual,
         columns={},
     )
+
+
+class StateStub(SimpleNamespace):
+    """A state of a search that takes whatever model a move makes."""
+
+    def moved(self, _move: str, model: object) -> None:
+        self.model = model

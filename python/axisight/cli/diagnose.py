@@ -34,7 +34,7 @@ from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.outputs import Outputs
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.screen import OUT, is_output
-from axisight.cli.show import show_diagnosis
+from axisight.cli.show import show_account, show_diagnosis
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.gap import Settings, diagnose
@@ -164,6 +164,14 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
         ),
     ] = None,
+    explain: Annotated[
+        bool,
+        typer.Option(
+            "--explain",
+            help="Say how the verdict came about: what was compared, what each rule added, why rivals lost, "
+            "what each move did.",
+        ),
+    ] = False,
     force: Force = False,
     exit_code: Annotated[
         bool,
@@ -216,6 +224,7 @@ def diagnose_command(
             "--write-model": write_model,
             "--signals": signals,
             "--simulated": simulated,
+            "--explain": explain,
             "--force": force,
             "--exit-code": exit_code,
             "--untrusted": untrusted,
@@ -282,6 +291,8 @@ def diagnose_command(
                 simulated=inputs.simulated,
             )
         show_diagnosis(found)
+        if explain:
+            show_account(found)
         write_each(outputs.writes(found, inputs, options))
         if exit_code:
             raise typer.Exit(EXIT_CODES[found.verdict])

@@ -20,12 +20,20 @@ from axisight.gap.facts.result import MotionErrors
 from axisight.gap.facts.wording import percent
 from axisight.gap.intake.user_simulator import said
 from axisight.gap.verdict.headline import in_order
+from axisight.report.account import account
 from axisight.report.limits import limit_table
 
 _RANKED = 8
 _REFITTED = 10
 # Axes of a table of detection limits.
 _PLACES = 7
+
+
+def show_account(found: Diagnosis) -> None:
+    """Print how the verdict came about: what was compared, why rivals lost, what each move did."""
+    OUT.print("[bold]how the verdict came about[/]")
+    for line in account(found.trace).lines():
+        say(line)
 
 
 def show_diagnosis(found: Diagnosis) -> None:

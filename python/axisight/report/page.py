@@ -23,6 +23,7 @@ from axisight.gap.facts.result import (
     Where,
 )
 from axisight.gap.verdict.headline import in_order, within_tolerances
+from axisight.report.account import account
 from axisight.report.colors import shade
 from axisight.report.figures import TOP, overlays_by_log, ranking_bars
 from axisight.report.limits import limit_table
@@ -128,6 +129,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "equivalent": [[title_of_label(label) for label in g] for g in diagnosis.equivalent],
         "next_experiment": diagnosis.next_experiment,
         "checks": diagnosis.checks,
+        "account": account(diagnosis.trace),
         "refit": _refit(diagnosis.refit),
         "provenance": _flat(diagnosis.provenance),
         "settings": _flat(diagnosis.settings),

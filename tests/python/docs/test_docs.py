@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import axisight
 from axisight import _core
 from axisight.cli import app
+from axisight.gap.facts.trace import MOVES, RULES
 
 MODULES = (
     axisight,
@@ -178,3 +179,9 @@ def test_public_function_documents_its_parameters(name: str) -> None:
     # A sole argument is what the summary is about.
     missing = [p for p in wanted if not mentions(text, p)] if len(wanted) > 1 else []
     assert not missing, f"{name} does not document {', '.join(missing)}"
+
+
+def test_the_account_page_has_every_rule_and_move(repository: Path) -> None:
+    page = (repository / "docs" / "explain.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| ([a-z ]+) \| ([A-Z].*) \|$", page, flags=re.MULTILINE))
+    assert rows == {name.replace("_", " "): why for name, why in (RULES | MOVES).items()}

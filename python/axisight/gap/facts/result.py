@@ -19,6 +19,7 @@ from axisight.gap.facts.axis_names import axis_label, verdict_word
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.trace import Trace
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
@@ -302,6 +303,7 @@ class Diagnosis:
     ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
     less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
     ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
+    ``trace``: what the search compared, what each rule added to a log-weight, and what each move did.
     """
 
     name: str
@@ -331,6 +333,7 @@ class Diagnosis:
     experiment: Experiment | None = None
     simulator: Reproduction | None = None
     signals: tuple[xr.Dataset, ...] = ()
+    trace: Trace = field(default_factory=Trace)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -414,6 +417,7 @@ class Diagnosis:
             "findings": [f.to_dict() for f in self.findings],
             "settings": self.settings,
             "provenance": self.provenance,
+            "trace": self.trace.to_dict(),
         }
         finite: dict[str, Any] = _finite(out)
         return finite

@@ -52,7 +52,9 @@ def _of_axes(found: SearchState, fitter: ModelFitter, axes: set[int]) -> SearchS
     kept = [f for f, (_, s) in zip(found.model.free, found.accepted, strict=True) if s.axis in axes]
     if len(kept) == len(found.model.free):
         return found
-    return replace(found, model=settled(fitter, kept, found.model))
+    out = replace(found, steps=[*found.steps])
+    out.moved("own_axes", settled(fitter, kept, found.model))
+    return out
 
 
 @dataclass(frozen=True)

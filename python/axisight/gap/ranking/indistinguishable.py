@@ -40,9 +40,10 @@ def with_twins(ranking: Sequence[Candidate], n_axes: int) -> tuple[Candidate, ..
 
 def less_their_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[NamedCause, ...]:
     """Return the causes without the share of probability that their twins have."""
+    counts = [len(twins_of(c.effect, n_axes)) for c in causes]
     return tuple(
-        replace(c, probability=c.probability * (1 - TWIN_SHARE * len(twins_of(c.effect, n_axes))))
-        for c in causes
+        c.adjusted("twins", 1 - TWIN_SHARE * count) if count else c
+        for c, count in zip(causes, counts, strict=True)
     )
 
 

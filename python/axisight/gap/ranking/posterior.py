@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,13 @@ from axisight.effects.stated import (
     SPRING_CHANGES,
     TRANSPORT_DELAY,
 )
+from axisight.gap.facts.trace import NONE, UNKNOWN, Adjustment, log_odds
 from axisight.gap.fit.amplitude_significance import amplitude_significance
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.idle_numbers import idle_numbers
+from axisight.gap.ranking.belief import Belief
 from axisight.gap.ranking.formula_error import NEXT_TO_NOTHING, held_apart
 from axisight.gap.ranking.plainer_law import held_to_plainer
 
@@ -37,6 +40,15 @@ GEAR = "transmission"
 """Family of effects whose laws are many for one gear: a second one may mend the formula of the first."""
 # Log-probability each fitted number costs (Schwarz 1978, with the blocks above).
 _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
+
+
+TINY = 1e-300
+"""Smallest weight that is divided by."""
+
+
+def _against_the_best(standing: AxisPosterior) -> dict[str, float]:
+    """Return how probable each candidate of an axis is against the best there, by label."""
+    return {r.trial.label: r.probability / standing.best.probability for r in standing.ranked}
 
 
 def numbers(effect: Hypothesis) -> float:
@@ -94,68 +106,107 @@ class RankedHypothesis:
 
 @dataclass(frozen=True)
 class AxisPosterior:
-    """How the candidates stand on one axis (from 0), best first; with the two that are none."""
+    """How the candidates stand on one axis (from 0), best first; with the two that are none.
+
+    ``ledger``: the entries that made their log-weights, in order. A probability changes only by `adjusted`,
+    `exchanged` and `joined`, and each writes there what it did.
+    """
 
     axis: int
     ranked: tuple[RankedHypothesis, ...]
     p_none: float
     p_unknown: float
+    ledger: tuple[Adjustment, ...] = ()
 
     @property
     def best(self) -> RankedHypothesis:
         """The most probable candidate."""
         return self.ranked[0]
 
+    def adjusted(self, rule: str, odds: Mapping[str, float]) -> AxisPosterior:
+        """Return the same with candidates, by label, counted for so many times as probable; without those of zero."""
+        weighed = [(odds.get(r.trial.label, 1.0), r) for r in self.ranked]
+        left = [(times * r.probability, r) for times, r in weighed if times > 0]
+        if any(times != 1 for times, _ in weighed if times > 0):
+            left.sort(key=lambda pair: -pair[0])
+        whole = sum(weight for weight, _ in left) + self.p_none + self.p_unknown
+        entries = (Adjustment(rule, r.trial.label, log_odds(x)) for x, r in weighed if x != 1)
+        return AxisPosterior(
+            self.axis,
+            tuple(replace(r, probability=weight / whole) for weight, r in left),
+            self.p_none / whole,
+            self.p_unknown / whole,
+            (*self.ledger, *entries),
+        )
+
+    def exchanged(self, rule: str, one: RankedHypothesis) -> AxisPosterior:
+        """Return the same led by another candidate, the probabilities of both exchanged."""
+        first = replace(one, probability=self.best.probability)
+        other = replace(self.best, probability=one.probability)
+        nats = log_odds(first.probability) - log_odds(max(one.probability, TINY))
+        entries = (
+            Adjustment(rule, first.trial.label, nats),
+            Adjustment(rule, other.trial.label, -nats),
+        )
+        rest = tuple(other if r is one else r for r in self.ranked[1:])
+        return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entries))
+
+    def joined(self, into: RankedHypothesis, parts: Sequence[RankedHypothesis]) -> AxisPosterior:
+        """Return the same led by ``into``, in the place of ``parts`` and with their probability."""
+        gone = {r.trial.label for r in parts}
+        first = replace(into, probability=sum(r.probability for r in parts))
+        rest = (r for r in self.ranked if r.trial.label not in gone)
+        more = first.probability / into.probability if into.probability > 0 else 1.0
+        entries = [Adjustment("composite", first.trial.label, log_odds(more))]
+        entries += [
+            Adjustment("composite", r.trial.label, log_odds(0.0))
+            for r in parts
+            if r.trial.label != first.trial.label
+        ]
+        return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entries))
+
+    def led_by(self, first: RankedHypothesis, rule: str | None = None) -> AxisPosterior:
+        """Return the same with one of its candidates named first, as probable as it is."""
+        entry = () if rule is None else (Adjustment(rule, first.trial.label, 0.0),)
+        rest = (r for r in self.ranked if r is not first)
+        return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entry))
+
     def without_first(self, count: int) -> AxisPosterior:
-        """Return the same without its first candidates, probabilities of the others scaled up."""
-        return self._of(self.ranked[count:])
+        """Return the same without its first candidates."""
+        return self.without(*(r.trial.label for r in self.ranked[:count]))
 
-    def without(self, label: str) -> AxisPosterior:
-        """Return the same without a candidate, probabilities of the others scaled up."""
-        return self._of(tuple(r for r in self.ranked if r.trial.label != label))
+    def without(self, *labels: str) -> AxisPosterior:
+        """Return the same without some candidates, by label."""
+        return self.adjusted("not_a_cause", dict.fromkeys(labels, 0.0))
 
-    def _of(self, left: tuple[RankedHypothesis, ...]) -> AxisPosterior:
-        whole = sum(r.probability for r in left) + self.p_none + self.p_unknown
-        scaled = (replace(r, probability=r.probability / whole) for r in left)
-        return AxisPosterior(self.axis, tuple(scaled), self.p_none / whole, self.p_unknown / whole)
-
-    def led_by(self, first: RankedHypothesis) -> AxisPosterior:
-        """Return the same with one of its candidates first."""
-        return replace(self, ranked=(first, *(r for r in self.ranked if r is not first)))
-
-    def with_what_others_say(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
+    def with_axes_it_leads(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
         """Return the same with rivals held against the first where they do worst.
 
-        ``others``: standings of other axes that the first leads too. What moves several axes is seen on
+        ``others``: of other axes that the first leads too. What moves several axes is seen on
         all of them; one that does as well on one of them may do worse on another.
         """
-        first = self.best
-        odds = {r.trial.label: r.probability for r in self.ranked}
-        for other in others:
-            there = {r.trial.label: r.probability / other.best.probability for r in other.ranked}
-            odds = {
-                label: min(p, first.probability * there.get(label, 0.0))
-                for label, p in odds.items()
-            }
-        held = (replace(r, probability=odds[r.trial.label]) for r in self.ranked)
-        return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
+        first = self.best.probability
+        there = [_against_the_best(other) for other in others]
+        odds = {
+            r.trial.label: min(
+                (first * x.get(r.trial.label, 0.0) / max(r.probability, TINY) for x in there),
+                default=1.0,
+            )
+            for r in self.ranked
+        }
+        return self.adjusted("other_axes", {label: min(x, 1.0) for label, x in odds.items()})
 
-    def with_those_that_lead(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
+    def with_axes_rivals_lead(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
         """Return the same with all held by what axes say on which rivals of the first lead surely.
 
-        ``others``: standings of these axes. What is seen on two axes is judged by both.
+        ``others``: of these axes. What is seen on two axes is judged by both.
         """
-        odds = {r.trial.label: r.probability for r in self.ranked}
-        for other in others:
-            there = {r.trial.label: r.probability / other.best.probability for r in other.ranked}
-            odds = {
-                r.trial.label: min(
-                    odds[r.trial.label], r.probability * there.get(r.trial.label, 0.0)
-                )
-                for r in self.ranked
-            }
-        held = (replace(r, probability=odds[r.trial.label]) for r in self.ranked)
-        return self._of(tuple(sorted(held, key=lambda r: -r.probability)))
+        there = [_against_the_best(other) for other in others]
+        odds = {
+            r.trial.label: prod(min(x.get(r.trial.label, 0.0), 1.0) for x in there)
+            for r in self.ranked
+        }
+        return self.adjusted("rival_leads", odds)
 
     def inseparable(self) -> list[RankedHypothesis]:
         """Return the candidates the data cannot tell apart, the winner first; one if it is clear.
@@ -182,15 +233,7 @@ class AxisPosterior:
             for i in usual
             for axis in axes
         }
-        return self.weighed(odds)
-
-    def weighed(self, odds: Mapping[str, float]) -> AxisPosterior:
-        """Return the same with some candidates, by label, counted for as many times as probable."""
-        weighed = [
-            replace(r, probability=odds.get(r.trial.label, 1.0) * r.probability)
-            for r in self.ranked
-        ]
-        return self._of(tuple(sorted(weighed, key=lambda r: -r.probability)))
+        return self.adjusted("look_alike", odds)
 
     def play_first(self) -> AxisPosterior:
         """Return the same led by play where the winner is a gear whose middle has lost its stiffness.
@@ -207,10 +250,7 @@ class AxisPosterior:
         label = Effect(PLAY[0], effect.axis).label
         for play in self.ranked[1:]:
             if play.trial.label == label and play.score >= _AS_PLAY * self.best.score:
-                led = replace(play, probability=self.best.probability)
-                other = replace(self.best, probability=play.probability)
-                rest = (other if r is play else r for r in self.ranked[1:])
-                return replace(self, ranked=(led, *rest))
+                return self.exchanged("play_of_gear", play)
         return self
 
 
@@ -291,23 +331,28 @@ def stand(
     # An unknown cause has as many numbers to it as the known one that explains most.
     unknown = mine[int(np.argmin(losses))].cost
     cost = np.array([*_costs(mine), 0.0, _PARAMETER_COST * unknown])
-    logp = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered) - cost
+    belief = Belief([*(t.label for t in mine), NONE, UNKNOWN])
+    likelihood = -0.5 * _INDEPENDENT_BLOCKS * np.log(tempered)
+    belief.becomes("likelihood", likelihood, against=likelihood[-2])
+    belief.becomes("cost", likelihood - cost)
     fitted = np.array([_fitted_loss(t.fitted, here) for t in mine])
-    logp = held_apart(
+    apart = held_apart(
         [t.hypothesis for t in mine],
         axis,
-        logp,
+        belief.log_weight,
         losses,
         explainable,
         least,
         lambda left, which: -0.5 * _INDEPENDENT_BLOCKS * np.log(left) - cost[which],
     )
+    belief.becomes("formula_error", apart)
     explained = (before - losses) / explainable
-    logp = _with_those_that_fit_better(mine, logp, explained, fitted, cost)
+    better = _with_those_that_fit_better(mine, belief.log_weight, explained, fitted, cost)
+    belief.becomes("better_fit", better)
     tried = [t.hypothesis.effect for t in mine]
-    logp = held_to_plainer(tried, [t.fitted for t in mine], logp, layout.stretch)
-    probability = np.exp(logp - logp.max())
-    probability /= probability.sum()
+    plainer = held_to_plainer(tried, [t.fitted for t in mine], belief.log_weight, layout.stretch)
+    belief.becomes("plainer_law", plainer)
+    probability = belief.probabilities()
     samples = float(layout.samples()[axis])
     ranked = [
         RankedHypothesis(
@@ -320,7 +365,8 @@ def stand(
         for t, loss, p in zip(mine, losses, probability, strict=False)
     ]
     ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
-    return AxisPosterior(axis, tuple(ranked), float(probability[-2]), float(probability[-1]))
+    none, unknown = (float(p) for p in probability[-2:])
+    return AxisPosterior(axis, tuple(ranked), none, unknown, tuple(belief.ledger))
 
 
 # Of machines that a delay describes as well as a current loop, which are delays for one that is a loop: loops are as
@@ -457,10 +503,3 @@ def of_one_formula(standing: AxisPosterior) -> list[RankedHypothesis]:
         if {r.trial.hypothesis.effect.name, first.trial.hypothesis.effect.name} <= ONE_FORMULA
         and r.score > least
     ]
-
-
-def without_composite(standing: AxisPosterior, part: RankedHypothesis) -> AxisPosterior:
-    """Put the first part in the place of its composite, with the probability of both."""
-    merged = replace(part, probability=part.probability + standing.best.probability)
-    rest = tuple(r for r in standing.ranked[1:] if r is not part)
-    return replace(standing, ranked=(merged, *rest))

@@ -190,11 +190,7 @@ def without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
         if winner.name in effect_info(r.trial.hypothesis.effect.name).parts
         and r.trial.hypothesis.effect.axis == winner.axis
     ]
-    for composite in composed:
-        rest = tuple(r for r in standing.ranked[1:] if r is not composite)
-        mass = standing.best.probability + composite.probability
-        standing = replace(standing, ranked=(replace(standing.best, probability=mass), *rest))
-    return standing
+    return standing.joined(standing.best, [standing.best, *composed]) if composed else standing
 
 
 def in_parts(
@@ -227,10 +223,9 @@ def in_parts(
         return ()
     chosen = _needed(alone, both, layout, standing.axis)
     labels = {t.label for t in both} | {winner.trial.label}
-    rest = tuple(r for r in standing.ranked if r.trial.label not in labels)
-    mass = sum(r.probability for r in standing.ranked if r.trial.label in labels)
-    found = [replace(winner, trial=t, probability=mass) for t in chosen]
-    return tuple((r, replace(standing, ranked=(r, *rest))) for r in found)
+    same = [r for r in standing.ranked if r.trial.label in labels]
+    joined = [standing.joined(replace(winner, trial=t), same) for t in chosen]
+    return tuple((led.best, led) for led in joined)
 
 
 def _new(part: Hypothesis, present: set[str]) -> bool:

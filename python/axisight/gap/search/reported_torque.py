@@ -51,8 +51,8 @@ def with_constants_told(
             continue
         model = _held(fitter, model, rival.trial.label, told)
         left = found.left()
-        found.model = model
-        weighed = standing.weighed({rival.trial.label: _ODDS})
+        found.moved("reported_torque", model)
+        weighed = standing.adjusted("reported_torque", {rival.trial.label: _ODDS})
         first = next(r for r in weighed.ranked if r.trial is rival.trial)
         led = weighed.led_by(first)
         found.rounds.append(Round((led,), ((first, led),), left))

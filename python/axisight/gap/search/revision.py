@@ -40,7 +40,8 @@ def straighten(fitter: ModelFitter, state: SearchState) -> None:
     ]
     found = straightened(fitter, state.model, entered)
     if found is not None:
-        state.model, _, rival = found
+        model, _, rival = found
+        state.moved("straighten", model)
         state.rounds.append(Round((rival[1],), (rival,), state.left()))
 
 
@@ -58,9 +59,10 @@ def finish(fitter: ModelFitter, state: SearchState) -> None:
     if not model.free or model.stuck or linear_gain(model) < OPEN:
         return
     with suppress(InputError):
-        state.model = fitter.fit(
+        fitted = fitter.fit(
             model.free, model, lazy=True, max_iterations=_FINISHING, refreshes=1, worth=OPEN
         )
+        state.moved("finish", fitted)
 
 
 def weigh_again(fitter: ModelFitter, state: SearchState, settings: Settings) -> None:
@@ -93,7 +95,8 @@ def weigh_again(fitter: ModelFitter, state: SearchState, settings: Settings) -> 
             rivals,
         )
         if found is not None and state.left_by(found[0])[axis] < most:
-            state.model, taken = found
+            model, taken = found
+            state.moved("exchange", model)
             state.rounds.append(Round((taken[1],), (taken,), left))
     if state.model is not before:
         drop_idle(fitter, state, settings)
@@ -124,12 +127,13 @@ def drop_idle(fitter: ModelFitter, state: SearchState, settings: Settings) -> se
             stood_in = _stood_in(fitter, state, settings)
             if stood_in is None:
                 break
-            label, state.model = stood_in
+            label, model = stood_in
+            state.moved("stand_in", model)
             dropped.add(label)
             continue
         dropped.add(free[worst].effect.label)
         rest = [*free[:worst], *free[worst + 1 :]]
-        state.model = settled(fitter, rest, state.model)
+        state.moved("drop", settled(fitter, rest, state.model))
     return dropped
 
 
@@ -174,7 +178,7 @@ def withdraw_doubtful(fitter: ModelFitter, state: SearchState, settings: Setting
         kept = [f for f in state.model.free if f.effect.label not in doubtful]
         if len(kept) == len(state.model.free):
             break
-        state.model = settled(fitter, kept, state.model)
+        state.moved("withdraw", settled(fitter, kept, state.model))
         doubtful |= {
             r.trial.label
             for r, s in state.accepted
@@ -219,7 +223,7 @@ def merge(
         gone |= left - now
         taken = _as_it_stood(found, left - now, state)
         before = state.left()
-        state.model = settled(fitter, fitted.free, fitted)
+        state.moved("merge", settled(fitter, fitted.free, fitted))
         state.rounds.append(Round((taken[1],), (taken,), before))
     return gone
 

@@ -22,7 +22,6 @@ from axisight.gap.ranking.posterior import (
     RankedHypothesis,
     clearly_worse,
     falls,
-    without_composite,
 )
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
@@ -164,11 +163,11 @@ def _taken(
         led = causes[standing.axis]
         if led is None or _beaten_at_home(led, causes):
             continue
-        led = led.with_those_that_lead(
+        led = led.with_axes_rivals_lead(
             [s for s in standings if _rival_leads(led, s, fall, place, state, settings)]
         )
         least = state.least_falls(settings)
-        led = led.with_what_others_say(
+        led = led.with_axes_it_leads(
             [s for s in standings if _leads(led, s, fall[place[led.best.trial.label]], least)]
         )
         mine = place[led.best.trial.label]
@@ -328,7 +327,7 @@ def _take_in(
             free = [*kept_beside(free, new), new]
     # From the simulator of the first: a gap may have bent the one without it. As far as the last fit
     # goes: mostly this is it.
-    state.model = settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN)
+    state.moved("add", settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN))
     progress(label, 1, 1)
 
 
@@ -352,7 +351,7 @@ def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
     if part is None:
         return standing
     if any(r is part for r in standing.inseparable()):
-        return standing.led_by(part)
+        return standing.led_by(part, "simplest_first")
     winner = standing.best
     effect = winner.trial.hypothesis.effect
     second = effect_info(effect.name).parts[1]
@@ -362,7 +361,7 @@ def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
     except InputError:
         return standing
     if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
-        return without_composite(standing, part)
+        return standing.joined(part, [part, standing.best])
     return standing
 
 

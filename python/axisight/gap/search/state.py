@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.trace import Step
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss, predictable
@@ -46,6 +47,7 @@ class SearchState:
     accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
     blocks lie; ``skipped``: candidates that failed, with the reason;
     ``sensitivities`` by label, of candidates as they were screened last;
+    ``steps``: what each move changed;
     ``adds_up``: errors add up axis by axis; ``by_axis``: the effects explain their axes, not the arm.
     """
 
@@ -56,6 +58,7 @@ class SearchState:
     rounds: list[Round] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
     sensitivities: dict[str, Sensitivity] = field(default_factory=dict)
+    steps: list[Step] = field(default_factory=list)
     adds_up: bool = False
     by_axis: bool = False
 
@@ -64,6 +67,12 @@ class SearchState:
         """The causes in the model and how they stood when they entered, in the model's order."""
         entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
         return [entered[f.effect.label] for f in self.model.free]
+
+    def moved(self, move: str, model: FittedModel) -> None:
+        """Take the model that a move of `axisight.gap.facts.trace.MOVES` makes, and write down what it changed."""
+        before, after = (tuple(f.effect.label for f in m.free) for m in (self.model, model))
+        self.steps.append(Step(move, before, after, self.model.total, model.total))
+        self.model = model
 
     def standings_of(self, cause: RankedHypothesis) -> tuple[AxisPosterior, ...]:
         """Return how the round stood in which a cause came in."""

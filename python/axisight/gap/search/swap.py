@@ -75,12 +75,11 @@ def _beside(
     label, its = cause.trial.label, rival.trial.label
     led = (s for s in standings if s.best.trial.label == label)
     entered = next(s for s in led if any(r.trial.label == its for r in s.inseparable()))
-    first, second = entered.best, next(r for r in entered.ranked if r.trial.label == its)
-    winner = replace(second, probability=first.probability)
-    loser = replace(first, probability=second.probability)
-    others = [r for r in entered.ranked if r.trial.label not in {label, its}]
-    behind = sorted([loser, *others], key=lambda r: -r.probability)
-    return winner, replace(entered, ranked=(winner, *behind))
+    second = next(r for r in entered.ranked if r.trial.label == its)
+    changed = entered.exchanged("straighter_first", second)
+    behind = sorted(changed.ranked[1:], key=lambda r: -r.probability)
+    changed = replace(changed, ranked=(changed.best, *behind))
+    return changed.best, changed
 
 
 def nearly_as_good(

@@ -19,6 +19,7 @@ from axisight.gap.measure.detection_limits import detection_limits
 from axisight.gap.measure.gap_figures import gap_figures, stage
 from axisight.gap.measure.motion_errors import motion_errors, velocity_from
 from axisight.gap.measure.where import band_map, findings, led_by_weight, regime_maps
+from axisight.gap.search.account import trace_of
 from axisight.gap.search.prior_strain import bent_for
 from axisight.gap.signals.encoder_steps import encoder_steps
 from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
@@ -119,6 +120,7 @@ def assembled(
             *parameters_at_edge(fitted, nominal, tolerances),
         ),
         settings=settings.as_dict(robot),
+        trace=replace(trace_of(found), named=tuple(x for c in conclusion.causes for x in c.ledger)),
         provenance=_provenance(robot, view, names, settings),
     )
 

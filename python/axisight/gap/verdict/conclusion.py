@@ -14,6 +14,7 @@ from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.trace import Adjustment, log_odds
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.ranking.indistinguishable import (
@@ -142,7 +143,8 @@ def conclude(
     gains = either(causes, unseen_constant(settings))
     if gains and verdict == "explained":
         verdict = "undecidable"
-    causes = tuple(_or_another(c) if c.label in {one for one, _ in gains} else c for c in causes)
+    torn = {one for one, _ in gains}
+    causes = tuple(c.adjusted("either", 0.5) if c.label in torn else c for c in causes)
     open_groups += gains
     advice = _advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
@@ -180,11 +182,6 @@ def _too_little(found: SearchState, explained: float, settings: Settings) -> boo
     left = float(found.left().sum() / found.layout.samples().sum())
     # By inverse dynamics the real thing has much that no effect explains.
     return not found.adds_up and explained < 1.0 - _OF_A_LAW and left > _OF_NOISE
-
-
-def _or_another(cause: NamedCause) -> NamedCause:
-    """Return a cause beside which another one is as likely."""
-    return replace(cause, probability=0.5 * cause.probability)
 
 
 def named_shown(cause: AlgebraicCause) -> NamedCause:
@@ -317,7 +314,9 @@ def _named(
     alone = ranked.probability / whole
     family = min(max(sum(r.probability for r in kin) / whole, alone), 1.0)
     where, axes = effect.first_axis, effect.axes
-    return NamedCause(effect.name, where, alone, found, units, info.family, family, axes)
+    entry = Adjustment("beside_causes", effect.label, -log_odds(whole))
+    ledger = () if whole == 1 else (entry,)
+    return NamedCause(effect.name, where, alone, found, units, info.family, family, axes, ledger)
 
 
 def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[str, ...]:

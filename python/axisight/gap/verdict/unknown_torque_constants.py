@@ -32,10 +32,7 @@ def open_with_constants(conclusion: Conclusion, axes: Sequence[int]) -> Conclusi
     like = {c.label: found for c in conclusion.causes if (found := _constants_like(c, axes))}
     if not like or conclusion.verdict not in ("explained", "undecidable"):
         return conclusion
-    causes = tuple(
-        replace(c, probability=0.5 * c.probability) if c.label in like else c
-        for c in conclusion.causes
-    )
+    causes = tuple(c.adjusted("either", 0.5) if c.label in like else c for c in conclusion.causes)
     return replace(
         conclusion,
         verdict="undecidable",

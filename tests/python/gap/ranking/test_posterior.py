@@ -230,10 +230,10 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
     # On the first axis all do the same; the second has seen more.
     assert len(here.inseparable()) == 3
     here = here.led_by(next(r for r in here.ranked if r.trial is true))
-    held = here.with_what_others_say([there])
+    held = here.with_axes_it_leads([there])
     assert held.best.trial is true and held.best.probability > 0.99
     assert total(held) == pytest.approx(1.0)
-    assert here.with_what_others_say([]).best.probability == pytest.approx(here.best.probability)
+    assert here.with_axes_it_leads([]).best.probability == pytest.approx(here.best.probability)
 
 
 @pytest.mark.parametrize(
@@ -289,7 +289,7 @@ def test_what_leads_another_axis_surely_is_judged_by_both():
     there = standing(
         [replace(link, held_out=np.full(40, 1.0)), replace(offset, held_out=np.full(40, 1.25))]
     )
-    both = here.with_those_that_lead([there])
+    both = here.with_axes_rivals_lead([there])
     assert both.best.trial.label == link.label
     odds, alone, elsewhere = (
         {r.trial.label: r.probability for r in s.ranked} for s in (both, here, there)
@@ -297,7 +297,7 @@ def test_what_leads_another_axis_surely_is_judged_by_both():
     one, other = link.label, offset.label
     product = alone[one] / alone[other] * elsewhere[one] / elsewhere[other]
     assert odds[one] / odds[other] == pytest.approx(product)
-    assert here.with_those_that_lead([]).best.trial is offset
+    assert here.with_axes_rivals_lead([]).best.trial is offset
 
 
 def test_a_third_gains_nothing_from_a_rival_that_leads_another_axis():
@@ -310,7 +310,7 @@ def test_a_third_gains_nothing_from_a_rival_that_leads_another_axis():
     there = standing(
         [replace(t, held_out=np.full(40, x)) for t, x in ((lag, 1.6), (loop, 1.6), (delay, 1.0))]
     )
-    both = here.with_those_that_lead([there])
+    both = here.with_axes_rivals_lead([there])
     odds, alone = ({r.trial.label: r.probability for r in s.ranked} for s in (both, here))
     assert odds[lag.label] / odds[loop.label] == pytest.approx(alone[lag.label] / alone[loop.label])
     assert odds[delay.label] / odds[loop.label] > alone[delay.label] / alone[loop.label]

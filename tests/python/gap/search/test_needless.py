@@ -9,7 +9,7 @@ from axisight import Effect, Settings
 from axisight.errors import InputError
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.search import revision
-from gap_data import linear_evidence
+from gap_data import StateStub, linear_evidence
 
 COLUMNS = {"viscous_friction": 0, "torque_offset": 1, "quadratic_drag": 2}
 
@@ -40,7 +40,7 @@ def test_a_cause_is_dropped_unless_a_loop_swings_without_it(needed, dropped, mon
     fits = Fits(needed)
     free = [Hypothesis(Effect(name, 1), ("size",)) for name in COLUMNS]
     model = fits.evaluate(free, None, robot_values={})
-    state = SimpleNamespace(model=model, layout=SimpleNamespace(samples=lambda: np.array([400.0])))
+    state = StateStub(model=model, layout=SimpleNamespace(samples=lambda: np.array([400.0])))
     monkeypatch.setattr(revision, "linear_gain", lambda _: 0.0)
     monkeypatch.setattr(
         revision, "settled", lambda fitter, rest, _: fitter.evaluate(rest, None, robot_values={})
@@ -59,7 +59,7 @@ def test_what_stood_in_for_a_load_is_fitted_away_however_far_a_step_goes(
         Hypothesis(Effect("payload", None), ("mass_kg",)),
         Hypothesis(Effect("viscous_friction", 1), ("viscous_nm_s_rad",)),
     ]
-    state = SimpleNamespace(
+    state = StateStub(
         model=SimpleNamespace(free=free, total=100.0, robot_values={}),
         layout=SimpleNamespace(samples=lambda: np.array([400.0, 400.0])),
     )

@@ -17,7 +17,7 @@ from axisight.gap.screening.screening import Start
 from axisight.gap.screening.search_round import SearchRound
 from axisight.gap.search import revision, search
 from axisight.gap.search import state as states
-from gap_data import linear_evidence
+from gap_data import StateStub, linear_evidence
 
 
 def free(label: str) -> Hypothesis:
@@ -126,7 +126,9 @@ def test_a_cause_less_likely_than_something_unknown_needs_the_rest_explained(
         entered("backlash@2", 1, 0.99, 0.0),
     )
     state = searched(accepted, left=np.array([0.25, 5.0]), now=np.array([left_in_the_end, 4.0]))
-    monkeypatch.setattr(revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
+    monkeypatch.setattr(
+        revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept, total=0.0)
+    )
     revision.withdraw_doubtful(None, state, Settings())  # type: ignore[arg-type]
     assert [f.effect.label for f in state.model.free] == kept
 
@@ -142,7 +144,7 @@ def searched(accepted, left, now):
     round_ = states.Round((), accepted, left)
     layout = Layout(*[np.zeros(4, int)] * 3, np.ones(4))
 
-    class State(SimpleNamespace):
+    class State(StateStub):
         @property
         def accepted(self):
             labels = {f.effect.label for f in self.model.free}
@@ -181,7 +183,9 @@ def test_what_came_in_beside_a_cause_that_is_none_is_judged_anew(
 
     monkeypatch.setattr(revision, "trial", tried)
     monkeypatch.setattr(revision, "held_out_loss", lambda fitted: fitted.held_out)
-    monkeypatch.setattr(revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept))
+    monkeypatch.setattr(
+        revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept, total=0.0)
+    )
     revision.withdraw_doubtful(Fitter(), state, Settings())  # type: ignore[arg-type]
     assert [f.effect.label for f in state.model.free] == (["link_com@1"] if stays else [])
 

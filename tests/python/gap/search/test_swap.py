@@ -20,7 +20,7 @@ from axisight.gap.search.swap import (
     straightened,
     weighed_again,
 )
-from gap_data import linear_evidence
+from gap_data import StateStub, linear_evidence
 
 ROBOT = load_robot("irb6600_like").with_effects([])
 TOLERANCE = {"mass": 0.015, "stiffness": 0.015, "motor_inertia": 0.015}
@@ -292,7 +292,7 @@ def test_only_a_law_that_mends_has_to_halve_what_is_left(
     cause = SimpleNamespace(trial=SimpleNamespace(fitted=SimpleNamespace(free=sides)))
     standing = SimpleNamespace(axis=0)
     new = SimpleNamespace(name="new")
-    state = SimpleNamespace(
+    state = StateStub(
         model=SimpleNamespace(free=[SOFT, PLAY]),
         standings_of=lambda _cause: (),
         rounds=[SimpleNamespace(standings=())],
