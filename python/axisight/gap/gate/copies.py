@@ -12,6 +12,7 @@ from axisight.logs import Log
 
 Hashes = NDArray[np.uint64]
 
+# Bits of the finalizer of MurmurHash3 (Appleby, public domain).
 _SHIFT = np.uint64(33)
 # Rows of different runs agree to the last bit where sensors are coarse and the machine rests, at
 # most; rows with noise never do.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+# Waves per turn of the motor [1]: slots and poles of servo motors give no higher ones of any size.
 HIGHEST_ORDER = 80
 # Waves are left out where they come near the Nyquist frequency of the residual.
 _OF_NYQUIST = 0.8

@@ -50,6 +50,7 @@ def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
     return start
 
 
+# Of the top speed of an axis: the corner of dry friction, and the speed over which friction falls.
 _SMOOTHING = 0.003
 _STRIBECK = 0.1
 # Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load; over more of that of

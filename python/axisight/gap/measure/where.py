@@ -17,6 +17,7 @@ from axisight.logs import Log, lowpass
 
 Array = NDArray[np.float64]
 
+# Edges of the bands of the gap map [Hz]: rigid motion, its harmonics, the modes of arms, those of gears and drives.
 BAND_EDGES_HZ = (0.0, 0.5, 2.0, 6.0, 15.0, 40.0, 125.0)
 # Shares below this are not worth a line of their own.
 _SMALLEST_SHARE = 0.1

@@ -18,6 +18,7 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
+# Length of an experiment [s]: some periods of the slowest motion, and short enough to repeat.
 SECONDS = 8.0
 # Of a standard multisine, and of one as wide as residuals are looked at.
 _BAND_HZ = (1.0, 40.0)

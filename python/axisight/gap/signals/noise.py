@@ -13,6 +13,7 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
+# Samples of a segment of which densities are averaged (Welch 1967).
 _SEGMENT = 2048
 # Samples of a log of which a tenth of the lines say little.
 _SHORT = 4000

@@ -19,7 +19,9 @@ _VELOCITY_REF = {
     "velocity_ref_in_rev_s": 0.5 / math.pi,
     "velocity_ref_in_mrad_s": 1000.0,
 }
+# Factors of torques in other units [1].
 _TORQUE = {"torque_in_mnm": 1000.0, "torque_in_knm": 0.001}
+# Bits of an encoder per turn of the motor: catalogues have none with fewer or more.
 _LEAST_COUNT_BITS = 8
 _MOST_COUNT_BITS = 30
 

@@ -43,6 +43,7 @@ class AxisSizes:
         return np.inf if self.stiffness is None else self.torque_nm / self.ratio / self.stiffness
 
 
+# What is a lot on an axis, by the unit of an amplitude.
 _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "Nm": lambda a: a.torque_nm,
     "Nm s/rad": lambda a: a.torque_nm / a.speed_rad_s,

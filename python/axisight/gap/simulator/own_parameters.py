@@ -20,6 +20,7 @@ from axisight.robot import Robot
 
 UNKNOWN = 1.0
 """Tolerance of a constant that nobody knows, relative [1]: one standard deviation is a factor of two."""
+# Effects of the core that stand for parameters of the simulator, and their parameters.
 _CONSTANT = TORQUE_CONSTANT[0]
 _FIRST, _SECOND = OTHER_GAINS[1]
 # Parameter of the effect of other gains by gain, of the controllers whose gains may have a tolerance.

@@ -163,6 +163,7 @@ def _place(axes: Sequence[int], n_axes: int) -> str:
     return f"on {'axis' if len(axes) == 1 else 'axes'} {listed([str(a) for a in axes])}"
 
 
+# Numbers of axes in words.
 _COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 

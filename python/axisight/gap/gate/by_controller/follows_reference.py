@@ -20,6 +20,7 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
+# References and positions are compared below this frequency [Hz]: loops of arms follow up to some ten hertz.
 _BAND_HZ = 20.0
 # An axis at a torque limit for most of a log still correlates with its reference by 0.94.
 _FOLLOWS = 0.9

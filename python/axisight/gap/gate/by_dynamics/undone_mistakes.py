@@ -17,6 +17,7 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
+# What a position in a wrong unit has to be multiplied by [rad].
 _UNITS = {
     "position_in_degrees": math.pi / 180.0,
     "position_in_revolutions": 2.0 * math.pi,
