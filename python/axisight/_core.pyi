@@ -5,7 +5,8 @@ arguments must be float64 (other types raise TypeError). Units are SI; "axis" me
 axis, "joint" any joint of the chain. On a prismatic axis rad reads m and Nm reads N. Axes of
 effects count from 1; indices of joints, logs, effects and parameters in lists count from 0.
 
-Misuse raises `axisight.errors.InputError` naming the field. Calls that take ``cancel`` release
+Misuse raises `axisight.errors.InputError` naming the field; a model that a fit of logs cannot simulate is
+an answer, `Diverged`. Calls that take ``cancel`` release
 the interpreter lock and raise KeyboardInterrupt on Ctrl-C. After `CancelToken.cancel` a
 simulation returns early with status "cancelled" and a fit raises KeyboardInterrupt.
 """
@@ -20,6 +21,7 @@ __all__ = [
     "CancelToken",
     "Column",
     "Courses",
+    "Diverged",
     "FitResult",
     "FrequencyFitResult",
     "Linearization",
@@ -417,6 +419,24 @@ class Courses:
     """Runs of a model over all logs, for models close to it; see `courses`."""
 
 @final
+class Diverged:
+    """A model that does not hold: an answer of a fit, no misuse. Its text says why.
+
+    It cannot be run along some log (unstable, too stiff), or not at all (no equilibrium, a link without mass,
+    an axis that lacks what an effect needs).
+    """
+
+    def __new__(
+        cls, reason: str, logs: Sequence[int] = ..., sample: int | None = None
+    ) -> Diverged: ...
+    @property
+    def logs(self) -> list[int]:
+        """The logs (from 0) that ran in lock-step, one of which diverged; empty without a run."""
+    @property
+    def sample(self) -> int | None:
+        """The sample (from 0) at which one did; None without a run."""
+
+@final
 class FitResult:
     """Result of a fit. Arrays are copies.
 
@@ -763,7 +783,7 @@ def fit_simulation(
     warm: Sequence[tuple[int, Column]] = ...,
     courses: Courses | None = None,
     cancel: CancelToken | None = None,
-) -> FitResult:
+) -> FitResult | Diverged:
     """Fit a free-running simulation to logs.
 
     ``records`` are (input, target, certainty, start, lead), the first three of shape (n_samples, n_axes), one
@@ -786,7 +806,7 @@ def fit_inverse_dynamics(
     *,
     warm: Sequence[tuple[int, Column]] = ...,
     cancel: CancelToken | None = None,
-) -> FitResult:
+) -> FitResult | Diverged:
     """Fit the torque predicted from measured motions, transmissions taken as rigid.
 
     ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm],
@@ -809,7 +829,7 @@ def evaluate_simulation(
     warm: Sequence[tuple[int, Column]] = ...,
     courses: Courses | None = None,
     cancel: CancelToken | None = None,
-) -> Linearization:
+) -> Linearization | Diverged:
     """Compare a free-running simulation with logs at the initial values of the parameters.
 
     Arguments as for `fit_simulation`; columns of parameters in ``warm`` are taken from there.
@@ -826,7 +846,7 @@ def courses(
     input: Literal["reference", "torque", "tracking"] = "reference",
     output: Literal["torque", "position"] = "torque",
     cancel: CancelToken | None = None,
-) -> Courses:
+) -> Courses | Diverged:
     """Run a model over all logs, at the initial values of the parameters.
 
     Arguments as for `fit_simulation`. Models close to it are then evaluated with the arm
@@ -844,7 +864,7 @@ def evaluate_inverse_dynamics(
     *,
     warm: Sequence[tuple[int, Column]] = ...,
     cancel: CancelToken | None = None,
-) -> Linearization:
+) -> Linearization | Diverged:
     """Predict the torque of measured motions at the initial values of the parameters.
 
     Arguments as for `fit_inverse_dynamics`; the residual is prediction minus measurement.

@@ -1,6 +1,7 @@
 """The borders of the package's rooms: few loose files, no circles, one way to the compiled robot."""
 
 import ast
+from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -96,6 +97,53 @@ def test_rooms_of_the_diagnosis_are_small_and_say_what_they_are(modules: dict[st
         said = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8")))
         assert said and "\n" not in said and said.endswith("."), f"{folder}: one sentence"
     assert len(imports(gap / "pipeline.py", modules)) <= MOST_IMPORTS
+
+
+# Rooms where a simulation that diverges is an answer: what raises there is misuse, and is to be seen.
+FITTING_ROOMS = ("fit", "measure", "ranking", "screening", "search", "verdict", "views")
+MISUSE = {"InputError", "AxisightError", "ValueError", "Exception", "BaseException"}
+
+
+def caught(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Names of what is caught and not raised again, with their lines."""
+    for node in ast.walk(tree):
+        kinds: list[ast.expr | None] = []
+        if isinstance(node, ast.ExceptHandler):
+            again = isinstance(node.body[-1], ast.Raise) and node.body[-1].exc is None
+            kinds = [] if again else [node.type or ast.Name("BaseException")]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("suppress"):
+            kinds = [*node.args]
+        for kind in kinds:
+            named = kind.elts if isinstance(kind, ast.Tuple) else [kind]
+            yield from ((node.lineno, ast.unparse(n).rpartition(".")[2]) for n in named if n)
+
+
+def test_no_room_that_fits_catches_misuse(modules: dict[str, Path]) -> None:
+    gap = modules["axisight.gap"].parent
+    for name in FITTING_ROOMS:
+        for path in (gap / name).rglob("*.py"):
+            for line, kind in caught(ast.parse(path.read_text("utf-8"))):
+                assert kind not in MISUSE, f"{path}:{line}: misuse would vanish here"
+
+
+def test_what_is_caught_is_found() -> None:
+    code = """
+with suppress(InputError, KeyError):
+    pass
+try:
+    pass
+except (errors.InputError, OSError):
+    pass
+except:
+    pass
+try:
+    pass
+except BaseException:
+    stop()
+    raise
+"""
+    found = [kind for _, kind in caught(ast.parse(code))]
+    assert sorted(found) == ["BaseException", "InputError", "InputError", "KeyError", "OSError"]
 
 
 def test_package_stands_without_the_study(modules: dict[str, Path]) -> None:

@@ -3,14 +3,14 @@
 use crate::convert::rows;
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, InputError, detached, flag, input_error};
-use crate::fit_results::{Column, FitResult, Linearization};
+use crate::fit_results::{Column, Ended, FitResult, Linearization, problem_error};
 use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
 use axisight_core::robot::{Parameter, RobotDescription};
 use axisight_identification::logs::{
     Column as Shared, Courses as Runs, FitOptions, FitParameter, InverseDynamics,
-    Linearization as Point, Loss, MotionRecord, Problem, ProblemError, Record,
-    SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
+    Linearization as Point, Loss, MotionRecord, Problem, Record, SimulationErrorProblem,
+    SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_numerics::Weighting;
 use axisight_numerics::descent::Status;
@@ -134,13 +134,6 @@ fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Shared)> {
     warm.iter().map(shared).collect()
 }
 
-fn problem_error(e: ProblemError) -> PyErr {
-    match e {
-        ProblemError::Cancelled => pyo3::exceptions::PyKeyboardInterrupt::new_err("cancelled"),
-        other => input_error(other),
-    }
-}
-
 fn solve<P: Problem + Send>(
     py: Python<'_>,
     cancel: &AtomicBool,
@@ -148,12 +141,10 @@ fn solve<P: Problem + Send>(
     parameters: &[FitParameter],
     options: FitOptions,
     warm: &[WarmColumn<'_>],
-) -> PyResult<FitResult> {
+) -> PyResult<Ended<FitResult>> {
     let warm = warm_columns(warm);
     let fit = detached(py, cancel, || fit(problem, parameters, options, &warm))?;
-    Ok(FitResult {
-        fit: fit.map_err(problem_error)?,
-    })
+    Ended::of(fit.map(|fit| FitResult { fit }))
 }
 
 fn linearize<P: Problem + Send>(
@@ -163,12 +154,10 @@ fn linearize<P: Problem + Send>(
     parameters: &[FitParameter],
     loss: Loss,
     warm: &[WarmColumn<'_>],
-) -> PyResult<Linearization> {
+) -> PyResult<Ended<Linearization>> {
     let warm = warm_columns(warm);
     let at = detached(py, cancel, || Point::new(problem, parameters, loss, &warm))?;
-    Ok(Linearization {
-        at: at.map_err(problem_error)?,
-    })
+    Ended::of(at.map(|at| Linearization { at }))
 }
 
 /// Input, target and certainty of a record, arrays `(n, n_axes)`, driven joint angles where it begins,
@@ -266,7 +255,7 @@ pub fn fit_simulation(
     warm: Vec<WarmColumn<'_>>,
     courses: Option<&Bound<'_, Courses>>,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<FitResult> {
+) -> PyResult<Ended<FitResult>> {
     let cancel = flag(cancel);
     let spec = SimulationSpec {
         robot,
@@ -302,7 +291,7 @@ pub fn evaluate_simulation(
     warm: Vec<WarmColumn<'_>>,
     courses: Option<&Bound<'_, Courses>>,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Linearization> {
+) -> PyResult<Ended<Linearization>> {
     let cancel = flag(cancel);
     let spec = SimulationSpec {
         robot,
@@ -336,7 +325,7 @@ pub fn courses(
     input: &str,
     output: &str,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Courses> {
+) -> PyResult<Ended<Courses>> {
     let cancel = flag(cancel);
     let spec = SimulationSpec {
         robot,
@@ -352,8 +341,9 @@ pub fn courses(
     let problem = spec.problem(&cancel)?;
     let theta: Vec<f64> = problem.parameters.iter().map(|p| p.initial).collect();
     let runs = detached(py, &cancel, || Runs::new(&problem, &theta))?;
-    let runs = runs.map_err(problem_error)?.map(Arc::new);
-    Ok(Courses { runs })
+    Ended::of(runs.map(|runs| Courses {
+        runs: runs.map(Arc::new),
+    }))
 }
 
 /// A motion as (position, velocity, acceleration, torque, certainty), each `(n, n_axes)`, motor side.
@@ -409,7 +399,7 @@ pub fn fit_inverse_dynamics(
     options: OptionSpec,
     warm: Vec<WarmColumn<'_>>,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<FitResult> {
+) -> PyResult<Ended<FitResult>> {
     let (robot, block_s) = (&robot.description, options.block_s);
     let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
     let options = self::options(&options)?;
@@ -431,7 +421,7 @@ pub fn evaluate_inverse_dynamics(
     options: OptionSpec,
     warm: Vec<WarmColumn<'_>>,
     cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Linearization> {
+) -> PyResult<Ended<Linearization>> {
     let (robot, block_s) = (&robot.description, options.block_s);
     let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
     let loss = loss(&options)?;

@@ -2,10 +2,73 @@
 
 use crate::convert::{array1, array2, array3};
 use crate::entry::input_error;
-use axisight_identification::logs::{BlockGram, Column as Shared, Fit, Linearization as Point};
+use axisight_identification::logs::{
+    BlockGram, Column as Shared, Divergence, Fit, Linearization as Point, ProblemError,
+};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::sync::Arc;
+
+/// A model that does not hold: it cannot be run along some of the logs, or not at all.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct Diverged {
+    divergence: Divergence,
+}
+
+#[pymethods]
+impl Diverged {
+    #[new]
+    #[pyo3(signature = (reason, logs=Vec::new(), sample=None))]
+    fn new(reason: String, logs: Vec<usize>, sample: Option<usize>) -> Self {
+        Self {
+            divergence: Divergence {
+                records: logs,
+                sample,
+                reason,
+            },
+        }
+    }
+    #[getter]
+    fn logs(&self) -> Vec<usize> {
+        self.divergence.records.clone()
+    }
+    #[getter]
+    fn sample(&self) -> Option<usize> {
+        self.divergence.sample
+    }
+    fn __str__(&self) -> String {
+        self.divergence.to_string()
+    }
+    fn __repr__(&self) -> String {
+        format!("Diverged({:?})", self.divergence.reason)
+    }
+}
+
+/// What a model gives that holds, or that it does not.
+#[derive(IntoPyObject)]
+pub enum Ended<T> {
+    Holds(T),
+    Diverged(Diverged),
+}
+
+impl<T> Ended<T> {
+    /// Misuse and Ctrl-C raise.
+    pub fn of(outcome: Result<T, ProblemError>) -> PyResult<Self> {
+        match outcome {
+            Ok(found) => Ok(Self::Holds(found)),
+            Err(ProblemError::Diverged(divergence)) => Ok(Self::Diverged(Diverged { divergence })),
+            Err(other) => Err(problem_error(other)),
+        }
+    }
+}
+
+/// An error that is no divergence.
+pub fn problem_error(e: ProblemError) -> PyErr {
+    match e {
+        ProblemError::Cancelled => pyo3::exceptions::PyKeyboardInterrupt::new_err("cancelled"),
+        other => input_error(other),
+    }
+}
 
 /// Log, axis, start and length of a block.
 type BlockTuple = (usize, usize, usize, usize);

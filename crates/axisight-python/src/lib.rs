@@ -41,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<entry::CancelToken>()?;
     module.add_class::<fit_results::Column>()?;
     module.add_class::<fit::Courses>()?;
+    module.add_class::<fit_results::Diverged>()?;
     module.add_class::<fit_results::FitResult>()?;
     module.add_class::<fit_results::Linearization>()?;
     module.add_function(wrap_pyfunction!(effects::effect_table, module)?)?;

@@ -14,6 +14,7 @@ from axisight import _core
 from axisight.display import html
 from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import Integrator
@@ -272,7 +273,7 @@ def fit(
     simulation is driven by the logged torque and positions are compared.
     Effect parameters refer to positions in ``effects``. The robot's own effects
     act too, but for those that one in ``effects`` replaces: same name, same axis.
-    Raises InputError for misuse; non-convergence is a status.
+    Raises InputError for misuse, and for a start that cannot be simulated; non-convergence is a status.
     """
     chosen = options or FitOptions()
     added = list(effects)
@@ -287,6 +288,11 @@ def fit(
         input="reference" if closed else "torque",
         output="torque" if closed else "position",
     )
+    if isinstance(result, Diverged):
+        raise InputError(
+            f"parameters: expected initial values that can be simulated, got some where {result}; "
+            "start nearer to the machine, or integrate in smaller steps"
+        )
     return fitted(result, parameters, added)
 
 

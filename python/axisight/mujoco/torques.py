@@ -13,6 +13,7 @@ from axisight.effects import Effect, core_effects, effect_info
 from axisight.effects.stated import WITH_MEMORY
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Weighting
+from axisight.fitting.divergence import must_hold
 from axisight.robot import Robot
 from axisight.simulation import Integrator
 
@@ -110,7 +111,7 @@ class EffectTorques:
             self._options,
         )
         # Of motors that move such a load, less what it needs without effects.
-        asked = found.residual.reshape(self.n, -1).T + command
+        asked = must_hold(found).residual.reshape(self.n, -1).T + command
         return np.asarray(load - asked / self.ratio)
 
     def of_command(self, command: Array) -> Array:

@@ -280,7 +280,7 @@ fn courses_that_end_too_early_are_refused() {
         ..exact.clone()
     }
     .evaluate(&start(&exact), &[]);
-    let Err(ProblemError::Failed(text)) = error else {
+    let Err(ProblemError::Misuse(text)) = error else {
         panic!("{error:?}")
     };
     // Of the logs in one batch or in the other, whichever is found first.

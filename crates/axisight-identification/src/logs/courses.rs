@@ -69,7 +69,7 @@ impl Courses {
     /// Runs of `problem` at `theta`; `None` where its arm cannot be linearised along them.
     ///
     /// # Errors
-    /// [`ProblemError::Failed`] where the model does not hold.
+    /// [`ProblemError::Diverged`] where the model does not hold.
     pub fn new(
         problem: &SimulationErrorProblem,
         theta: &[f64],
@@ -88,7 +88,10 @@ impl Courses {
             }
             Ok(Batch { course, excess })
         };
-        let batches = batches.par_iter().map(batch).collect::<Result<_, _>>()?;
+        let batches = batches
+            .par_iter()
+            .map(batch)
+            .collect::<Result<_, ProblemError>>()?;
         Ok(Some(Self { batches }))
     }
 

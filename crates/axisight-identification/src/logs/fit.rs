@@ -472,6 +472,7 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
                 Ok(Some((loss + self.prior_loss(&theta), trial)))
             }
             Err(ProblemError::Cancelled) => Err(ProblemError::Cancelled),
+            // Misuse has shown at the start: what fails here does so by its parameters.
             Err(_) => Ok(None),
         }
     }

@@ -10,7 +10,7 @@ use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
 };
 use axisight_core::effects::{CoupledAxis, Motor};
-use axisight_core::plant::{Axis, Plant, PlantError, assemble};
+use axisight_core::plant::{Axis, Plant, assemble};
 use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Scalar};
@@ -100,14 +100,13 @@ impl InverseDynamics {
     ) -> Result<Vec<Vec<Vec<f64>>>, ProblemError> {
         let (overrides, settings) =
             seeded::<S>(&self.parameters, &self.effects, theta, seeds, S::seeded);
-        let failed = |e: PlantError| ProblemError::Failed(e.to_string());
-        let plant = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
+        let plant = assemble(&self.robot, &overrides, &settings)?;
         if plant.arm_carries_derivatives() {
             return Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plant)));
         }
         let (overrides, settings) =
             seeded::<f64>(&self.parameters, &self.effects, theta, &[], f64::seeded);
-        let plain = assemble(&self.robot, &overrides, &settings).map_err(failed)?;
+        let plain = assemble(&self.robot, &overrides, &settings)?;
         Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plain)))
     }
 

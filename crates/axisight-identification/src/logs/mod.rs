@@ -1,6 +1,7 @@
 //! Fitting: residuals of several logs, exact sensitivities, the search for their least squares.
 
 mod courses;
+mod divergence;
 mod fit;
 mod gram;
 mod inverse_dynamics;
@@ -12,6 +13,7 @@ mod problem;
 mod simulation_error;
 
 pub use courses::Courses;
+pub use divergence::Divergence;
 pub use fit::{Fit, FitOptions, fit};
 pub use gram::{Block, BlockGram};
 pub use inverse_dynamics::{InverseDynamics, MotionRecord};

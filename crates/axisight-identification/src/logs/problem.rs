@@ -1,6 +1,7 @@
 //! What a fit needs to know of a problem.
 
 use super::courses::Runs;
+use super::divergence::Divergence;
 use super::gram::Block;
 use axisight_core::robot::{EffectSetting, Parameter};
 use axisight_numerics::Weighting;
@@ -65,7 +66,7 @@ impl Evaluation {
         if self.residual.iter().all(|r| r.is_finite()) {
             Ok(self)
         } else {
-            Err(ProblemError::Failed("a residual is not finite".into()))
+            Err(ProblemError::does_not_hold(&"a residual is not finite"))
         }
     }
 }
@@ -73,12 +74,15 @@ impl Evaluation {
 /// Why a problem cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {
-    /// The model does not hold at these parameters (unstable, too stiff, no equilibrium).
-    #[error("the simulation failed: {0}")]
-    Failed(String),
+    /// The model does not hold at these parameters (unstable, too stiff, no equilibrium): no misuse.
+    #[error(transparent)]
+    Diverged(Divergence),
     /// Another thread asked to stop.
     #[error("cancelled")]
     Cancelled,
+    /// Misuse that building or running the model shows.
+    #[error("{0}")]
+    Misuse(String),
     /// Misuse, also at the first evaluation.
     #[error("{field}: expected {expected}, got {got}")]
     Invalid {
@@ -126,12 +130,12 @@ pub trait Problem: Sync {
     /// Residuals at `theta` and their derivatives with respect to the parameters `columns`.
     ///
     /// # Errors
-    /// [`ProblemError::Failed`] where the model does not hold.
+    /// [`ProblemError::Diverged`] where the model does not hold.
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError>;
     /// The same where an evaluation at `theta` is known, whose `runs` may save a simulation.
     ///
     /// # Errors
-    /// [`ProblemError::Failed`] where the model does not hold.
+    /// [`ProblemError::Diverged`] where the model does not hold.
     fn differentiate(
         &self,
         theta: &[f64],

@@ -110,10 +110,6 @@ type Keep<'a, S> = &'a mut dyn FnMut(&[S]);
 /// Series per lane and axis, value and derivatives: `[quantity][lane * axes + axis][sample]`.
 pub(super) type Traces = Vec<Vec<Vec<f64>>>;
 
-fn failed(e: &dyn std::fmt::Display) -> ProblemError {
-    ProblemError::Failed(e.to_string())
-}
-
 /// The arm in a run.
 pub(super) enum Arm<'a> {
     /// As it is.
@@ -182,7 +178,7 @@ impl SimulationErrorProblem {
         seed: impl Fn(S, usize) -> S,
     ) -> Result<Plant<S>, ProblemError> {
         let (overrides, settings) = seeded(&self.parameters, &self.effects, theta, seeds, seed);
-        assemble(&self.robot, &overrides, &settings).map_err(|e| failed(&e))
+        Ok(assemble(&self.robot, &overrides, &settings)?)
     }
 
     /// The plant without derivatives.
@@ -282,14 +278,14 @@ impl SimulationErrorProblem {
                 }
             }
         };
-        match simulate(plant, &run, stepper, &mut observe).map_err(|e| failed(&e))? {
-            Status::Completed => Ok(traces),
-            Status::Cancelled(_) => Err(ProblemError::Cancelled),
-            Status::Diverged(k) => Err(failed(&format!("diverged at sample {k}"))),
-            Status::StepSizeCollapsed(k) => {
-                Err(failed(&format!("step size collapsed at sample {k}")))
-            }
-        }
+        let (sample, what) = match simulate(plant, &run, stepper, &mut observe)? {
+            Status::Completed => return Ok(traces),
+            Status::Cancelled(_) => return Err(ProblemError::Cancelled),
+            Status::Diverged(k) => (k, "diverged"),
+            Status::StepSizeCollapsed(k) => (k, "step size collapsed"),
+        };
+        let reason = format!("{what} at sample {sample}");
+        Err(ProblemError::diverged(records, Some(sample), &reason))
     }
 
     /// Model output of the logs `records` with derivatives along `seeds`.
@@ -319,7 +315,7 @@ impl SimulationErrorProblem {
         let plant = self.plant::<S>(theta, seeds, |number, seed| packing.seeded(number, seed))?;
         let mut stepper = match arm {
             Arm::Exact => Stepper::new(&plant),
-            Arm::Along(course) => Stepper::along(&plant, course).map_err(|e| failed(&e))?,
+            Arm::Along(course) => Stepper::along(&plant, course)?,
         };
         self.traces(records, &plant, &mut stepper, seeds.len(), None)
     }

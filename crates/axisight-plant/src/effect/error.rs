@@ -31,6 +31,16 @@ pub enum EffectError {
         /// What came.
         got: String,
     },
+    /// An axis of this robot lacks what an effect needs there, or has what excludes it.
+    #[error("effect `{effect}`: expected {expected}, got {got}")]
+    Lacking {
+        /// Effect.
+        effect: &'static str,
+        /// What the effect needs.
+        expected: String,
+        /// The axis, and what it lacks or has.
+        got: String,
+    },
     /// A kernel asks for something its point of action has not.
     #[error("effect `{effect}`: expected {expected} where it acts, got {got}")]
     Unsupported {

@@ -199,7 +199,7 @@ impl<S: Scalar> Plant<S> {
         let own = self.with_states(own);
         let link = self.link(index);
         let axis = &mut self.axes[index];
-        let needs = |expected: &str, lack: &str| EffectError::Axis {
+        let needs = |expected: &str, lack: &str| EffectError::Lacking {
             effect: info.name,
             expected: expected.to_owned(),
             got: format!("{} ({lack})", Place::Axis(index)),

@@ -224,7 +224,7 @@ fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
     for (i, axis) in plant.axes.iter().enumerate() {
         let lead = axis.led_by.iter().find(turns);
         if let (None, Some(lead)) = (&axis.gear, lead) {
-            return Err(EffectError::Axis {
+            return Err(EffectError::Lacking {
                 effect: lead.effect,
                 expected: "a compliant transmission of the axis that is turned along".to_owned(),
                 got: format!("axis {} (rigid)", i + 1),

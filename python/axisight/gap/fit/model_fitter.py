@@ -20,6 +20,7 @@ from axisight.fitting import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.rank_deficiency import deviations_seen
 from axisight.gap.simulator.natural_sizes import NaturalSizes
@@ -48,6 +49,7 @@ class _Setup:
 class ModelFitter(ABC):
     """Fits models to one set of logs; subclasses say by which error.
 
+    A model that cannot be simulated is an answer, `Diverged`; misuse raises InputError.
     ``adds_up``: effects of an axis add up in the error, and hide one another where several are
     missing: they are tried in pairs too.
     """
@@ -112,7 +114,7 @@ class ModelFitter(ABC):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
-    ) -> _core.FitResult:
+    ) -> _core.FitResult | Diverged:
         """Run the fit in the core, around the runs ``near`` if there are any."""
 
     @abstractmethod
@@ -123,7 +125,7 @@ class ModelFitter(ABC):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
-    ) -> _core.Linearization:
+    ) -> _core.Linearization | Diverged:
         """Evaluate the model in the core, at the initial values."""
 
     def part(self, logs: Sequence[int]) -> ModelFitter:
@@ -156,6 +158,8 @@ class ModelFitter(ABC):
             model.free, replace(model, columns=cut), None, [True] * len(model.free), lazy=True
         )
         found = other._solved(setup, model.free, other._options(), None, renewed=model.renewed)
+        if isinstance(found, Diverged):
+            return None
         # The very same values: fits of what this model screens begin at those of the whole.
         same = replace(found, robot_values=model.robot_values, log=np.unique(model.log)[found.log])
         return other, same
@@ -175,7 +179,7 @@ class ModelFitter(ABC):
 
     def runs(
         self, model: FittedModel, robot_values: Mapping[str, float] | None = None
-    ) -> _core.Courses | None:
+    ) -> _core.Courses | Diverged | None:
         """Return runs of a model around which others close to it cost less; None without any.
 
         ``robot_values``: the simulator's own parameters, where they are not the model's.
@@ -189,7 +193,7 @@ class ModelFitter(ABC):
 
     def run(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
-    ) -> _core.Courses | None:
+    ) -> _core.Courses | Diverged | None:
         """Run the model in the core, at the initial values."""
         del effects, parameters, options
         return None
@@ -206,7 +210,7 @@ class ModelFitter(ABC):
         refreshes: int = 0,
         fresh: bool = False,
         worth: float | None = None,
-    ) -> FittedModel:
+    ) -> FittedModel | Diverged:
         """Fit the simulator's own parameters and the effects ``free``.
 
         An effect that the robot has itself is replaced by the free one of its label.
@@ -239,8 +243,10 @@ class ModelFitter(ABC):
         near: _core.Courses | None,
         *,
         renewed: bool,
-    ) -> FittedModel:
+    ) -> FittedModel | Diverged:
         result = self.solve(*self._for_core(setup), options, setup.warm, near)
+        if isinstance(result, Diverged):
+            return result
         return _evidence(result, setup, list(free), renewed=renewed, counted=self.counted())
 
     def evaluate(
@@ -250,7 +256,7 @@ class ModelFitter(ABC):
         *,
         robot_values: Mapping[str, float] | None = None,
         near: _core.Courses | None = None,
-    ) -> NormalEquations:
+    ) -> NormalEquations | Diverged:
         """Return the model where a lazy `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
         return self._evaluated(setup, near)
@@ -262,15 +268,16 @@ class ModelFitter(ABC):
         *,
         robot_values: Mapping[str, float] | None = None,
         near: _core.Courses | None = None,
-    ) -> float:
+    ) -> float | Diverged:
         """Return the loss where a `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
         fixed = [replace(p, frozen=True) for p in setup.parameters]
-        return self._evaluated(replace(setup, parameters=fixed, warm=[]), near).total
+        found = self._evaluated(replace(setup, parameters=fixed, warm=[]), near)
+        return found if isinstance(found, Diverged) else found.total
 
     def evaluate_each(
         self, options: Sequence[Hypothesis], start: FittedModel, near: _core.Courses | None = None
-    ) -> list[NormalEquations]:
+    ) -> list[NormalEquations] | Diverged:
         """Return what `evaluate` would for each of several effects that do nothing as they are.
 
         They do not disturb one another: one evaluation serves all. One that stands in for a
@@ -279,14 +286,18 @@ class ModelFitter(ABC):
         free, n = [*start.free, *options], len(start.free)
         setup = self._setup(free, start, None, [True] * len(free), lazy=True, fixed_by=start.free)
         together = self._evaluated(setup, near)
+        if isinstance(together, Diverged):
+            return together
         return [
             together.without(n + i, among=range(n, len(free)), fixed=self.replaced([option]))
             for i, option in enumerate(options)
         ]
 
-    def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> NormalEquations:
+    def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> NormalEquations | Diverged:
         options = self._options()
         result = self.linearize(*self._for_core(setup), options, setup.warm, near)
+        if isinstance(result, Diverged):
+            return result
         return replace(_linearized(result, setup), jacobian=tuple(result.columns))
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.measure.gap_figures import Stage
@@ -53,7 +54,7 @@ def _of_axes(found: SearchState, fitter: ModelFitter, axes: set[int]) -> SearchS
     if len(kept) == len(found.model.free):
         return found
     out = replace(found, steps=[*found.steps])
-    out.moved("own_axes", settled(fitter, kept, found.model))
+    out.moved("own_axes", must_hold(settled(fitter, kept, found.model)))
     return out
 
 

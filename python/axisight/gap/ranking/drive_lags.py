@@ -12,7 +12,7 @@ import numpy as np
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import CURRENT_LOOP, TRANSPORT_DELAY
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis
@@ -54,21 +54,16 @@ def ended(
     loop = found.get(CURRENT_LOOP[0])
     begun = None if delay is None else _as_delay(delay, options)
     if delay is not None and begun is not None and (loop is None or loop.total > delay.total):
-        try:
-            again = fitter.fit(begun, delay, fresh=True, max_iterations=_STEPS, worth=_WORTH)
-        except InputError:
-            # No loop holds there: what there is stays.
-            return list(found.values())
-        if loop is None or again.total < loop.total:
+        again = fitter.fit(begun, delay, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+        # Where no loop holds, what there is stays.
+        if not isinstance(again, Diverged) and (loop is None or again.total < loop.total):
             found[CURRENT_LOOP[0]] = again
     return list(found.values())
 
 
 def _ended(fitter: ModelFitter, fitted: FittedModel) -> FittedModel:
-    try:
-        return fitter.fit(fitted.free, fitted, fresh=True, max_iterations=_STEPS, worth=_WORTH)
-    except InputError:
-        return fitted
+    found = fitter.fit(fitted.free, fitted, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+    return fitted if isinstance(found, Diverged) else found
 
 
 def _as_delay(delay: FittedModel, options: Sequence[Hypothesis]) -> list[Hypothesis] | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -15,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from axisight._core import Courses
 from axisight.effects import effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.held_out import linear_falls, linear_gain
@@ -79,19 +78,22 @@ class ScreeningModel:
     @cached_property
     def near(self) -> Courses | None:
         """Runs of the model."""
-        return self.fitter.runs(self.model)
+        return self._runs(self.model.robot_values)
 
     def begin_nominal(self) -> None:
         """Get ready for candidates that begin at the nominal values of the simulator's own parameters.
 
         Where it cannot be simulated with these alone, candidates are tried without runs to follow.
         """
-        with suppress(InputError):
-            self.near_nominal = self.fitter.runs(self.model, {})
+        self.near_nominal = self._runs({})
+
+    def _runs(self, values: Mapping[str, float]) -> Courses | None:
+        runs = self.fitter.runs(self.model, values)
+        return None if isinstance(runs, Diverged) else runs
 
     def attempt(
         self,
-        solve: Callable[..., A],
+        solve: Callable[..., A | Diverged],
         option: Hypothesis,
         values: Mapping[str, float] | None,
         *,
@@ -108,11 +110,11 @@ class ScreeningModel:
         # Runs serve where the simulator's own parameters are those of the runs, or near them.
         as_model = close or values is None or values == self.model.robot_values
         near = self.near if as_model else self.near_nominal
-        try:
-            return solve(effects, self.model, robot_values=values, near=near)
-        except InputError as error:
-            self.skipped[option.effect.label] = str(error)
+        found = solve(effects, self.model, robot_values=values, near=near)
+        if isinstance(found, Diverged):
+            self.skipped[option.effect.label] = str(found)
             return None
+        return found
 
 
 class Screening:
@@ -194,9 +196,10 @@ class Screening:
 
     def _run(self, group: Sequence[Hypothesis]) -> list[NormalEquations | None]:
         if len(group) > 1:
+            together = self.fitter.evaluate_each(group, self.model, self.bench.near)
             # One that cannot be simulated leaves all to be tried alone.
-            with suppress(InputError):
-                return list(self.fitter.evaluate_each(group, self.model, self.bench.near))
+            if not isinstance(together, Diverged):
+                return list(together)
         return [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
 
     def _best_start(self, option: Hypothesis, fitted: NormalEquations | None) -> Start:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
@@ -92,7 +92,7 @@ def settled(
     rough: ModelFitter | None = None,
     max_iterations: int = 6,
     worth: float | None = None,
-) -> FittedModel:
+) -> FittedModel | Diverged:
     """Return a fit with sensitivities of its own, as often renewed as it needs.
 
     ``rough``: the same for part of the data, which brings what bends the simulator most of the way;
@@ -102,16 +102,18 @@ def settled(
         return _renewed(fitter, start, max_iterations)
     renewals = _RENEWALS
     if rough is not None:
-        with suppress(InputError):
-            start = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
-            free, renewals = start.free, 0
+        begun = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
+        if not isinstance(begun, Diverged):
+            start, free, renewals = begun, begun.free, 0
     found = fitter.fit(free, start, refreshes=renewals, worth=worth)
     return _renewed(fitter, found, max_iterations)
 
 
-def _renewed(fitter: ModelFitter, found: FittedModel, max_iterations: int) -> FittedModel:
+def _renewed(
+    fitter: ModelFitter, found: FittedModel | Diverged, max_iterations: int
+) -> FittedModel | Diverged:
     """Return a fit, with sensitivities renewed at every step where it has not settled without."""
-    if _has_settled(found):
+    if isinstance(found, Diverged) or _has_settled(found):
         return found
     return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
 
@@ -299,20 +301,22 @@ class SearchRound:
         ``values``: where the simulator's own parameters begin.
         """
         part = self.rough or self.fitter
-        try:
-            free = [*leader.free[:-1], option]
-            found = part.fit(free, leader, robot_values=values, refreshes=_RENEWALS)
+        free = [*leader.free[:-1], option]
+        found = part.fit(free, leader, robot_values=values, refreshes=_RENEWALS)
+        if not isinstance(found, Diverged):
             found = settled(part, found.free, found)
-            if part is not self.fitter:
-                found = self._looked_at(found)
-        except InputError as error:
-            self.skipped.setdefault(option.effect.label, str(error))
+        if part is not self.fitter and not isinstance(found, Diverged):
+            found = self._looked_at(found)
+        if isinstance(found, Diverged):
+            self.skipped.setdefault(option.effect.label, str(found))
             return None
         return trial(option, found, self.model)
 
-    def _looked_at(self, begun: FittedModel) -> FittedModel:
+    def _looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
         """Return a fit to part of the data as all of them have it."""
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
+        if isinstance(found, Diverged):
+            return found
         # What is taken in is fitted on where it has not settled.
         return replace(found, renewed=found.renewed and _has_settled(found))
 
@@ -461,14 +465,15 @@ class SearchRound:
 
         As it was where they leave it far behind its ``leader``.
         """
-        try:
-            fitted = self._compared(one.fitted, None if leader is None else leader.fitted)
-        except InputError as error:
-            self.skipped[one.label] = str(error)
+        fitted = self._compared(one.fitted, None if leader is None else leader.fitted)
+        if isinstance(fitted, Diverged):
+            self.skipped[one.label] = str(fitted)
             return None
         return one if fitted is None else trial(one.hypothesis, fitted, self.model)
 
-    def _compared(self, start: FittedModel, leader: FittedModel | None) -> FittedModel | None:
+    def _compared(
+        self, start: FittedModel, leader: FittedModel | None
+    ) -> FittedModel | Diverged | None:
         """Return a fit good enough to be compared: settled on part of the data, looked at on all.
 
         None where it stays far behind its ``leader`` on that part.
@@ -476,6 +481,8 @@ class SearchRound:
         if self.rough is None or start.renewed:
             return settled(self.fitter, start.free, start)
         begun = settled(self.rough, start.free, start)
+        if isinstance(begun, Diverged):
+            return begun
         axis = start.free[-1].effect.axis
         if leader is not None and axis is not None:
             needed = CLOSE * _taken_away(leader, self.model, axis - 1)

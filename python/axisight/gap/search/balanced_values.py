@@ -8,14 +8,13 @@ every axis count for as much as they tell.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.rank_deficiency import pseudo_inverse
@@ -43,18 +42,17 @@ def _balanced(model: FittedModel, fitter: ModelFitter) -> FittedModel:
     excess = inflation(model)
     if not (excess > 1).any():
         return model
-    with suppress(InputError):
-        fitted = fitter.tempered(1 / np.sqrt(excess)).fit(model.free, model, fresh=True)
-        if fitted.converged or fitted.stuck:
-            return replace(
-                model,
-                effects=fitted.effects,
-                free=fitted.free,
-                robot_values=fitted.robot_values,
-                std=deviations(fitted),
-                balanced=fitted.at_bound,
-            )
-    return model
+    fitted = fitter.tempered(1 / np.sqrt(excess)).fit(model.free, model, fresh=True)
+    if isinstance(fitted, Diverged) or not (fitted.converged or fitted.stuck):
+        return model
+    return replace(
+        model,
+        effects=fitted.effects,
+        free=fitted.free,
+        robot_values=fitted.robot_values,
+        std=deviations(fitted),
+        balanced=fitted.at_bound,
+    )
 
 
 def inflation(model: FittedModel) -> Array:

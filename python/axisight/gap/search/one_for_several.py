@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info, effect_table
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
@@ -64,9 +64,8 @@ def one_for_several(
         rest = [f for f in model.free if f not in several]
         count = _needed_numbers(several, model)
         others = _others(axis, family, several, options)
-        try:
-            without = fitter.fit(rest, model, lazy=True)
-        except InputError:
+        without = fitter.fit(rest, model, lazy=True)
+        if isinstance(without, Diverged):
             continue
         trials = [t for o in others if (t := _tried(fitter, rest, o, without)) is not None]
         # A load shows on every axis that carries it, and has to do on all.
@@ -188,9 +187,8 @@ def _best_settled(
     best = min(trials, key=lambda t: float(t.held_out.sum()), default=None)
     if best is None:
         return []
-    try:
-        fitted = settled(fitter, best.fitted.free, best.fitted)
-    except InputError:
+    fitted = settled(fitter, best.fitted.free, best.fitted)
+    if isinstance(fitted, Diverged):
         return list(trials)
     return [trial(t.hypothesis, fitted) if t is best else t for t in trials]
 
@@ -198,7 +196,5 @@ def _best_settled(
 def _tried(
     fitter: ModelFitter, rest: Sequence[Hypothesis], option: Hypothesis, start: FittedModel
 ) -> FittedHypothesis | None:
-    try:
-        return trial(option, fitter.fit([*rest, option], start, lazy=True))
-    except InputError:
-        return None
+    found = fitter.fit([*rest, option], start, lazy=True)
+    return None if isinstance(found, Diverged) else trial(option, found)

@@ -7,7 +7,7 @@ sure. Together both are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
@@ -134,22 +134,13 @@ class Pairs:
         """Return the parts of a composite that are not known, each on top of the model."""
         effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
         free = [_part(name, effect, bounds) for name in effect_info(effect.name).parts]
-        try:
-            return [
-                trial(f, self.fitter.fit([*self.model.free, f], self.model))
-                for f in free
-                if _new(f, known)
-            ]
-        except InputError:
-            return []
+        new = [f for f in free if _new(f, known)]
+        return _all(_tried(self.fitter, [*self.model.free, f], self.model) for f in new) or []
 
     def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
         """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""
-        try:
-            fitted = self.fitter.fit([*one.fitted.free, other.hypothesis], one.fitted, lazy=True)
-        except InputError:
-            return None
-        return trial(other.hypothesis, fitted)
+        free = [*one.fitted.free, other.hypothesis]
+        return _tried(self.fitter, free, one.fitted, lazy=True)
 
     def _beside(
         self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int
@@ -209,23 +200,40 @@ def in_parts(
     bounds = winner.trial.hypothesis.bounds
     present = {e.label for e in model.effects}
     free = [f for f in (_part(name, effect, bounds) for name in parts) if _new(f, present)]
-    try:
-        alone = [trial(f, fitter.fit([*model.free, f], model)) for f in free]
-        both = alone
-        if len(free) == 2:
-            both = [
-                trial(f, fitter.fit([*model.free, g, f], beside.fitted, lazy=True))
-                for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
-            ]
-    except InputError:
+    alone = _all(_tried(fitter, [*model.free, f], model) for f in free)
+    both = alone
+    if alone is not None and len(free) == 2:
+        both = _all(
+            _tried(fitter, [*model.free, g, f], beside.fitted, lazy=True)
+            for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
+        )
+    if not alone or not both:
         return ()
-    if not both or clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
+    if clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
         return ()
     chosen = _needed(alone, both, layout, standing.axis)
     labels = {t.label for t in both} | {winner.trial.label}
     same = [r for r in standing.ranked if r.trial.label in labels]
     joined = [standing.joined(replace(winner, trial=t), same) for t in chosen]
     return tuple((led.best, led) for led in joined)
+
+
+def _tried(
+    fitter: ModelFitter, free: Sequence[Hypothesis], start: FittedModel, *, lazy: bool = False
+) -> FittedHypothesis | None:
+    """Return the last of the effects ``free`` beside the others; None if it cannot be simulated."""
+    found = fitter.fit(free, start, lazy=lazy)
+    return None if isinstance(found, Diverged) else trial(free[-1], found)
+
+
+def _all(tried: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
+    """Return trials as far as all can be simulated; None from the first that cannot."""
+    found = []
+    for one in tried:
+        if one is None:
+            return None
+        found.append(one)
+    return found
 
 
 def _new(part: Hypothesis, present: set[str]) -> bool:

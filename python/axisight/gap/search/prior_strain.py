@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.tolerance_edges import BENT, bent
 from axisight.gap.search.state import SearchState
@@ -28,10 +28,9 @@ def bent_for(fitter: ModelFitter, found: SearchState) -> float:
 def _hold_straight(fitter: ModelFitter, found: SearchState) -> bool:
     """Whether the causes explain nearly all with the simulator's own parameters kept near their values."""
     straight = fitter.within(_WITHIN)
-    try:
-        before = straight.fit([], found.baseline, refreshes=1)
-        left = straight.fit(found.model.free, found.model, refreshes=1)
-    except InputError:
+    before = straight.fit([], found.baseline, refreshes=1)
+    left = straight.fit(found.model.free, found.model, refreshes=1)
+    if isinstance(before, Diverged) or isinstance(left, Diverged):
         return False
     noise = float(found.floor.sum())
     return before.total - left.total >= _HOLD * (before.total - noise)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from axisight.effects import Effect
 from axisight.effects.stated import TORQUE_CONSTANT
+from axisight.fitting.divergence import must_hold
 from axisight.gap.controller.torque_sensor import share_reported
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.fit.fitted_model import FittedModel
@@ -83,4 +84,4 @@ def _held(
         else f
         for f in model.free
     ]
-    return fitter.fit(free, model, refreshes=1)
+    return must_hold(fitter.fit(free, model, refreshes=1))

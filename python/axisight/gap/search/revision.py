@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss, linear_gain
@@ -58,11 +57,11 @@ def finish(fitter: ModelFitter, state: SearchState) -> None:
     model = state.model
     if not model.free or model.stuck or linear_gain(model) < OPEN:
         return
-    with suppress(InputError):
-        fitted = fitter.fit(
-            model.free, model, lazy=True, max_iterations=_FINISHING, refreshes=1, worth=OPEN
-        )
-        state.moved("finish", fitted)
+    found = fitter.fit(
+        model.free, model, lazy=True, max_iterations=_FINISHING, refreshes=1, worth=OPEN
+    )
+    if not isinstance(found, Diverged):
+        state.moved("finish", found)
 
 
 def weigh_again(fitter: ModelFitter, state: SearchState, settings: Settings) -> None:
@@ -111,11 +110,8 @@ def drop_idle(fitter: ModelFitter, state: SearchState, settings: Settings) -> se
         gains = []
         for i, f in enumerate(free):
             others = [*free[:i], *free[i + 1 :]]
-            try:
-                without = fitter.evaluate(
-                    others, state.model, robot_values=state.model.robot_values
-                )
-            except InputError:
+            without = fitter.evaluate(others, state.model, robot_values=state.model.robot_values)
+            if isinstance(without, Diverged):
                 # A loop that swings without end lacks it.
                 gains.append(np.inf)
                 continue
@@ -133,7 +129,7 @@ def drop_idle(fitter: ModelFitter, state: SearchState, settings: Settings) -> se
             continue
         dropped.add(free[worst].effect.label)
         rest = [*free[:worst], *free[worst + 1 :]]
-        state.moved("drop", settled(fitter, rest, state.model))
+        state.moved("drop", must_hold(settled(fitter, rest, state.model)))
     return dropped
 
 
@@ -151,11 +147,12 @@ def _stood_in(
         axis = f.effect.axis
         if axis is None or effect_info(f.effect.name).family not in families:
             continue
-        with suppress(InputError):
-            without = settled(fitter, [*free[:i], *free[i + 1 :]], state.model)
-            left = without.total - state.model.total
-            if left <= settings.smallest_gain * float(state.layout.samples()[axis - 1]):
-                return f.effect.label, without
+        without = settled(fitter, [*free[:i], *free[i + 1 :]], state.model)
+        if isinstance(without, Diverged):
+            continue
+        left = without.total - state.model.total
+        if left <= settings.smallest_gain * float(state.layout.samples()[axis - 1]):
+            return f.effect.label, without
     return None
 
 
@@ -178,7 +175,7 @@ def withdraw_doubtful(fitter: ModelFitter, state: SearchState, settings: Setting
         kept = [f for f in state.model.free if f.effect.label not in doubtful]
         if len(kept) == len(state.model.free):
             break
-        state.moved("withdraw", settled(fitter, kept, state.model))
+        state.moved("withdraw", must_hold(settled(fitter, kept, state.model)))
         doubtful |= {
             r.trial.label
             for r, s in state.accepted
@@ -193,14 +190,13 @@ def _stands(
     """Whether a cause of the model is likelier on an axis than none and something unknown together."""
     mine = next(f for f in state.model.free if f.effect.label == label)
     rest = [f for f in state.model.free if f is not mine]
-    try:
-        without = fitter.fit(rest, state.model, lazy=True)
-        tried = trial(mine, fitter.fit([*rest, mine], state.model, lazy=True))
-    except InputError:
+    without = fitter.fit(rest, state.model, lazy=True)
+    fitted = fitter.fit([*rest, mine], state.model, lazy=True)
+    if isinstance(without, Diverged) or isinstance(fitted, Diverged):
         # A loop that swings without end lacks it.
         return True
     found = stand(
-        [tried],
+        [trial(mine, fitted)],
         held_out_loss(without),
         state.floor,
         state.layout,
@@ -223,7 +219,7 @@ def merge(
         gone |= left - now
         taken = _as_it_stood(found, left - now, state)
         before = state.left()
-        state.moved("merge", settled(fitter, fitted.free, fitted))
+        state.moved("merge", must_hold(settled(fitter, fitted.free, fitted)))
         state.rounds.append(Round((taken[1],), (taken,), before))
     return gone
 

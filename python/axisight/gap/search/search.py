@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
@@ -97,12 +97,11 @@ def search(
         out.rounds.append(Round(standings, taken, out.left()))
         if not taken:
             break
-        try:
-            _take_in(round_, out, taken, progress)
-        except InputError as error:
+        diverged = _take_in(round_, out, taken, progress)
+        if diverged is not None:
             # Together they cannot be simulated: what promised most was none of it.
             refused.add(taken[0][0].trial.label)
-            out.skipped[taken[0][0].trial.label] = str(error)
+            out.skipped[taken[0][0].trial.label] = str(diverged)
             continue
         refused |= drop_idle(fitter, out, settings)
         refused |= merge(fitter, out, settings, offered)
@@ -121,8 +120,8 @@ def _refitted(fitter: ModelFitter) -> FittedModel:
     """Return the simulator re-fitted without effects: most of the way on the first halves of the logs."""
     halves = fitter.beginnings()
     if halves is None:
-        return fitter.fit([], refreshes=1)
-    return fitter.fit([], halves.fit([]))
+        return must_hold(fitter.fit([], refreshes=1))
+    return must_hold(fitter.fit([], must_hold(halves.fit([]))))
 
 
 def _judged(
@@ -313,7 +312,8 @@ def _take_in(
     state: SearchState,
     taken: Sequence[tuple[RankedHypothesis, AxisPosterior]],
     progress: Progress,
-) -> None:
+) -> Diverged | None:
+    """Take causes into the model; return how it diverges with them, else nothing."""
     label = "adding " + ", ".join(r.trial.label for r, _ in taken)
     progress(label, 0, 1)
     start = taken[0][0].trial.fitted
@@ -327,8 +327,12 @@ def _take_in(
             free = [*kept_beside(free, new), new]
     # From the simulator of the first: a gap may have bent the one without it. As far as the last fit
     # goes: mostly this is it.
-    state.moved("add", settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN))
+    found = settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN)
+    if isinstance(found, Diverged):
+        return found
+    state.moved("add", found)
     progress(label, 1, 1)
+    return None
 
 
 def _first_part(standing: AxisPosterior) -> RankedHypothesis | None:
@@ -356,9 +360,8 @@ def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
     effect = winner.trial.hypothesis.effect
     second = effect_info(effect.name).parts[1]
     other = Hypothesis(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
-    try:
-        both = fitter.fit([*part.trial.fitted.free, other], part.trial.fitted, lazy=True)
-    except InputError:
+    both = fitter.fit([*part.trial.fitted.free, other], part.trial.fitted, lazy=True)
+    if isinstance(both, Diverged):
         return standing
     if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
         return standing.joined(part, [part, standing.best])
@@ -379,12 +382,9 @@ def _earns_its_gain(
     gain = model.total - fitted.total
     if fitter.within_tolerance(fitted.effects[-1]) or gain < HOPELESS * least:
         return False
-    try:
-        without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
-    except InputError:
-        # A loop that swings without end lacks it.
-        return True
-    return without.total - fitted.total > 0.5 * gain
+    without = fitter.evaluate(others, model, robot_values=fitted.robot_values)
+    # A loop that swings without end lacks it.
+    return isinstance(without, Diverged) or without.total - fitted.total > 0.5 * gain
 
 
 def _settled(state: SearchState, settings: Settings) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import DRY_FRICTION
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
@@ -153,12 +153,12 @@ def weighed_again(
         return None
     mine = next(f for f in free if f.effect.label == label)
     # A trial is of the last effect of its model.
-    fits = {label: fitter.fit([*rest, mine], model, lazy=True)}
+    fits = {label: must_hold(fitter.fit([*rest, mine], model, lazy=True))}
     for r in rivals:
         other = in_its_place(fitter, model, cause, r)
         if other is not None and len(other.free) == len(free):
             fits[r.trial.label] = other
-    without = fitter.fit(rest, model, lazy=True)
+    without = must_hold(fitter.fit(rest, model, lazy=True))
     tried = [trial(fit.free[-1], fit) for fit in fits.values()]
     standing = stand(
         tried, held_out_loss(without), floor, layout, entered.axis, explained_share=explained_share
@@ -200,8 +200,7 @@ def in_its_place(
     free = [*kept_beside(others, new), new]
     alone = len(free) == len(rival.trial.fitted.free)
     start = rival.trial.fitted if alone else model
-    try:
-        fitted = fitter.fit(free, start, refreshes=1)
-        return settled(fitter, fitted.free, fitted)
-    except InputError:
-        return None
+    found = fitter.fit(free, start, refreshes=1)
+    if not isinstance(found, Diverged):
+        found = settled(fitter, found.free, found)
+    return None if isinstance(found, Diverged) else found

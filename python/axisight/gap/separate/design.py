@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.excitation import References
+from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.experiment import Experiment, Plan
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.separate.question import Question, Seen, Turn
@@ -138,7 +139,8 @@ def _left(
     """
     # Sensitivities of other logs are of no use here.
     start = replace(model, columns={})
-    found = fitter.fit(free, start, robot_values=model.robot_values, max_iterations=0)
+    values = model.robot_values
+    found = must_hold(fitter.fit(free, start, robot_values=values, max_iterations=0))
     known = model.matrix.sum(axis=0) + model.prior_matrix
     names = [p for p in found.parameters if p in model.parameters]
     mine = [found.parameters.index(p) for p in names]

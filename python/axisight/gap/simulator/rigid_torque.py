@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from axisight import _core
 from axisight.effects import core_effects
 from axisight.fitting import FitOptions, Weighting
+from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.signals.motion import Motion
 from axisight.gap.simulator.own_parameters import with_values
@@ -28,5 +29,5 @@ def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
         FitOptions(),
     )
     # The residual is prediction minus measurement, axis by axis.
-    residual = result.residual.reshape(robot.n_axes, -1).T
+    residual = must_hold(result).residual.reshape(robot.n_axes, -1).T
     return np.asarray(residual + at[3])

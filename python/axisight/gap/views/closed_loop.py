@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.effects import Effect, EffectTuple, core_effects
-from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.divergence import Diverged
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.controller.feedback import loop_responses, periodic_response
 from axisight.gap.controller.loop_decay import FORGOTTEN, slowest_decay_1_s
@@ -134,10 +134,9 @@ class ClosedLoopView(View):
     def followed(self, found: SearchState, logs: Sequence[Log]) -> float:
         """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
         there = self.fitter.along(records_of(self.tracking, logs, self.floor.weighting))
-        try:
-            before = there.loss([], found.baseline)
-            left = there.loss(found.model.free, found.model)
-        except InputError:
+        before = there.loss([], found.baseline)
+        left = there.loss(found.model.free, found.model)
+        if isinstance(before, Diverged) or isinstance(left, Diverged):
             # One of them cannot be kept there.
             return 0.0
         noise = float(there.counted_by_axis() @ self.floor.expected)
@@ -321,7 +320,7 @@ class ClosedLoopFitter(ModelFitter):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None = None,
-    ) -> _core.FitResult:
+    ) -> _core.FitResult | Diverged:
         """Run the fit in the core."""
         return _core.fit_simulation(
             *self._problem(effects, parameters),
@@ -335,7 +334,7 @@ class ClosedLoopFitter(ModelFitter):
 
     def run(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
-    ) -> _core.Courses:
+    ) -> _core.Courses | Diverged:
         """Run the model in the core."""
         return _core.courses(
             *self._problem(effects, parameters),
@@ -352,7 +351,7 @@ class ClosedLoopFitter(ModelFitter):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None = None,
-    ) -> _core.Linearization:
+    ) -> _core.Linearization | Diverged:
         """Evaluate the model in the core."""
         return _core.evaluate_simulation(
             *self._problem(effects, parameters),

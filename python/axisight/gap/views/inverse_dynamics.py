@@ -15,6 +15,7 @@ from axisight.effects import Effect, core_effects
 from axisight.effects.stated import VISCOUS_FRICTION, WARMING
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
+from axisight.fitting.divergence import Diverged
 from axisight.fitting.simulation_error import Spec, core_spec
 from axisight.gap.controller.speed_loop import other_controllers_of_targets
 from axisight.gap.facts.settings import Settings
@@ -312,7 +313,7 @@ class InverseDynamicsFitter(ModelFitter):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         _near: _core.Courses | None = None,
-    ) -> _core.FitResult:
+    ) -> _core.FitResult | Diverged:
         """Run the fit in the core."""
         return _core.fit_inverse_dynamics(
             self.robot.core,
@@ -332,7 +333,7 @@ class InverseDynamicsFitter(ModelFitter):
         options: FitOptions,
         warm: list[tuple[int, _core.Column]],
         _near: _core.Courses | None = None,
-    ) -> _core.Linearization:
+    ) -> _core.Linearization | Diverged:
         """Evaluate the model in the core."""
         return _core.evaluate_inverse_dynamics(
             self.robot.core,

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.errors import InputError
 from axisight.fitting import Weighting
+from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.controller.feedback import (
     controller_response,
     inertia_of_motors,
@@ -68,7 +68,7 @@ class TargetsView(View):
         )
         for _ in range(_ROUNDS if fitter.gains else 0):
             # Gains say most of what a motion does between samples.
-            self._like = Variant(fitter.fit([]).robot_values)
+            self._like = Variant(must_hold(fitter.fit([])).robot_values)
             fitter.records = _records(logs, self._between_samples(logs, settings))
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
@@ -87,10 +87,9 @@ class TargetsView(View):
     def removed_there(self, found: SearchState, logs: Sequence[Log]) -> float | None:
         """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove."""
         there = self.fitter.along(_records(logs, self._between_samples(logs, self.settings)))
-        try:
-            before = there.loss([], found.baseline)
-            left = there.loss(found.model.free, found.model)
-        except InputError:
+        before = there.loss([], found.baseline)
+        left = there.loss(found.model.free, found.model)
+        if isinstance(before, Diverged) or isinstance(left, Diverged):
             return None
         above = before - float(there.counted_by_axis() @ self.floor.expected)
         return (before - left) / above if above > 0 else 0.0

@@ -9,7 +9,7 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.effects import effect_info
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.data_blocks import Layout, layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.held_out import linear_gain, linear_step
@@ -233,11 +233,11 @@ class Valley:
 
     def loss(
         self, free: Sequence[Hypothesis], *_: object, robot_values: object = None, **__: object
-    ) -> float:
+    ) -> float | Diverged:
         value = (free[-1].effect.parameters or {})["half_width_rad"]
         self.asked.append(value)
         if value > self.fails:
-            raise InputError("the simulation failed")
+            return Diverged("diverged at sample 5")
         return self.curve(value) if self.given is None or robot_values else self.given
 
 
@@ -329,7 +329,7 @@ def test_starts_that_cannot_be_simulated_are_passed_over():
     start = screened.best_of_starts(play())
     assert (start.option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
     assert start.gain == pytest.approx(model.total, rel=1e-3)
-    assert screened.bench.skipped == {"backlash@1": "the simulation failed"}
+    assert screened.bench.skipped == {"backlash@1": "the simulation failed: diverged at sample 5"}
 
 
 def test_a_single_start_is_a_start():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from axisight import Effect, Settings
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.search import revision
 from gap_data import StateStub, linear_evidence
@@ -27,7 +27,7 @@ class Fits:
         del start, robot_values
         names = [f.effect.name for f in free]
         if self.needed is not None and self.needed not in names:
-            raise InputError("the simulation failed: diverged at sample 7")
+            return Diverged("diverged at sample 7")
         columns = self.x[:, [COLUMNS[name] for name in names]]
         found = linear_evidence(columns, self.y, np.zeros(400, int))
         return SimpleNamespace(**vars(found) | {"free": free, "total": float(found.loss.sum())})

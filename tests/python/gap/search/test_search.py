@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from axisight import Effect, Settings
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.screening import search_round
@@ -212,7 +212,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
 
     def settled(fitter, free_, start):
         if start is whole.fitted:
-            raise InputError("the simulation failed")
+            return Diverged("diverged at sample 5", logs=[0], sample=5)
         return start
 
     field = Field({})
@@ -224,7 +224,9 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     monkeypatch.setattr(search_round, "settled", settled)
     monkeypatch.setattr(search_round, "trial", lambda candidate, fitted, model: other)
     assert SearchRound.refined(field, [whole, other], [], 1) == [other]
-    assert field.bench.skipped == {"gear_hysteresis@1": "the simulation failed"}
+    assert field.bench.skipped == {
+        "gear_hysteresis@1": "the simulation failed: diverged at sample 5"
+    }
 
 
 def finished(pull: float) -> list[dict[str, object]]:
@@ -260,7 +262,7 @@ def earns(without, within: bool = False, least: float = 1.0) -> bool:
 
     def evaluate(free, model, *, robot_values):
         if without is None:
-            raise InputError("the simulation failed: diverged at sample 5")
+            return Diverged("diverged at sample 5")
         return SimpleNamespace(total=without)
 
     fitter = SimpleNamespace(evaluate=evaluate, within_tolerance=lambda effect: within)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from axisight import Effect, load_robot
-from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.fit.tolerance_edges import BENT, bent
@@ -162,7 +162,7 @@ class Weighed:
         labels = tuple(sorted(f.effect.label for f in free))
         self.asked.append(labels)
         if self.losses[labels] is None:
-            raise InputError("it cannot be simulated")
+            return Diverged("it cannot be simulated")
         return self.of(free)
 
     def of(self, free):
