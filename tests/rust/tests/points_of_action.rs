@@ -5,7 +5,7 @@
 //! spring on that state must do what a known spring at the same place does.
 
 use axisight_core::effects::{
-    Acts, Arm, AxisTorque, BaseJoint, EffectInfo, Family, Joint, Kernel, Linear, Motor, Pair,
+    Acts, Arm, AxisTorque, BaseJoint, EffectInfo, Family, Joint, Kernel, Motor, Pair,
     PlantParameters, Scope, Spring,
 };
 use axisight_core::plant::{Plant, equilibrium};
@@ -19,22 +19,11 @@ const SAMPLES: usize = 200;
 const fn info(scope: Scope, acts: Acts) -> EffectInfo {
     EffectInfo {
         name: "test",
-        summary: "",
-        equation: "",
-        source: "",
         scope,
         acts,
         family: Family::Arm,
-        contains: &[],
-        parts: &[],
-        usual: &[],
-        twins: &[],
-        stands_for: None,
-        linear: Linear::No,
         inverse_dynamics: false,
-        absorbed_by: &[],
-        shown_by: &[],
-        parameters: &[],
+        ..EffectInfo::PLAIN
     }
 }
 

@@ -1,6 +1,6 @@
 //! Finite bandwidth of the current loop.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive follows the commanded torque with a first-order lag",
     equation: "T_c tau' + tau = u,  bandwidth 1 / (2 pi T_c)",
     source: "Leonhard (2001), Control of Electrical Drives, section 7.2 (closed current loop)",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::Timing,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[ParameterInfo {
         name: "time_constant_s",
@@ -29,6 +21,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 0.1,
         typical: 1e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Lag<S>(S);

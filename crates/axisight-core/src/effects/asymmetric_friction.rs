@@ -2,7 +2,7 @@
 
 use super::formulas::smoothed_sign;
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,16 +10,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "Coulomb friction of different size forward and backward",
     equation: "tau_f = t (F_+ (1 + t) + F_- (1 - t)) / 2,  t = tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), section 2",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
     contains: &["coulomb_friction"],
     parts: &["coulomb_friction", "torque_offset"],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -44,6 +38,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         SMOOTHING,
         ARM_SHARE,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Asymmetric<S> {

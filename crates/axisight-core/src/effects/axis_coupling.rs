@@ -1,10 +1,7 @@
 //! A drive that goes through another axis: wrists, and arms with a parallelogram.
 
 use super::formulas::smoothed_sign;
-use super::{
-    Absorber, Acts, AxisTorque, EffectInfo, Experiment, Family, Kernel, Linear, Pair, ParameterInfo, Role,
-    SMOOTHING, Scope,
-};
+use super::{Absorber, Acts, AxisTorque, EffectInfo, Experiment, Family, Kernel, Pair, ParameterInfo, Role, SMOOTHING, Scope};
 use axisight_scalar::Scalar;
 
 const fn amplitude(
@@ -32,13 +29,6 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scope: Scope::Axes,
     acts: Acts::Motor,
     family: Family::Arm,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::ViscousFriction, Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -56,6 +46,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         SMOOTHING,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Coupling<S> {

@@ -1,7 +1,7 @@
 //! Backlash: a dead zone between motor and joint.
 
 use super::formulas::{dead_zone, dead_zone_inverse};
-use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,15 +9,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "play in the gear: no torque until the gap is crossed",
     equation: "tau_g = k D + d (D' + g (delta' - D')),  D = delta - clip(delta, -b, b), its corners rounded over b/20",
     source: "Nordin, Gutman (2002), Automatica 38(10), dead-zone model",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Backlash],
     shown_by: &[Experiment::Amplitudes],
@@ -42,6 +35,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.5,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Backlash<S> {

@@ -2,9 +2,7 @@
 //!
 //! Twist about the first axis is the spring of its gear, with nothing that moves between the two.
 
-use super::{
-    Acts, BaseJoint, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope,
-};
+use super::{Acts, BaseJoint, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Scope};
 use crate::robot::Motion;
 use axisight_scalar::Scalar;
 
@@ -28,14 +26,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scope: Scope::Arm,
     acts: Acts::Base,
     family: Family::Arm,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[
         compliance("about_x_rad_nm"),
@@ -50,6 +41,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 2e-3,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Compliance<S> {

@@ -23,16 +23,11 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scope: Scope::Arm,
     acts: Acts::Base,
     family: Family::Arm,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: &[angle("about_x_rad"), angle("about_y_rad")],
+    ..EffectInfo::PLAIN
 };
 
 struct Tilt<S> {

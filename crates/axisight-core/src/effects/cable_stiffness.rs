@@ -1,6 +1,6 @@
 //! Stiffness of cables and hoses along the joint.
 
-use super::{Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "cables and hoses pull the joint back to where they rest, in proportion to the angle",
     equation: "tau_j = p - k q on the joint, at rest where q = p / k",
     source: "Hooke's law on the angle from rest",
-    scope: Scope::Axis,
     acts: Acts::Joint,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Slope,
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::Poses],
     parameters: &[
         ParameterInfo {
@@ -40,6 +32,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 100.0,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Cable<S> {

@@ -1,6 +1,6 @@
 //! Controller and logger that run on clocks of their own.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -11,14 +11,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scope: Scope::Arm,
     acts: Acts::Controller,
     family: Family::Timing,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::References],
     parameters: &[ParameterInfo {
         name: "relative_rate",
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 0.01,
         typical: 1e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Drift<S>(S);

@@ -1,6 +1,6 @@
 //! Gains of the machine's controller that are not the stated ones.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 const fn change(name: &'static str) -> ParameterInfo {
@@ -20,17 +20,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the controller has other gains than the stated ones",
     equation: "k_p' = k_p (1 + e_p),  k_i' = k_i (1 + e_i),  k_v' = k_v (1 + e_v)",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control)",
-    scope: Scope::Axis,
     acts: Acts::Controller,
     family: Family::Controller,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::References],
     parameters: &[
         change("relative_proportional"),
@@ -38,6 +30,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         // Of the position loop around a cascade's speed loop; others have none.
         change("relative_position"),
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Gains<S>([S; 3]);

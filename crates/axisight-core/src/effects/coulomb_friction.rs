@@ -2,7 +2,7 @@
 
 use super::formulas::smoothed_sign;
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,16 +10,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "constant friction against the direction of motion",
     equation: "tau_f = F_c tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Wernholt (2004), eq. (9.7), sign smoothed over the width v_0",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -35,6 +27,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         SMOOTHING,
         ARM_SHARE,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Coulomb<S> {

@@ -1,6 +1,6 @@
 //! A current loop of second order.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive follows the commanded torque with a lag of second order, and may overshoot",
     equation: "T^2 tau'' + 2 D T tau' + tau = u,  natural frequency 1 / (2 pi T)",
     source: "Leonhard (2001), Control of Electrical Drives, section 7.2 (closed current loop)",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::Timing,
     contains: &["actuator_bandwidth"],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[
         ParameterInfo {
@@ -40,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.7,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Loop<S> {

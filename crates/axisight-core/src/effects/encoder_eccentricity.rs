@@ -1,6 +1,6 @@
 //! Encoder on the joint whose disc is not centred.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -20,19 +20,12 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the position is taken from an encoder on the joint that sits off centre: an error once a turn of the joint",
     equation: "v_phi = (a (cos(q) - cos(q_0)) + b (sin(q) - sin(q_0))) / r,  q_0 where a log begins",
     source: "Heidenhain, Rotary Encoders catalogue: measuring error of eccentric mounting, e / R once a turn",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::Periodic,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     parameters: &[wave("cosine_rad"), wave("sine_rad")],
+    ..EffectInfo::PLAIN
 };
 
 struct Eccentric<S>([S; 2]);

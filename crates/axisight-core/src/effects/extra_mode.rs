@@ -1,6 +1,6 @@
 //! A mode that the simulator does not have: something on the joint swings on a spring.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,15 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "something on the joint (a tool, a hose, a structure) swings on a spring",
     equation: "x' = v,  v' = w^2 (q - x) + 2 z w (q' - v),  tau = -J v' on the joint",
     source: "Den Hartog (1956), Mechanical Vibrations, section 3.3 (damped vibration absorber)",
-    scope: Scope::Axis,
     acts: Acts::Joint,
     family: Family::Arm,
-    contains: &[],
-    parts: &[],
     usual: &["link_inertia"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::WideBand],
@@ -49,6 +43,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.05,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Mode<S> {

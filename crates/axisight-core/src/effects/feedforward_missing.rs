@@ -1,6 +1,6 @@
 //! Torque that the machine's controller feeds forward and the simulator's does not.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 const fn share(name: &'static str, unit: &'static str, typical: f64) -> ParameterInfo {
@@ -20,22 +20,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the controller feeds forward torque for acceleration and speed",
     equation: "u = feedback + J_f dphi_r'/dt + F_f phi_r'",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.4 (feedforward compensation)",
-    scope: Scope::Axis,
     acts: Acts::Controller,
     family: Family::Controller,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::References],
     parameters: &[
         share("acceleration_nm_s2_rad", "Nm s^2/rad", 0.01),
         share("speed_nm_s_rad", "Nm s/rad", 0.01),
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Forward<S>([S; 2]);

@@ -1,6 +1,6 @@
 //! Viscous friction that changes while the gear warms up.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "viscous friction changes with the time since the log began, as grease warms up",
     equation: "tau_f = (F_0 + F_w (1 - e^(-t / T_w))) phi'",
     source: "Bittencourt and Gunnarsson (2012), Journal of Dynamic Systems, Measurement, and Control 134(5) (viscous friction falls with temperature)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
     contains: &["viscous_friction"],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::Speeds],
     parameters: &[
         ParameterInfo {
@@ -50,6 +42,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.05,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Warmup<S> {

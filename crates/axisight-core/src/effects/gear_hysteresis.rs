@@ -1,6 +1,6 @@
 //! Gear hysteresis: a spring beside the gear's own slips, and remembers.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,15 +8,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "a loop of torque over deflection: a spring beside the gear's slips, or part of it",
     equation: "tau_g = k (1 - b a) delta + a k sum_j D_j z_j / 4,  D_j z_j' = delta' - ((1 - s/2) |delta'| z_j + s/2 delta' |z_j|) (1 - s + s z_j^4),  D_j = D (1 + s (j - 2.5) 0.4)",
     source: "four Bouc-Wen elements: Wen (1976), J. Eng. Mech. Div. 102(2), with A = 1, beta = 1 - s/2, gamma = s/2; with s = 0 all are Dahl's (1968, TOR-0158), with s = 1 about the sliders of Iwan (1966), J. Appl. Mech. 33(4), evenly apart; beside the spring as in Dhaouadi, Ghorbel, Gandhi (2003), IEEE Trans. Ind. Electron. 50(6)",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness, Absorber::Damping],
     shown_by: &[Experiment::Amplitudes],
@@ -71,6 +64,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.5,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 /// Deflections that elements slip at, as shares of their mean, about it: evenly from nought, if most sudden.

@@ -1,6 +1,6 @@
 //! Torque of a gravity balancer on the joint.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "a balancer (spring or counterweight) the simulator lacks, or has wrong",
     equation: "tau_j = a sin q + b cos q on the joint",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.3",
-    scope: Scope::Axis,
     acts: Acts::Joint,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Slope,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[
@@ -40,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 1e3,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Balancer<S> {

@@ -1,6 +1,6 @@
 //! Transport delay between commanded and applied torque.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive applies the commanded torque late",
     equation: "tau(t) = u(t - T_d), any fraction of a sample",
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::Timing,
-    contains: &[],
-    parts: &[],
-    usual: &[],
     twins: &["sensor_delay"],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: &[ParameterInfo {
         name: "delay_s",
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 0.05,
         typical: 1e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Delay<S>(S);

@@ -1,6 +1,6 @@
 //! Gear stiffness other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,13 +8,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "gear stiffness off by more than its tolerance",
     equation: "k = k_1 (1 + s)",
     source: "Wernholt (2004), eq. (9.6) with k_3 = 0",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
     stands_for: Some(StandsFor { quantity: "stiffness", change: Change::Relative }),
     linear: Linear::Parameters,
     inverse_dynamics: false,
@@ -29,6 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 5.0,
         typical: 0.2,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Stiffness<S>(S);

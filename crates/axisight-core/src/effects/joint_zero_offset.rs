@@ -1,6 +1,6 @@
 //! Zero of a joint angle other than the simulator's: the arm beyond stands turned.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the zero of a joint is not where it is modelled: its encoder was mounted or set otherwise",
     equation: "q + q_0 in M, c and g",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
-    scope: Scope::Axis,
     acts: Acts::Arm,
     family: Family::Arm,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1.6,
         typical: 0.02,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Zero<S>(S);

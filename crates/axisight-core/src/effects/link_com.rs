@@ -1,6 +1,6 @@
 //! Centre of mass of one link other than the simulator's.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, Scope, shift};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, shift};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,19 +8,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the centre of mass of a link is not where it is modelled",
     equation: "c + d",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.2 (the dynamic parameters of a link)",
-    scope: Scope::Axis,
     acts: Acts::Arm,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
     usual: &["payload"],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
+    ..EffectInfo::PLAIN
 };
 
 struct Shift<S>([S; 3]);

@@ -1,6 +1,6 @@
 //! A length of a link other than the simulator's: what it carries lies elsewhere.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, Scope, shift};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, shift};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,19 +8,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the next axis does not lie where it is modelled in the link of this one: a length or an offset is wrong; behind the last axis there is none",
     equation: "p + d, from this joint to the next",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
-    scope: Scope::Axis,
     acts: Acts::Arm,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
     usual: &["payload", "link_com"],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
+    ..EffectInfo::PLAIN
 };
 
 struct Longer<S>([S; 3]);

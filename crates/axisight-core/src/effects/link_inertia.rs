@@ -1,6 +1,6 @@
 //! Inertia of one link other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,11 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the inertia of a link about its centre of mass is off by more than its tolerance",
     equation: "J (1 + s)",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.2 (the dynamic parameters of a link)",
-    scope: Scope::Axis,
     acts: Acts::Arm,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
     usual: &["payload", "rotor_inertia"],
-    twins: &[],
     stands_for: Some(StandsFor { quantity: "inertia_scale", change: Change::Relative }),
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 20.0,
         typical: 0.1,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Inertia<S>(S);

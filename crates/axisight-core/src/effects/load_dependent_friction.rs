@@ -1,7 +1,7 @@
 //! Coulomb friction in proportion to the gear load.
 
 use super::formulas::smoothed_sign;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, SMOOTHING, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,16 +9,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "friction in proportion to the torque the gear carries",
     equation: "tau_f = mu |tau_load| tanh(phi' / v_0)",
     source: "Hamon, Gautier, Garrec (2010), Dynamic identification of robots with a dry friction model depending on load and velocity, IROS",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
-    parts: &[],
     usual: &["coulomb_friction"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -33,6 +26,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         SMOOTHING,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct LoadFriction<S> {

@@ -1,6 +1,6 @@
 //! Gear that gives way around its middle: play that carries part of the torque.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the gear is soft around its middle, where few of its teeth carry, and as stiff as modelled beyond",
     equation: "tau_g = k (delta - s m),  m = (hypot(delta + b, c) - hypot(delta - b, c)) hypot(1, rho) / 2,  c = rho b:  dm/ddelta = 1 at 0",
     source: "Nabtesco, RV series catalogue: lost motion, the torsion at 3 % of the rated torque",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
     usual: &["backlash", "nonlinear_stiffness"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::Amplitudes],
     parameters: &[
         ParameterInfo {
@@ -51,6 +44,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.3,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Soft<S> {

@@ -1,6 +1,6 @@
 //! Motor inertia other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "motor inertia off by more than its tolerance",
     equation: "J_m (1 + s)",
     source: "Wernholt (2004), eq. (9.4)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
     stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Relative }),
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::MotorInertia],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +23,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 10.0,
         typical: 0.2,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Inertia<S>(S);

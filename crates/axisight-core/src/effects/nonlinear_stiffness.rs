@@ -1,7 +1,7 @@
 //! Gear stiffness that changes with load.
 
 use super::formulas::spring_torque;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,14 +9,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "gear spring with a cubic term: stiffer (or softer) under load",
     equation: "tau_g = k_1 delta + k_3 delta^3",
     source: "Wernholt (2004), eq. (9.6)",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Slope,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness],
@@ -30,6 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e14,
         typical: 1e11,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Cubic<S>(S);

@@ -24,13 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scope: Scope::Arm,
     acts: Acts::Arm,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
     parameters: &[
@@ -47,6 +41,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         coordinate("y_m", 0.0),
         coordinate("z_m", 0.2),
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Payload<S> {

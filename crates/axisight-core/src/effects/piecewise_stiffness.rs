@@ -1,7 +1,7 @@
 //! Gear stiffness that takes one value at small loads and another at large ones.
 
 use super::formulas::dead_zone;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,15 +9,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "gear spring with a knee: stiffer (or softer) beyond some deflection",
     equation: "tau_g = k ((1 + a) delta + s D),  D = delta - clip(delta, -d, d), its corners rounded over d/20",
     source: "Harmonic Drive, engineering data: torsional stiffness K_1, K_2 with a knee at T_1",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Transmission,
-    contains: &[],
-    parts: &[],
     usual: &["backlash", "nonlinear_stiffness", "lost_motion"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
@@ -51,6 +45,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 3e-4,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Knee<S> {

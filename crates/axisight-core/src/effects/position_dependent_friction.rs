@@ -1,7 +1,7 @@
 //! Dry friction that changes with the position of the axis.
 
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -21,16 +21,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "dry friction that is larger in some places of the turn than in others",
     equation: "tau_f = (m + c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint; a share a of it behind the gear, there with q / r for phi",
     source: "Armstrong-Helouvry (1991), Control of Machines with Friction (joints of a PUMA 560 over their position); tanh form as coulomb_friction",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
     contains: &["coulomb_friction"],
-    parts: &[],
     usual: &["coulomb_friction"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Poses],
     parameters: &[
@@ -49,6 +43,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         wave("mean_nm"),
         ARM_SHARE,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Uneven<S> {

@@ -1,6 +1,6 @@
 //! Encoder of few lines: positions come in steps.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the measured position comes in steps: an encoder of few lines",
     equation: "phi_m = s round(phi / s)",
     source: "Widrow, Kollar (2008), Quantization Noise, chapter 1",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::Sensor,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     parameters: &[ParameterInfo {
         name: "increment_rad",
@@ -29,6 +21,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1.0,
         typical: 1.5e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Steps<S>(S);

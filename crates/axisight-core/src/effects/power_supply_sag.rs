@@ -1,6 +1,6 @@
 //! Supply whose voltage gives way under power, and the drive's torque with it.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive gives less of its torque the more power it draws: its supply gives way",
     equation: "tau = u (1 - x / (1 + c x)),  x = s max(u phi', 0);  a line at c = 0, 1 / (1 + x) at c = 1",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.2 (power supply and amplifier)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
     usual: &["torque_constant"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::Speeds],
     parameters: &[
         ParameterInfo {
@@ -40,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.5,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 /// Of the torque something is always left.

@@ -1,7 +1,7 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
 use super::formulas::stribeck_level;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, STRIBECK_SPEED, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role, STRIBECK_SPEED};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,16 +9,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "friction that yields like a spring before it slips, with a memory of its own",
     equation: "tau_f = F_c (z + T_b z'),  z' = (phi' - |phi'| z / g) / (delta + T_r |phi'|),  g = 1 + (s - 1) exp(-(phi' / v_s)^2)",
     source: "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), eqs. (1)-(4) with sigma_0 = F_c / delta, sigma_1 = sigma_0 T_b",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
     contains: &["coulomb_friction"],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -71,6 +64,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 1e-4,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Presliding<S> {

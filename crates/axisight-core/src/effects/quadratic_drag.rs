@@ -1,6 +1,6 @@
 //! Drag that grows with the square of the speed.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "friction that grows with the square of the speed",
     equation: "tau_f = c phi' |phi'|",
     source: "Bona, Indri (2005), Friction compensation in robotics: an overview, IEEE CDC",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
-    parts: &[],
     usual: &["viscous_friction"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::ViscousFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[ParameterInfo {
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e3,
         typical: 1e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Drag<S>(S);

@@ -1,7 +1,7 @@
 //! Resolver error over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,17 +9,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "position measurement error that repeats with the motor angle",
     equation: "v_phi = sum_i a_i cos(n_i phi) + b_i sin(n_i phi)",
     source: "Wernholt (2004), eq. (8.2b)",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::Periodic,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Waves { constant: 0, proportional: 0, reading: 15 },
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
     parameters: harmonic_parameters!(
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         "rad" 0.5 1e-3 "order_4" "cosine_4_rad" "sine_4_rad" 0.0,
         "rad" 0.5 1e-3 "order_5" "cosine_5_rad" "sine_5_rad" 0.0,
     ),
+    ..EffectInfo::PLAIN
 };
 
 struct Resolver<S>(Harmonics<S>);

@@ -1,6 +1,6 @@
 //! Motors whose inertia the simulator leaves out.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,11 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "inertia of motor and gear that the simulator leaves out, as model files of arms mostly do",
     equation: "J_m + dJ",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.1 (rotors in the kinetic energy)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Load,
-    contains: &[],
-    parts: &[],
     usual: &["link_mass"],
-    twins: &[],
     stands_for: Some(StandsFor { quantity: "motor_inertia", change: Change::Absolute }),
     linear: Linear::Parameters,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::MotorInertia],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e5,
         typical: 0.01,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Inertia<S>(S);

@@ -1,6 +1,6 @@
 //! Transport delay of the position that the controller reads.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Scope, input_delay};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, input_delay};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,19 +8,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the controller reads and logs the position late: of an axis alone the logs of a delay of the drive, other axes feel its motion earlier than it is read",
     equation: "phi_measured(t) = phi(t - T_d)",
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::Timing,
-    contains: &[],
-    parts: &[],
     usual: &["input_delay"],
     twins: &["input_delay"],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::WideBand],
     parameters: input_delay::INFO.parameters,
+    ..EffectInfo::PLAIN
 };
 
 struct Late<S>(S);

@@ -2,7 +2,7 @@
 
 use super::formulas::{smoothed_sign, stribeck_level};
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -10,16 +10,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "Coulomb friction that rises towards standstill",
     equation: "tau_f = (F_c + F_s exp(-(phi' / v_s)^2)) tanh(phi' / v_0), a share a of it behind the gear, there with q' / r for phi'",
     source: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. (5)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
     contains: &["coulomb_friction"],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[
@@ -45,6 +38,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         SMOOTHING,
         ARM_SHARE,
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct Stribeck<S> {

@@ -1,6 +1,6 @@
 //! Torque constant other than the drive believes.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the motor gives more or less torque than commanded, in proportion",
     equation: "tau = (1 + e) u",
     source: "Gautier, Briot (2014), Global identification of joint drive gains, J. Dyn. Sys. 136(5)",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::Torque],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 2.0,
         typical: 0.05,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Gain<S>(S);

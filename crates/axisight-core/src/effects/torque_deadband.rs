@@ -1,6 +1,6 @@
 //! Deadband of the drive.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,15 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive delivers nothing of small torques, and less of all others",
     equation: "tau = u - clip(u, -d, d)",
     source: "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities, chapter 2 (dead zones)",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
     usual: &["torque_offset"],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::DryFriction, Absorber::TorqueOffset],
     shown_by: &[Experiment::Amplitudes],
@@ -29,6 +23,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e4,
         typical: 0.3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Deadband<S>(S);

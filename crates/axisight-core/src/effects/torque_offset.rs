@@ -1,6 +1,6 @@
 //! Constant torque error.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "a constant torque is added to the commanded one",
     equation: "tau = u + o",
     source: "Janot, Gautier, Brunot (2019), EMPS benchmark: offset of the force",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
-    usual: &[],
     twins: &["torque_sensor_offset"],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: &[ParameterInfo {
@@ -29,6 +23,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e4,
         typical: 0.5,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Offset<S>(S);

@@ -1,7 +1,7 @@
 //! Motor torque ripple over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -9,17 +9,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "cogging: torque that repeats with the motor angle",
     equation: "v_tau = sum_i a_i cos(n_i phi) + b_i sin(n_i phi) + u (a_u cos(n_u phi) + b_u sin(n_u phi))",
     source: "Wernholt (2004), eq. (8.2a)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Periodic,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Waves { constant: 15, proportional: 3, reading: 0 },
-    inverse_dynamics: true,
-    absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
     parameters: harmonic_parameters!(
@@ -30,6 +22,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         "Nm" 1e4 0.1 "order_5" "cosine_5_nm" "sine_5_nm" 0.0,
         "1" 1.0 0.02 "order_u" "cosine_u" "sine_u" 0.0,
     ),
+    ..EffectInfo::PLAIN
 };
 
 struct Ripple<S> {

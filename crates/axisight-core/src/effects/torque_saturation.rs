@@ -1,6 +1,6 @@
 //! Torque limit of the drive.
 
-use super::{Acts, EffectInfo, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Family, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,18 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive limits the torque",
     equation: "tau = clip(u, -L, L)",
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 9.4",
-    scope: Scope::Axis,
     acts: Acts::TorquePath,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
     linear: Linear::Path,
-    inverse_dynamics: true,
-    absorbed_by: &[],
-    shown_by: &[],
     parameters: &[ParameterInfo {
         name: "limit_nm",
         unit: "Nm",
@@ -29,6 +20,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e6,
         typical: 10.0,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Limit<S>(S);

@@ -1,6 +1,6 @@
 //! Scale of the torque that the drive reports.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the drive reports a torque other than the one the motor gets by a constant factor",
     equation: "u_reported = (1 + e) u",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.4 (sensors)",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::Sensor,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::References],
     parameters: &[ParameterInfo {
         name: "relative_error",
@@ -29,6 +21,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 10.0,
         typical: 0.05,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Gain<S>(S);

@@ -1,25 +1,21 @@
 //! Constant error of the torque that the drive reports.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Linear, Scope, torque_offset};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Linear, torque_offset};
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_sensor_offset",
     summary: "the drive reports a torque smaller than the one the motor gets by a constant",
     equation: "u_reported = u - o",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.4 (sensors)",
-    scope: Scope::Axis,
     acts: Acts::Sensor,
     family: Family::TorquePath,
-    contains: &[],
-    parts: &[],
-    usual: &[],
     twins: &["torque_offset"],
-    stands_for: None,
     linear: Linear::Path,
     inverse_dynamics: false,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
     parameters: torque_offset::INFO.parameters,
+    ..EffectInfo::PLAIN
 };
 
 /// Of a torque as it is reported, which is what logs hold.

@@ -1,7 +1,7 @@
 //! Kinematic error of the gear over the motor angle.
 
 use super::formulas::harmonic_slope;
-use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -21,17 +21,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the gear runs ahead and behind periodically over the motor angle",
     equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi) + a_2 cos(m n phi) + b_2 sin(m n phi); tau_motor = (r + c de/dphi) tau_gear",
     source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
-    scope: Scope::Axis,
     acts: Acts::Transmission,
     family: Family::Periodic,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::SlowTurns, Experiment::Amplitudes],
     parameters: &[
         ParameterInfo {
@@ -69,6 +61,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 1.0,
         },
     ],
+    ..EffectInfo::PLAIN
 };
 
 struct TransmissionError<S> {

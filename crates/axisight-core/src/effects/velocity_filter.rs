@@ -1,6 +1,6 @@
 //! A filter through which the controller takes the speed.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,17 +8,9 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "the controller takes the measured speed through a low-pass",
     equation: "w_k = w_(k-1) + T / (T + T_v) (v_k - w_(k-1))",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control; the speed from positions)",
-    scope: Scope::Axis,
     acts: Acts::Controller,
     family: Family::Controller,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
-    stands_for: None,
-    linear: Linear::No,
     inverse_dynamics: false,
-    absorbed_by: &[],
     shown_by: &[Experiment::References],
     parameters: &[ParameterInfo {
         name: "time_constant_s",
@@ -29,6 +21,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 0.1,
         typical: 2e-3,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Filter<S>(S);

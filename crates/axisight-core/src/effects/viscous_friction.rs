@@ -1,6 +1,6 @@
 //! Viscous friction beyond the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, Scope, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -8,16 +8,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     summary: "friction proportional to speed, beyond what the simulator has",
     equation: "tau_f = F_v phi'",
     source: "Wernholt (2004), eq. (9.7)",
-    scope: Scope::Axis,
     acts: Acts::Motor,
     family: Family::Friction,
-    contains: &[],
-    parts: &[],
-    usual: &[],
-    twins: &[],
     stands_for: Some(StandsFor { quantity: "viscous_friction", change: Change::Absolute }),
     linear: Linear::Slope,
-    inverse_dynamics: true,
     absorbed_by: &[Absorber::ViscousFriction],
     shown_by: &[Experiment::Speeds],
     parameters: &[ParameterInfo {
@@ -29,6 +23,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         upper: 1e4,
         typical: 0.01,
     }],
+    ..EffectInfo::PLAIN
 };
 
 struct Viscous<S>(S);

@@ -212,3 +212,30 @@ pub struct EffectInfo {
     /// Parameters in kernel order.
     pub parameters: &'static [ParameterInfo],
 }
+
+impl EffectInfo {
+    /// What most effects are: on one axis, held by torque predicted from measured motion and by no linear model,
+    /// akin to no other.
+    ///
+    /// An effect states what it is otherwise, `..EffectInfo::PLAIN` the rest. Of its own it states at least name,
+    /// summary, equation, source, point of action, family and parameters.
+    pub const PLAIN: Self = Self {
+        name: "",
+        summary: "",
+        equation: "",
+        source: "",
+        scope: Scope::Axis,
+        acts: Acts::Motor,
+        family: Family::Friction,
+        contains: &[],
+        parts: &[],
+        usual: &[],
+        twins: &[],
+        stands_for: None,
+        linear: Linear::No,
+        inverse_dynamics: true,
+        absorbed_by: &[],
+        shown_by: &[],
+        parameters: &[],
+    };
+}
