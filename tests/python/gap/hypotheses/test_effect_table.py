@@ -17,7 +17,7 @@ TABLE = effect_table()
 # What may know an effect by name: its definition, and the tables made for it.
 KNOWING = (
     "crates/axisight-core/src/effects/",
-    "python/axisight/gap/starts.py",
+    "python/axisight/gap/hypotheses/start_values.py",
     "python/axisight/effects/stated.py",
     # Closed forms of the laws of gears, which tests hold against simulations.
     "python/axisight/effects/gear_curves.py",
@@ -79,7 +79,7 @@ def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
         "graybox/robot_values.py": {"torque_offset", "backlash"},
         # A key of controllers that are told positions.
         "robot_file/reader.rs": {"gravity_compensation"},
-        "gap/speed_loop.py": {"gravity_compensation"},
+        "gap/controller/speed_loop.py": {"gravity_compensation"},
         # A load that is mounted, as drive data state it.
         "cli/model_options.py": {"payload"},
     }
